@@ -1,0 +1,106 @@
+"""Length of a cylinder as a function of the joint angle it turns: the rigid geometry of substructures A and B.
+
+All points in the frame of the carrier (the base for A; the section before for B) with its origin in the pivot and the
+carrier's axes; `phi` is the angle of the turned section against the carrier.
+
+A:  R = Rot(phi) (rx, ry), the rod pin on the turned section.
+B:  E = Rot(phi) (ex, ey); Q = intersection, left of D->E, of the circles (D, lL) and (E, lR); the rod pin sits on a link:
+    R = base + along u + left n, with base = D, u = (Q - D)/lL on link L, and base = E, u = (Q - E)/lR on link R.
+    B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
+    B3's R from Q towards E.
+
+length = |R - C|.  Derivatives follow from (Q-D).dQ = 0 and (Q-E).(dQ-dE) = 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import kernel
+
+DIRECT, LINK_L, LINK_R = 0, 1, 2
+
+LINKAGE = np.dtype(
+    [
+        ("mount", np.int64),  # DIRECT: rod pin on the turned section; LINK_L, LINK_R: on that link
+        ("cx", float), ("cy", float),  # barrel pin C, m
+        ("dx", float), ("dy", float),  # pivot D of link L, m
+        ("ex", float), ("ey", float),  # pin E of link R; of DIRECT the rod pin, m
+        ("length_l", float), ("length_r", float),  # m
+        ("along", float), ("left", float),  # place of the rod pin on its link, m
+    ]
+)  # fmt: skip
+
+
+@kernel
+def turned(x, y, phi):
+    """Vector (x, y) turned by phi (rad)."""
+    c, s = math.cos(phi), math.sin(phi)
+    return c * x - s * y, s * x + c * y
+
+
+@kernel
+def joint_pin(dx, dy, ex, ey, length_l, length_r):
+    """Pin Q left of D->E at distance length_l from D and length_r from E; NaN if the circles do not meet."""
+    vx, vy = ex - dx, ey - dy
+    distance2 = vx * vx + vy * vy
+    foot = (length_l * length_l - length_r * length_r + distance2) / (2.0 * distance2)
+    height2 = length_l * length_l / distance2 - foot * foot
+    if not height2 >= 0.0:
+        return math.nan, math.nan
+    height = math.sqrt(height2)
+    return dx + foot * vx - height * vy, dy + foot * vy + height * vx
+
+
+@kernel
+def link_angles(row, phi):
+    """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
+    ex, ey = turned(row.ex, row.ey, phi)
+    qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
+    return math.atan2(qy - row.dy, qx - row.dx), math.atan2(qy - ey, qx - ex)
+
+
+@kernel
+def cylinder_length(row, phi):
+    """Pin-to-pin length of the cylinder (m) and its derivative by phi (m/rad); NaN if the links do not close."""
+    ex, ey = turned(row.ex, row.ey, phi)
+    if row.mount == DIRECT:
+        rx, ry, drx, dry = ex, ey, -ey, ex
+    else:
+        qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
+        lx, ly = qx - row.dx, qy - row.dy
+        mx, my = qx - ex, qy - ey
+        # dQ = w (-ly, lx) with (Q-E).dQ = (Q-E).dE, dE = (-ey, ex)
+        rate_l = (mx * -ey + my * ex) / (my * lx - mx * ly)
+        if row.mount == LINK_L:
+            ux, uy = lx / row.length_l, ly / row.length_l
+            rx = row.dx + row.along * ux - row.left * uy
+            ry = row.dy + row.along * uy + row.left * ux
+            drx, dry = -rate_l * (ry - row.dy), rate_l * (rx - row.dx)
+        else:
+            ux, uy = mx / row.length_r, my / row.length_r
+            rx = ex + row.along * ux - row.left * uy
+            ry = ey + row.along * uy + row.left * ux
+            dqx, dqy = -rate_l * ly, rate_l * lx
+            rate_r = (ux * (dqy - ex) - uy * (dqx + ey)) / row.length_r
+            drx, dry = -ey - rate_r * (ry - ey), ex + rate_r * (rx - ex)
+    px, py = rx - row.cx, ry - row.cy
+    length = math.hypot(px, py)
+    return length, (px * drx + py * dry) / length
+
+
+@kernel
+def angle_of_length(row, length, phi, low, high):
+    """Angle next to `phi` at which the cylinder has `length`: Newton steps kept inside [low, high]; NaN if none."""
+    for _ in range(50):
+        now, slope = cylinder_length(row, phi)
+        step = (length - now) / slope
+        if not math.isfinite(step):
+            return math.nan
+        phi = min(max(phi + min(max(step, -0.2), 0.2), low), high)
+        if abs(step) < 1e-14:
+            return phi
+    now, slope = cylinder_length(row, phi)
+    return phi if abs(length - now) < 1e-11 else math.nan

@@ -1,0 +1,126 @@
+"""Frozen values that cross folders: what goes into the twin, what comes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Stream(Enum):
+    """A source of samples."""
+
+    STROKES = "cylinder_strokes"
+    ANGLES = "joint_angles"
+    IMU = "tip_imu"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One message of the rig, mapped to the scene's order and units.
+
+    Attributes
+    ----------
+    stream : Stream
+    stamp : int
+        Nanoseconds, `header.stamp` of the message.
+    values : ndarray
+        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad. ``IMU``: (2,) m/s^2, specific force along x and z of the tip.
+        NaN where the message had no value.
+    """
+
+    stream: Stream
+    stamp: int
+    values: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What the model says at the stamp of one stroke sample (model frame: x forward, y up).
+
+    Attributes
+    ----------
+    stamp : int
+        Nanoseconds.
+    tip_position, tip_displacement, tip_velocity, tip_acceleration : ndarray, shape (2,)
+        m, m, m/s, m/s^2. Displacement is against rigid sections on incompressible cylinders at the same strokes.
+    tip_angle, tip_angular_velocity, tip_angular_acceleration : float
+        Of the last section's head; rad, rad/s, rad/s^2.
+    joints, strokes, cylinder_forces : ndarray, shape (n,)
+        rad; m (as estimated); N (positive in tension).
+    shape : ndarray, shape (k, 2)
+        Points of the deflected centre line from the base pivot to the tip, m.
+    """
+
+    stamp: int
+    tip_position: Array
+    tip_displacement: Array
+    tip_velocity: Array
+    tip_acceleration: Array
+    tip_angle: float
+    tip_angular_velocity: float
+    tip_angular_acceleration: float
+    joints: Array
+    strokes: Array
+    cylinder_forces: Array
+    shape: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """Measured minus predicted at the stamp of one angle or IMU sample.
+
+    Attributes
+    ----------
+    stream : Stream
+    stamp : int
+        Nanoseconds.
+    names : tuple of str
+        One per channel: ``joint_1``, .. or ``tip_imu_x``, ``tip_imu_z``.
+    values, sigmas : ndarray, shape (len(names),)
+        The residual in the unit of the sensor, and the standard deviation expected of it. NaN where not measured.
+    """
+
+    stream: Stream
+    stamp: int
+    names: tuple[str, ...]
+    values: Array
+    sigmas: Array
+
+    @property
+    def normalised(self) -> Array:
+        """Residual over its expected standard deviation, shape (len(names),)."""
+        return self.values / self.sigmas
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What one sample caused.
+
+    Attributes
+    ----------
+    stamp : int
+        Of the sample, nanoseconds.
+    accepted : bool
+        False when the sample was not used; `events` says why.
+    prediction : Prediction or None
+        Set for every stroke sample that the model was stepped to.
+    residuals : tuple of Residuals
+        All that became known by this sample, in order of their stamps.
+    events : tuple of str
+        What was out of the ordinary, by the names in `boom_twin.twin.EVENTS`.
+    status : str
+        ``ok``, or one sentence on a failure of the model.
+    """
+
+    stamp: int
+    accepted: bool
+    prediction: Prediction | None = None
+    residuals: tuple[Residuals, ...] = ()
+    events: tuple[str, ...] = ()
+    status: str = "ok"
+    counts: dict[str, int] = field(default_factory=dict)

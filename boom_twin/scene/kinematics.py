@@ -1,0 +1,79 @@
+"""Rigid kinematics of a scene: postures, joint angles and strokes of the undeformed boom."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import UsageError
+from ..physics.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angle_of_length, cylinder_length
+from ..records import Array
+from .parts import Joint, Scene
+
+
+def linkage(scene: Scene, index: int) -> np.record:
+    """Geometry of joint `index` (0-based) as one record of `LINKAGE`."""
+    joint: Joint = scene.joints[index]
+    row = np.zeros(1, LINKAGE)
+    if joint.kind == "A":
+        rod_pin = scene.sections[0].rod_pin
+        pin, pivot = scene.base.cylinder_pin, scene.base.pivot
+        row["mount"] = DIRECT
+        row["cx"], row["cy"] = pin[0] - pivot[0], pin[1] - pivot[1]
+        row["ex"], row["ey"] = rod_pin  # type: ignore[misc]  # validated: A has a rod_pin
+        return row.view(np.recarray)[0]
+    row["cx"], row["cy"] = joint.C  # type: ignore[misc]  # validated: B has C, D, E, lL, lR
+    row["dx"], row["dy"] = joint.D  # type: ignore[misc]
+    row["ex"], row["ey"] = joint.E  # type: ignore[misc]
+    row["length_l"], row["length_r"] = joint.lL, joint.lR
+    if joint.kind == "B1":
+        row["mount"], row["along"] = LINK_L, joint.lL
+    elif joint.kind == "B2":
+        row["mount"] = LINK_L
+        row["along"], row["left"] = joint.R  # type: ignore[misc]
+    else:
+        row["mount"] = LINK_R
+        row["along"], row["left"] = joint.lR - joint.R[0], -joint.R[1]  # type: ignore[index, operator]
+    return row.view(np.recarray)[0]
+
+
+def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
+    """Strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
+    row, closed = linkage(scene, index), scene.joints[index].cylinder.closed_length
+    return np.array([cylinder_length(row, float(phi))[0] - closed for phi in np.atleast_1d(angles)])
+
+
+def strokes_of_posture(scene: Scene, name: str) -> Array:
+    """Strokes (m), shape (n,), that bring the undeformed boom to a named posture."""
+    if name not in scene.postures:
+        known = ", ".join(scene.postures) or "none"
+        raise UsageError(f"posture = {name!r}: the scene has {known}. Choose one of these or give the strokes.")
+    chord = np.radians(scene.postures[name])
+    relative = np.diff(chord, prepend=0.0)
+    return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
+
+
+def joint_angles_of_strokes(scene: Scene, strokes: Array, samples: int = 181) -> Array:
+    """Relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m).
+
+    Raises
+    ------
+    UsageError
+        If a stroke is not reached anywhere in its joint's ``range_deg``.
+    """
+    angles = np.empty(len(scene.joints))
+    for i, stroke in enumerate(strokes):
+        low, high = np.radians(scene.joints[i].range_deg)
+        grid = np.linspace(low, high, samples)
+        curve = stroke_curve(scene, i, grid)
+        gap = curve - stroke
+        start = int(np.nanargmin(np.abs(gap)))
+        length = scene.joints[i].cylinder.closed_length + float(stroke)
+        angles[i] = angle_of_length(linkage(scene, i), length, grid[start], low - 1e-6, high + 1e-6)
+        if not math.isfinite(angles[i]):
+            raise UsageError(
+                f"stroke_{i + 1} = {stroke:.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
+                f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a stroke inside."
+            )
+    return angles

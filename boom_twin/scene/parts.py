@@ -1,0 +1,136 @@
+"""The parts of a boom as a scene file names them: words, units and bounds of single values.
+
+Frames, signs and the meaning of every point are told in the comments of the default scene (``boom_twin scene``).
+All values are SI. ``None`` means "not named, therefore not in the model".
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Point = tuple[Finite, Finite]
+Modes = Annotated[int, Field(ge=0, le=10)]
+
+
+class Part(BaseModel):
+    """Base of all parts: frozen, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Material(Part):
+    """E (Pa), Poisson's ratio, density (kg/m^3)."""
+
+    name: str = "steel"
+    E: Positive
+    nu: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
+    rho: Positive | None = None
+
+
+class Base(Part):
+    """Pivot of section 1, barrel pin of cylinder 1 (m); inclination (rad) turns the base anticlockwise."""
+
+    pivot: Point
+    cylinder_pin: Point
+    inclination: Finite = 0.0
+
+
+class RigidPart(Part):
+    """Mass (kg), centre in the axes of its section (m), inertia about that centre (kg m^2)."""
+
+    mass: NotNegative
+    com: Point
+    inertia: NotNegative
+
+
+class Section(Part):
+    """One boom section, pivot to pivot; lengths in m from the inboard pivot.
+
+    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s).
+    """
+
+    length: Positive
+    beam: tuple[Finite, Finite] | None = None
+    A: Positive | None = None
+    I: Positive | None = None  # noqa: E741 - the field's symbol, and the contract's key
+    rho_A: Positive | None = None
+    rho_I: NotNegative | None = None
+    beta: NotNegative | None = None
+    modes: Modes | None = None
+    root: RigidPart | None = None
+    head: RigidPart | None = None
+    rod_pin: Point | None = None
+
+
+class CylinderPart(Part):
+    """Barrel or rod: mass (kg), inertia about its own centre (kg m^2), distance of that centre from its pin (m)."""
+
+    mass: NotNegative
+    inertia: NotNegative
+    com: NotNegative
+
+
+class Cylinder(Part):
+    """Drive with oil spring k (N/m) and damper d (N s/m); no k means incompressible. Lengths in m."""
+
+    k: Positive | None = None
+    d: NotNegative | None = None
+    closed_length: Positive
+    max_stroke: Positive
+    barrel: CylinderPart | None = None
+    rod: CylinderPart | None = None
+
+
+class Joint(Part):
+    """What turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
+
+    C, D relative to the outboard pivot of the section before, E to the pivot of its own section (m); link lengths
+    lL, lR (m) and masses mL, mR (kg); R places the rod pin on a link (B2, B3). ``range_deg`` is in degrees.
+    """
+
+    kind: Literal["A", "B1", "B2", "B3"]
+    range_deg: tuple[Finite, Finite]
+    C: Point | None = None
+    D: Point | None = None
+    E: Point | None = None
+    lL: Positive | None = None
+    lR: Positive | None = None
+    R: Point | None = None
+    mL: NotNegative | None = None
+    mR: NotNegative | None = None
+    cylinder: Cylinder
+
+
+class Tip(Part):
+    """Payload: a point mass at the outboard pivot of the last section (kg)."""
+
+    payload: NotNegative | None = None
+
+
+class Scene(Part):
+    """A whole boom with its base, its gravity (m/s^2) and its named postures (deg to the base's x axis)."""
+
+    description: str = ""
+    gravity: Point
+    material: Material
+    base: Base
+    modes: Modes = 3
+    sections: Annotated[tuple[Section, ...], Field(min_length=1)]
+    joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
+    tip: Tip | None = None
+    line_fill: NotNegative | None = None
+    postures: dict[str, tuple[Finite, ...]] = {}
+
+    def modes_of(self, index: int) -> int:
+        """Bending coordinates per flexible part of section `index` (0-based)."""
+        own = self.sections[index].modes
+        return self.modes if own is None else own
+
+    def is_flexible(self, index: int) -> bool:
+        """Whether section `index` (0-based) bends."""
+        return self.sections[index].beam is not None and self.modes_of(index) > 0

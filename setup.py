@@ -1,0 +1,49 @@
+"""Package boom_twin for pip and for colcon (ament_python)."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+HERE = Path(__file__).parent
+CONFIG = sorted(str(p.relative_to(HERE)) for p in (HERE / "msg_config").glob("*.yaml"))
+
+setup(
+    name="boom_twin",
+    version="0.1.0",
+    description="Digital twin of a concrete placing boom: transfer-matrix model, ROS 2 node, replay of MCAP sessions",
+    long_description=(HERE / "README.md").read_text(encoding="utf-8") if (HERE / "README.md").exists() else "",
+    long_description_content_type="text/markdown",
+    license="Apache-2.0",
+    author="boom_twin developers",
+    packages=find_packages(include=["boom_twin", "boom_twin.*"]),
+    package_data={"boom_twin": ["py.typed", "msg_config/*.yaml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["msg_config/resource/boom_twin"]),
+        ("share/boom_twin", ["package.xml"]),
+        ("share/boom_twin/msg_config", CONFIG),
+    ],
+    python_requires=">=3.11",
+    install_requires=[
+        "numpy>=2.0,<3",
+        "scipy>=1.13,<2",
+        "numba>=0.61,<1",
+        "pydantic>=2.7,<3",
+        "ruamel.yaml>=0.18,<1",
+        "mcap>=1.2,<2",
+        "rosbags>=0.10,<0.12",
+        "matplotlib>=3.8,<4",
+        "tqdm>=4.66,<5",
+    ],
+    extras_require={
+        "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<8", "ros-jazzy-common-interfaces>=5.3,<6"],
+        "test": [
+            "pytest>=8,<10",
+            "hypothesis>=6.100,<7",
+            "ruff>=0.6,<1",
+            "mypy>=1.11,<3",
+            "import-linter>=2.0,<3",
+        ],
+        "peers": ["exudyn>=1.9,<2"],
+    },
+    entry_points={"console_scripts": ["boom_twin = boom_twin.cli.main:main", "twin_node = boom_twin.ros.main:main"]},
+)
