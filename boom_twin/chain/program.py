@@ -1,0 +1,117 @@
+"""What a compiled boom is: a list of operations along the chain, their tables, and the arrays they work on.
+
+The operations stand in the order from the base to the tip. Positions are placed in that order, forces are swept in against
+it, increments are swept out along it. A kind of element that a scene does not have is a table of length 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..records import Array
+
+JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN, TIP = range(8)
+
+OPERATION = np.dtype([("kind", np.int64), ("row", np.int64)])
+
+JOINT = np.dtype(
+    [
+        ("z", np.int64),  # A: theta, N.  B: theta, alpha_L, alpha_R, lambda_x, lambda_y, N
+        ("x", float), ("y", float),  # pivot of joint A in the base, m
+        ("first_link", np.int64), ("links", np.int64),  # rows of LINK: those that have mass
+    ]
+)  # fmt: skip
+
+OFFSET_ROW = np.dtype([("x", float), ("y", float)])
+
+BODY_ROW = np.dtype(
+    [
+        ("history", np.int64),  # place of x, y, theta among the histories
+        ("x", float), ("y", float),  # centre from the frame it sits on, m
+        ("mass", float),  # kg
+        ("inertia", float),  # about the centre, kg m^2
+    ]
+)  # fmt: skip
+
+OUTLET = np.dtype([("cylinder", np.int64), ("x", float), ("y", float)])  # pin of that cylinder, from the frame, m
+
+LINK = np.dtype(
+    [
+        ("side", np.int64),  # LINK_L or LINK_R
+        ("history", np.int64),  # place of x, y, alpha among the histories
+        ("middle", float),  # half the length, m
+        ("mass", float),  # kg
+        ("inertia", float),  # about the middle, kg m^2
+    ]
+)
+
+
+class Tables(NamedTuple):
+    """A compiled boom. Record arrays, one row an element; see the dtypes for units."""
+
+    operations: np.recarray
+    joints: np.recarray
+    linkages: np.recarray
+    links: np.recarray
+    offsets: np.recarray
+    bodies: np.recarray
+    beams: np.recarray
+    psi: Array  # (beams, P+1, n)
+    weights: Array  # (beams, P+1, P), m
+    stiffness: Array  # (beams, n, n), N m
+    point_mass: Array  # (beams, P), kg
+    point_rotary: Array  # (beams, P), kg m^2
+    outlets: np.recarray
+    cylinders: np.recarray
+    parts: np.recarray
+    gravity: Array  # (2,), m/s^2
+    moving: Array  # (unknowns,): 1 for coordinates, 0 for forces
+    scale: Array  # (unknowns,): turns an increment into an angle, rad; 0 for forces
+    tip: int  # place of x, y, theta of the tip among the histories
+
+
+class Motion(NamedTuple):
+    """How histories give accelerations and velocities: a = gain (x - hat), v = rate x + offset."""
+
+    gain: float
+    rate: float
+    hat: Array
+    offset: Array
+
+
+class State(NamedTuple):
+    """What the boom remembers from step to step.
+
+    z : (unknowns,) coordinates and forces, see the tables.
+    history : (histories, 4) x, v, a, p of every unknown and then of every mass point; see `physics.integrators`.
+    frames : (operations + 1, 3) x, y, theta before every operation, and at the tip.
+    pins : (cylinders, 4) pins C and R of every cylinder, m.
+    """
+
+    z: Array
+    history: Array
+    frames: Array
+    pins: Array
+
+
+class Work(NamedTuple):
+    """Scratch of one step; no meaning between steps."""
+
+    position: Array  # (histories,)
+    hat: Array
+    offset: Array
+    s: Array  # (6, 6)
+    p: Array  # (6,)
+    g: Array  # (size,)
+    h: Array  # (size, size)
+    right: Array  # (6, 6)
+    gains: Array  # (operations, rows, 7): increments of the condensed unknowns by those of the cut; constants last
+    blocks: Array  # (cylinders, 6, 6) what a joint condenses, kept for counting natural frequencies
+    rho: Array  # (beams, P+1, 2)
+    drho: Array  # (beams, P+1, n+1, 2)
+    turn: Array  # (beams, P, 2)
+    local: Array  # (P, 2)
+    dz: Array  # (unknowns,)
+    cut: Array  # (6,)

@@ -1,0 +1,100 @@
+"""One time step of the boom, and many in one call."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..physics.integrators import finish_step, generalised_alpha, start_step
+from ..physics.jit import kernel
+from .newton import OK, newton
+from .program import JOINT_A, JOINT_B, Motion
+
+LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
+
+
+@kernel
+def predict(t, state, step):
+    """First guess of the unknowns at the new time: x + h v + h^2 a/2 for coordinates, forces as they were."""
+    for i in range(state.z.shape[0]):
+        if t.moving[i] > 0.0:
+            x, v, a = state.history[i, 0], state.history[i, 1], state.history[i, 2]
+            state.z[i] = x + step * (v + 0.5 * step * a)
+
+
+@kernel
+def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes):
+    """Step the boom by `scheme.step` to drive lengths (m) and rates (m/s), both shape (n,), at the new time.
+
+    Returns status, passes, last increment (rad). On failure the histories stay as they were.
+    """
+    start_step(scheme, state.history, work.hat, work.offset)
+    predict(t, state, scheme.step)
+    motion = Motion(scheme.gain, scheme.rate, work.hat, work.offset)
+    status, count, size = newton(t, state, work, motion, drive, drive_rate, tolerance, passes, LONGEST_INCREMENT)
+    if status == OK:
+        finish_step(scheme, work.position, work.hat, work.offset, state.history)
+    return status, count, size
+
+
+@kernel
+def rest(state, work):
+    """Let the boom be at rest where it is: histories hold the present positions, no velocity, no acceleration."""
+    for i in range(state.history.shape[0]):
+        state.history[i, 0] = work.position[i]
+        state.history[i, 1] = 0.0
+        state.history[i, 2] = 0.0
+        state.history[i, 3] = 0.0
+
+
+@kernel
+def observe(t, state, out):
+    """Write one row of results: joint angles (n), cylinder forces (n), then x, v, a of tip x, y, theta (9)."""
+    n, at = t.joints.shape[0], 0
+    for k in range(t.operations.shape[0]):
+        row = t.operations[k].row
+        if t.operations[k].kind == JOINT_A or t.operations[k].kind == JOINT_B:
+            out[at] = state.z[t.joints[row].z] - state.frames[k, 2]
+            at += 1
+    for i in range(n):
+        out[n + i] = state.z[t.cylinders[i].z]
+    for i in range(3):
+        for j in range(3):
+            out[2 * n + 3 * i + j] = state.history[t.tip + j, i]
+
+
+@kernel
+def run(t, state, work, steps, counts, drives, rates, rho, tolerance, passes, out):
+    """Follow drive lengths through many rows.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (rows,)
+        Step (s) that leads to each row.
+    counts : ndarray of int, shape (rows,)
+        Number of such steps; `drives`, `rates` hold all of them one after the other.
+    drives, rates : ndarray, shape (sum of counts, n)
+        Drive lengths (m) and rates (m/s) at the end of every step.
+    out : ndarray, shape (rows, 2 n + 9)
+        See `observe`.
+
+    Returns
+    -------
+    status, row, passes : int
+        Status of the last step and the row it belongs to; total of Newton passes.
+    """
+    at, total = 0, 0
+    for row in range(steps.shape[0]):
+        scheme = generalised_alpha(steps[row], rho)
+        for _ in range(counts[row]):
+            status, count, _ = advance(t, state, work, scheme, drives[at], rates[at], tolerance, passes)
+            total += count
+            at += 1
+            if status != OK:
+                return status, row, total
+        observe(t, state, out[row])
+    return OK, steps.shape[0], total
+
+
+def motion_at_rest(size: int) -> Motion:
+    """No inertia, no damping: the equations are statics. Work arrays of `size` histories."""
+    return Motion(0.0, 0.0, np.zeros(size), np.zeros(size))

@@ -1,0 +1,48 @@
+"""Notation used by every kernel. Documentation only.
+
+Frames and signs
+    Model plane: x forward, y up, angles anticlockwise, SI units, radians. The frame is the base's (`base_link`); an inclined
+    base turns gravity instead.
+
+State vector at a cut of the chain
+    Z = [e, f] with e = (x, y, theta), position (m) and orientation (rad), and f = (qx, qy, M), the force (N) and torque
+    (N m) that the inboard side exerts on the outboard side. At an input end f is positive along the axes, so a massless hinge
+    passes it unchanged (Zhang et al. 2016, section 3.1). f is written force first, so that it is conjugate to e.
+
+Transfer in Newton form
+    An element has coordinates z of its own (bending, joint angle, pin forces). Its equations stay nonlinear; what is
+    transferred are increments about the present iterate. With the outboard side condensed to
+
+        f_O = S de_O + p                                                             (Riccati transformation)
+
+    the equations of an element, written as the gradient of its work, are
+
+        f_I  = g_e(e, z) + H_ee de + H_ez dz ,     0 = g_z(e, z) + H_ze de + H_zz dz ,
+
+    with S and p already pulled back through e_O(e, z). Condensing dz gives S_I = H_ee - H_ez H_zz^-1 H_ze and
+    p_I = g_e - H_ez H_zz^-1 g_z: one small solve an element, no product of large and small numbers. With transfer-matrix
+    blocks U this is the known S_I = -(U_ff - S U_ef)^-1 (U_fe - S U_ee), without forming U.
+
+Carried columns
+    A loop closes over a cylinder whose barrel pin C lies further inboard. From the loop's joint to C the cut has extra columns:
+    e is followed by the increments of C (dx_C, dy_C), or by the force N of cylinder 1, and S, p grow accordingly.
+
+Time
+    Every mass centre and every quadrature point carries its own history; an integrator gives, for each scalar of it,
+    acceleration a = A (x - x_hat) and velocity v = C x + D at the new time (notes at `boom_twin.physics.integrators`). With
+    A = C = 0 the same equations are statics; with A = -omega^2 and x_hat = x they are harmonic vibration.
+
+Symbols
+    S, p     condensed tangent and force of all that lies outboard     A, C, D   coefficients of the integrator
+    c, s     cos and sin of an orientation                              h         step, s
+    N        force between barrel and rod, tension positive             l, l_ref  pin-to-pin length, length of the drive
+
+Sources
+    [Z] Z.W. Zhang, Y.X. Wu, J.G. Liu, W. Ren, M.H. Cao: Research on the rigid-flexible multibody dynamics of concrete placing
+        boom, 2016.
+    [R] W. Ren, Y. Wu, Z. Zhang, W. Shi: A numerical method of large-scale concrete displacing boom dynamic and experimental
+        validation, 2014, doi 10.1155/2014/943847.
+    [B] Riccati form for tree systems: doi 10.1007/s11044-019-09711-2.
+    [AB] M. Arnold, O. Bruels: Convergence of the generalized-alpha scheme for constrained mechanical systems, Multibody
+        System Dynamics 18 (2007).
+"""

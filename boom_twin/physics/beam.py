@@ -1,0 +1,226 @@
+"""Flexible beam part in a floating frame at its input end I: Euler-Bernoulli, exact in rotation, static axial stretch.
+
+Coordinates q: n bending ones and, if the row says so, one axial strain eps. The cross-section at arc s is turned by
+psi(s).q against the input end, psi(0) = 0; the curvature is psi'(s).q, so bending energy is quadratic, 1/2 q.K q, for any
+rotation. Positions follow by integration along the axis with the cosines and sines at P Gauss points,
+
+    rho(s) = (1 + eps) int_0^s (cos psi.q, sin psi.q) ds  ~  (1 + eps) sum_j W[s, j] (cos_j, sin_j),
+    r(s) = r_I + Rot(theta) rho(s),     theta(s) = theta + psi(s).q .
+
+Foreshortening, and with it the stiffness that axial load gives or takes (geometric stiffness), is in the cosines; nothing is
+added for it. Masses sit at the Gauss points. Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.notation`; the
+integrated form is derived here.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .algebra import condense
+from .jit import kernel
+
+BEAM = np.dtype(
+    [
+        ("z", np.int64),  # place of q among the unknowns; the axial strain follows the bending coordinates
+        ("bending", np.int64),  # n
+        ("axial", np.int64),  # 1 or 0
+        ("points", np.int64),  # P
+        ("rotary", np.int64),  # P if cross-sections have rotary inertia, else 0
+        ("damped", np.int64),  # number of coordinates if there is material damping, else 0
+        ("history", np.int64),  # place of x, y of each point among the histories; then theta of each, if rotary
+        ("beta", float),  # stiffness-proportional damping, s
+        ("axial_stiffness", float),  # E A length, N m: energy is 1/2 of it times eps^2
+    ]
+)
+
+
+@kernel
+def beam_shape(row, psi, weights, z, rho, drho, turn):
+    """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), and turn (P, 2): cos and sin; returns the end's turn.
+
+    `psi` is (P+1, n), `weights` (P+1, P); their last row belongs to the output end.
+    """
+    stretch = 1.0
+    if row.axial:
+        stretch += z[row.z + row.bending]
+    angle = 0.0
+    for j in range(row.points + 1):
+        angle = 0.0
+        for k in range(row.bending):
+            angle += psi[j, k] * z[row.z + k]
+        if j < row.points:
+            turn[j, 0] = math.cos(angle)
+            turn[j, 1] = math.sin(angle)
+    for i in range(row.points + 1):
+        x, y = 0.0, 0.0
+        for k in range(row.bending):
+            drho[i, k, 0] = 0.0
+            drho[i, k, 1] = 0.0
+        for j in range(row.points):
+            wx, wy = weights[i, j] * turn[j, 0], weights[i, j] * turn[j, 1]
+            x += wx
+            y += wy
+            for k in range(row.bending):
+                drho[i, k, 0] -= stretch * wy * psi[j, k]
+                drho[i, k, 1] += stretch * wx * psi[j, k]
+        rho[i, 0], rho[i, 1] = stretch * x, stretch * y
+        if row.axial:
+            drho[i, row.bending, 0], drho[i, row.bending, 1] = x, y
+    return angle
+
+
+@kernel
+def place_beam(row, psi, rho, z, x, y, theta, position):
+    """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
+    c, s = math.cos(theta), math.sin(theta)
+    for i in range(row.points):
+        at = row.history + 2 * i
+        position[at] = x + c * rho[i, 0] - s * rho[i, 1]
+        position[at + 1] = y + s * rho[i, 0] + c * rho[i, 1]
+    for i in range(row.rotary):
+        angle = theta
+        for k in range(row.bending):
+            angle += psi[i, k] * z[row.z + k]
+        position[row.history + 2 * row.points + i] = angle
+
+
+@kernel
+def transfer_beam(row, tables, scratch, z, theta, motion, gravity, position, s, p, m, g, h):
+    """Carry a cut (s, p) with m slots from the output to the input end, condensing q.
+
+    tables : psi, weights, stiffness (n, n), mass (P,), rotary (P,) of this part.
+    scratch : rho, drho, turn as `beam_shape` left them, and `local` (P, 2) for forces.
+    g, h : work; afterwards rows m.. of both hold the gains of q (see `condense`).
+
+    Returns the number of negative pivots, or -1.
+    """
+    psi, weights, stiffness, mass, rotary = tables
+    rho, drho, turn, local = scratch
+    c, sn = math.cos(theta), math.sin(theta)
+    n, points = row.bending, row.points
+    size = n + row.axial
+    fx_end, fy_end = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # in the axes of the input end
+    _pull_back_end(psi[points], rho[points], drho[points], n, size, c, sn, s, p, m, g, h)
+    for a in range(size):  # second derivatives of the end, turning against bending
+        h[m + a, 2] += fy_end * drho[points, a, 0] - fx_end * drho[points, a, 1]
+    _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, g, h, m)
+    _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, 1.0 if size == n else 1.0 + z[row.z + n], h, m)
+    _add_stiffness(row, stiffness, z, motion, g, h, m)
+    negative = condense(h, g, m, size)
+    for i in range(m):
+        p[i] = g[i]
+        for j in range(m):
+            s[i, j] = h[i, j]
+    return negative
+
+
+@kernel
+def _pull_back_end(psi, rho, drho, n, size, c, sn, s, p, m, g, h):
+    """Pull (s, p) at the output end back to (e_I, carried slots, q) in g, h (lower triangle)."""
+    ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
+    for a in range(size):
+        bx, by = c * drho[a, 0] - sn * drho[a, 1], sn * drho[a, 0] + c * drho[a, 1]
+        turn = psi[a] if a < n else 0.0
+        g[m + a] = bx * p[0] + by * p[1] + turn * p[2]
+        for i in range(m):
+            h[m + a, i] = s[i, 0] * bx + s[i, 1] * by + s[i, 2] * turn
+    for a in range(size):
+        for b in range(a + 1):
+            bx, by = c * drho[b, 0] - sn * drho[b, 1], sn * drho[b, 0] + c * drho[b, 1]
+            turn = psi[b] if b < n else 0.0
+            h[m + a, m + b] = h[m + a, 0] * bx + h[m + a, 1] * by + h[m + a, 2] * turn
+        h[m + a, 2] += ex * h[m + a, 1] - ey * h[m + a, 0]
+    for i in range(m):
+        g[i] = p[i]
+        for j in range(m):
+            h[i, j] = s[i, j]
+    g[2] += ex * p[1] - ey * p[0]
+    for i in range(m):
+        h[i, 2] += ex * h[i, 1] - ey * h[i, 0]
+    for i in range(m):
+        h[2, i] += ex * h[1, i] - ey * h[0, i]
+    h[2, 2] -= ex * p[0] + ey * p[1]
+
+
+@kernel
+def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, g, h, m):
+    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`."""
+    size = row.bending + row.axial
+    for i in range(row.points):
+        at = row.history + 2 * i
+        inertial = mass[i] * motion.gain
+        fx = inertial * (position[at] - motion.hat[at]) - mass[i] * gravity[0]
+        fy = inertial * (position[at + 1] - motion.hat[at + 1]) - mass[i] * gravity[1]
+        x, y = rho[i, 0], rho[i, 1]
+        dx, dy = c * x - sn * y, sn * x + c * y
+        ux, uy = c * fx + sn * fy, c * fy - sn * fx
+        local[i, 0], local[i, 1] = ux, uy
+        g[0] += fx
+        g[1] += fy
+        g[2] += dx * fy - dy * fx
+        h[0, 0] += inertial
+        h[1, 1] += inertial
+        h[2, 0] -= inertial * dy
+        h[2, 1] += inertial * dx
+        h[2, 2] += inertial * (x * x + y * y) - (dx * fx + dy * fy)
+        for a in range(size):
+            ax, ay = drho[i, a, 0], drho[i, a, 1]
+            g[m + a] += ux * ax + uy * ay
+            h[m + a, 0] += inertial * (c * ax - sn * ay)
+            h[m + a, 1] += inertial * (sn * ax + c * ay)
+            h[m + a, 2] += inertial * (x * ay - y * ax) + uy * ax - ux * ay
+            for b in range(a + 1):
+                h[m + a, m + b] += inertial * (ax * drho[i, b, 0] + ay * drho[i, b, 1])
+    for i in range(row.rotary):
+        at = row.history + 2 * row.points + i
+        inertial = rotary[i] * motion.gain
+        torque = inertial * (position[at] - motion.hat[at])
+        g[2] += torque
+        h[2, 2] += inertial
+        for a in range(row.bending):
+            g[m + a] += torque * psi[i, a]
+            h[m + a, 2] += inertial * psi[i, a]
+            for b in range(a + 1):
+                h[m + a, m + b] += inertial * psi[i, a] * psi[i, b]
+
+
+@kernel
+def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stretch, h, m):
+    """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
+    n, points = row.bending, row.points
+    for j in range(points):
+        fx, fy = weights[points, j] * fx_end, weights[points, j] * fy_end
+        for i in range(points):
+            fx += weights[i, j] * local[i, 0]
+            fy += weights[i, j] * local[i, 1]
+        along = stretch * (fx * turn[j, 0] + fy * turn[j, 1])
+        across = fy * turn[j, 0] - fx * turn[j, 1]
+        for a in range(n):
+            for b in range(a + 1):
+                h[m + a, m + b] -= along * psi[j, a] * psi[j, b]
+            if row.axial:
+                h[m + n, m + a] += across * psi[j, a]
+
+
+@kernel
+def _add_stiffness(row, stiffness, z, motion, g, h, m):
+    """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
+    n = row.bending
+    lead = 1.0 + row.beta * motion.rate
+    for a in range(n):
+        for b in range(n):
+            g[m + a] += stiffness[a, b] * z[row.z + b]
+            if b <= a:
+                h[m + a, m + b] += lead * stiffness[a, b]
+    if row.axial:
+        g[m + n] += row.axial_stiffness * z[row.z + n]
+        h[m + n, m + n] += lead * row.axial_stiffness
+    for b in range(row.damped):
+        rate = row.beta * (motion.rate * z[row.z + b] + motion.offset[row.z + b])
+        if b < n:
+            for a in range(n):
+                g[m + a] += stiffness[a, b] * rate
+        else:
+            g[m + n] += row.axial_stiffness * rate

@@ -1,0 +1,129 @@
+"""Hydraulic cylinder: barrel, rod, and a drive in series with an oil spring and damper, between pins C and R.
+
+d = R - C, l = |d|, e = d/l, n = e turned by 90 degrees, gamma = angle of e. Barrel centre C + b e, rod centre R - c e.
+
+    N = k (l - l_ref) + dv (l' - l_ref')       written as a compliance, so that k -> infinity is the rigid drive:
+    0 = [l - l_ref + tau (l' - l_ref') - N/k] / (1 + tau C),   tau = dv/k,   l' = C l + D.
+
+First and second derivatives by d:  dl = e.dd,  d2l = n n^T/l;  dgamma = n.dd/l,  d2gamma = -(e n^T + n e^T)/l^2;  for a
+constant force s, d(s.e) = (s.n) n.dd/l and d2(s.e) = -[(s.e) n n^T + (s.n)(e n^T + n e^T)]/l^2.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import kernel
+
+BARREL, ROD = 0, 1
+
+CYLINDER = np.dtype(
+    [
+        ("z", np.int64),  # place of N among the unknowns
+        ("history", np.int64),  # place of l among the histories
+        ("first_part", np.int64), ("parts", np.int64),  # rows of CYLINDER_PART
+        ("closed_length", float),  # m
+        ("compliance", float),  # 1/k, m/N; 0 = incompressible
+        ("lag", float),  # tau = damping over stiffness, s
+    ]
+)  # fmt: skip
+
+CYLINDER_PART = np.dtype(
+    [
+        ("end", np.int64),  # BARREL: measured from C; ROD: from R
+        ("history", np.int64),  # place of x, y, gamma among the histories
+        ("com", float),  # distance of the centre from its pin, m
+        ("mass", float),  # kg
+        ("inertia", float),  # about the centre, kg m^2
+    ]
+)
+
+
+@kernel
+def near(angle, other):
+    """The value of `angle` modulo 2 pi that is nearest to `other`."""
+    return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
+
+
+@kernel
+def place_cylinder(row, parts, cx, cy, rx, ry, position):
+    """Write length, centres and angles into `position`."""
+    dx, dy = rx - cx, ry - cy
+    length = math.hypot(dx, dy)
+    ex, ey = dx / length, dy / length
+    position[row.history] = length
+    for k in range(row.first_part, row.first_part + row.parts):
+        part = parts[k]
+        x, y, along = cx, cy, part.com
+        if part.end == ROD:
+            x, y, along = rx, ry, -part.com
+        position[part.history] = x + along * ex
+        position[part.history + 1] = y + along * ey
+        position[part.history + 2] = near(math.atan2(dy, dx), position[part.history + 2])
+
+
+@kernel
+def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion, gravity, position, g, h):
+    """Gradient g, shape (5,), and tangent h, shape (5, 5), over (x_C, y_C, x_R, y_R, N).
+
+    `motion` holds A, C, x_hat and D (see `boom_twin.chain.program.Motion`); `drive`, `drive_rate` are l_ref, l_ref'.
+    """
+    dx, dy = rx - cx, ry - cy
+    length = math.hypot(dx, dy)
+    ex, ey = dx / length, dy / length
+    nx, ny = -ey, ex
+    d_n, d_nn, d_en = 0.0, force / length, 0.0  # by d: gradient along n, tangents in the axes e, n
+    cc_ee, cc_nn, rr_ee, rr_nn, cr_nn = 0.0, 0.0, 0.0, 0.0, 0.0
+    gcx, gcy, grx, gry = 0.0, 0.0, 0.0, 0.0
+    for k in range(row.first_part, row.first_part + row.parts):
+        part = parts[k]
+        i = part.history
+        inertial = part.mass * motion.gain
+        fx = inertial * (position[i] - motion.hat[i]) - part.mass * gravity[0]
+        fy = inertial * (position[i + 1] - motion.hat[i + 1]) - part.mass * gravity[1]
+        ratio = part.com / length
+        far = inertial * ratio * ratio
+        close = inertial * (1.0 - ratio) * (1.0 - ratio)
+        cr_nn += inertial * ratio * (1.0 - ratio)
+        along = part.com
+        if part.end == BARREL:
+            gcx += fx
+            gcy += fy
+            cc_ee += inertial
+            cc_nn += close
+            rr_nn += far
+        else:
+            along = -part.com
+            grx += fx
+            gry += fy
+            rr_ee += inertial
+            rr_nn += close
+            cc_nn += far
+        f_e, f_n = along * (fx * ex + fy * ey), along * (fx * nx + fy * ny)
+        torque = part.inertia * motion.gain * (position[i + 2] - motion.hat[i + 2])
+        d_n += (f_n + torque) / length
+        d_nn += (part.inertia * motion.gain - f_e) / (length * length)
+        d_en -= (f_n + torque) / (length * length)
+    gx, gy = force * ex + d_n * nx, force * ey + d_n * ny
+    g[0], g[1], g[2], g[3] = gcx - gx, gcy - gy, grx + gx, gry + gy
+    _fill(h, 0, 0, ex, ey, cc_ee, d_en, cc_nn + d_nn)
+    _fill(h, 2, 2, ex, ey, rr_ee, d_en, rr_nn + d_nn)
+    _fill(h, 0, 2, ex, ey, 0.0, -d_en, cr_nn - d_nn)
+    _fill(h, 2, 0, ex, ey, 0.0, -d_en, cr_nn - d_nn)
+    lead = 1.0 + row.lag * motion.rate
+    speed = motion.rate * length + motion.offset[row.history] - drive_rate
+    g[4] = (length - drive + row.lag * speed - row.compliance * force) / lead
+    h[4, 0], h[4, 1], h[4, 2], h[4, 3], h[4, 4] = -ex, -ey, ex, ey, -row.compliance / lead
+    h[0, 4], h[1, 4], h[2, 4], h[3, 4] = -ex, -ey, ex, ey
+
+
+@kernel
+def _fill(h, i, j, ex, ey, ee, en, nn):
+    """Write a symmetric 2x2 block given in the axes e, n at rows i, columns j in the model axes."""
+    mixed = (ee - nn) * ex * ey + en * (ex * ex - ey * ey)
+    h[i, j] = ee * ex * ex - 2.0 * en * ex * ey + nn * ey * ey
+    h[i, j + 1] = mixed
+    h[i + 1, j] = mixed
+    h[i + 1, j + 1] = ee * ey * ey + 2.0 * en * ex * ey + nn * ex * ex

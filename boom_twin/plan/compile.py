@@ -1,0 +1,324 @@
+"""Scene -> compiled boom: which operation stands where along the chain, and where its numbers sit in memory.
+
+Only what the scene names gets rows. Section axes: x from the inboard pivot; the head's frame starts where the beam ends.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..chain import program
+from ..chain.program import State, Tables, Work
+from ..physics import cylinder, modes
+from ..physics.linkage import LINK_L, LINK_R, LINKAGE
+from ..records import Array
+from ..scene.kinematics import linkage
+from ..scene.parts import Cylinder, RigidPart, Scene, Section
+from .layout import Layout
+
+BasisName = Literal["end-shapes", "cantilever"]
+BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
+SAME_PLACE = 1e-9  # m
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A compiled boom.
+
+    Attributes
+    ----------
+    tables : Tables
+        What the kernels read.
+    names : tuple of str
+        The unknowns, in order.
+    masses, weights : ndarray, shape (histories,)
+        Inertia of every history (kg, kg m^2; 0 for those of unknowns) and weight along it (N).
+    outline : ndarray of int, shape (k, 2)
+        Points of the centre line, base to tip: (0, row of frames) or (1, place of x among the histories).
+    """
+
+    tables: Tables
+    names: tuple[str, ...]
+    masses: Array
+    weights: Array
+    outline: np.ndarray
+    closed_lengths: Array
+
+    @property
+    def joints(self) -> int:
+        """Number of joints, and of sections."""
+        return len(self.tables.joints)
+
+    def state(self) -> State:
+        """A fresh state, all zero but the pins in the base."""
+        histories, n = len(self.masses), self.joints
+        state = State(
+            np.zeros(len(self.names)), np.zeros((histories, 4)), np.zeros((len(self.tables.operations) + 1, 3)), np.zeros((n, 4))
+        )
+        first = self.tables.linkages[0]
+        state.pins[0, :2] = self.tables.joints[0].x + first.cx, self.tables.joints[0].y + first.cy
+        return state
+
+    def work(self) -> Work:
+        """Scratch arrays of the right sizes."""
+        t, histories = self.tables, len(self.masses)
+        points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
+        beams, operations = len(t.beams), len(t.operations)
+        size = max(6 + shapes, 17)
+        return Work(
+            position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories),
+            s=np.zeros((6, 6)), p=np.zeros(6), g=np.zeros(size), h=np.zeros((size, size)), right=np.zeros((6, 6)),
+            gains=np.zeros((operations, max(6, shapes), 7)), blocks=np.zeros((len(t.joints), 6, 6)),
+            rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
+            turn=np.zeros((beams, points, 2)), local=np.zeros((points, 2)), dz=np.zeros(len(self.names)), cut=np.zeros(6),
+        )  # fmt: skip
+
+
+def compile_scene(scene: Scene, basis: BasisName = "end-shapes") -> Plan:
+    """Compile `scene`; `basis` chooses the bending shapes of all flexible parts (see `boom_twin.physics.modes`)."""
+    builder = _Builder(scene, basis)
+    for index in range(len(scene.sections)):
+        builder.joint(index)
+        builder.section(index)
+    return builder.finish()
+
+
+@dataclass(frozen=True)
+class _Pin:
+    """A pin of a cylinder on a section: where along it and beside it, and what it is to the sweep."""
+
+    x: float
+    y: float
+    cylinder: int
+    kind: int
+
+
+class _Builder:
+    """Walks a scene from the base to the tip."""
+
+    def __init__(self, scene: Scene, basis: BasisName) -> None:
+        self.scene, self.basis, self.layout = scene, BASES[basis], Layout()
+        self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
+        self.outline: list[tuple[int, int]] = []
+        self.scale: list[float] = []
+        turn = -scene.base.inclination
+        gx, gy = scene.gravity
+        c, s = math.cos(turn), math.sin(turn)
+        self.gravity = np.array([c * gx - s * gy, s * gx + c * gy])
+
+    # -- joints ---------------------------------------------------------------------------------------------------
+
+    def joint(self, index: int) -> None:
+        """Joint `index` with its links and its cylinder."""
+        joint, n = self.scene.joints[index], index + 1
+        self.layout.add("linkages", **_fields(linkage(self.scene, index)))
+        if joint.kind == "A":
+            kind, names = program.JOINT_A, ["theta", "N"]
+            x, y = self.scene.base.pivot
+        else:
+            kind, names = program.JOINT_B, ["theta", "alpha_L", "alpha_R", "lambda_x", "lambda_y", "N"]
+            x, y = 0.0, 0.0
+        self.scale += [0.0 if name in ("N", "lambda_x", "lambda_y") else 1.0 for name in names]
+        z = self.layout.unknowns([f"{name}_{n}" for name in names])
+        first_link = len(self.layout.rows["links"])
+        for side, length, mass in ((LINK_L, joint.lL, joint.mL), (LINK_R, joint.lR, joint.mR)):
+            if mass is not None and length is not None:
+                inertia = mass * length**2 / 12
+                history = self._point(mass, inertia)
+                self.layout.add("links", side=side, history=history, middle=length / 2, mass=mass, inertia=inertia)
+        links = len(self.layout.rows["links"]) - first_link
+        row = self.layout.add("joints", z=z, x=x, y=y, first_link=first_link, links=links)
+        self._cylinder(joint.cylinder, z + len(names) - 1)
+        self._mark_frame()
+        self.layout.operate(kind, row)
+
+    def _cylinder(self, part: Cylinder, z: int) -> None:
+        first_part = len(self.layout.rows["parts"])
+        for end, own in ((cylinder.BARREL, part.barrel), (cylinder.ROD, part.rod)):
+            if own is not None:
+                history = self._point(own.mass, own.inertia)
+                self.layout.add("parts", end=end, history=history, com=own.com, mass=own.mass, inertia=own.inertia)
+        self.layout.add(
+            "cylinders",
+            z=z,
+            history=self.layout.histories([0.0], [0.0]),
+            first_part=first_part,
+            parts=len(self.layout.rows["parts"]) - first_part,
+            closed_length=part.closed_length,
+            compliance=0.0 if part.k is None else 1.0 / part.k,
+            lag=0.0 if part.k is None or part.d is None else part.d / part.k,
+        )
+
+    # -- sections -------------------------------------------------------------------------------------------------
+
+    def section(self, index: int) -> None:
+        """Section `index`: root, flexible parts between pins, head."""
+        section, pins = self.scene.sections[index], self._pins(index)
+        if not self.scene.is_flexible(index):
+            self._body(self._rigid_parts(index), 0.0)
+            self._stations(pins, 0.0)
+            self._offset(section.length)
+            return
+        assert section.beam is not None
+        x0, x1 = section.beam
+        self._body(self._with_line(section.root, 0.0, x0), 0.0)
+        self._stations([pin for pin in pins if pin.x <= x0 + SAME_PLACE], 0.0)
+        self._offset(x0)
+        inner = sorted((pin for pin in pins if x0 + SAME_PLACE < pin.x < x1 - SAME_PLACE), key=lambda pin: pin.x)
+        start = x0
+        for stop in sorted({pin.x for pin in inner} | {x1}):
+            self._beam(index, stop - start)
+            self._stations([pin for pin in inner if pin.x == stop], stop)
+            start = stop
+        self._body(self._with_line(section.head, x1, section.length), x1)
+        self._stations([pin for pin in pins if pin.x >= x1 - SAME_PLACE], x1)
+        self._offset(section.length - x1)
+
+    def _pins(self, index: int) -> list[_Pin]:
+        pins = []
+        if index + 1 < len(self.scene.joints):
+            c = self.scene.joints[index + 1].C
+            assert c is not None
+            pins.append(_Pin(self.scene.sections[index].length + c[0], c[1], index + 1, program.STATION))
+        if index == 0:
+            rod_pin = self.scene.sections[0].rod_pin
+            assert rod_pin is not None
+            pins.append(_Pin(rod_pin[0], rod_pin[1], 0, program.ROD_PIN))
+        return pins
+
+    def _stations(self, pins: list[_Pin], frame: float) -> None:
+        """Pins on a rigid part or cross-section whose frame sits at `frame` along the section."""
+        for pin in pins:
+            self.layout.operate(pin.kind, self.layout.add("outlets", cylinder=pin.cylinder, x=pin.x - frame, y=pin.y))
+
+    def _offset(self, length: float) -> None:
+        if length > SAME_PLACE:
+            self._mark_frame()
+            self.layout.operate(program.OFFSET, self.layout.add("offsets", x=length, y=0.0))
+
+    def _rigid_parts(self, index: int) -> list[RigidPart]:
+        """Everything that moves with a rigid section: its own mass, and its beam's if it has one with no modes."""
+        section = self.scene.sections[index]
+        parts = [part for part in (section.root, section.head) if part is not None]
+        if section.beam is not None and section.rho_A is not None:
+            x0, x1 = section.beam
+            rod = _rod(section.rho_A, x0, x1)
+            turning = (section.rho_I or 0.0) * (x1 - x0)
+            parts.append(rod.model_copy(update={"inertia": rod.inertia + turning}))
+        return parts + self._with_line(None, 0.0, section.length)
+
+    def _with_line(self, part: RigidPart | None, x0: float, x1: float) -> list[RigidPart]:
+        """A rigid part and the line's fill from x0 to x1, those that are named."""
+        parts = [] if part is None else [part]
+        if self.scene.line_fill and x1 - x0 > SAME_PLACE:
+            parts.append(_rod(self.scene.line_fill, x0, x1))
+        return parts
+
+    def _body(self, parts: list[RigidPart], frame: float) -> None:
+        """One body for all `parts` that ride on the same frame; nothing if they have no mass."""
+        mass = sum(part.mass for part in parts)
+        inertia = sum(part.inertia for part in parts)
+        if mass == 0.0 and inertia == 0.0:
+            return
+        x = sum(part.mass * part.com[0] for part in parts) / mass if mass else 0.0
+        y = sum(part.mass * part.com[1] for part in parts) / mass if mass else 0.0
+        inertia += sum(part.mass * ((part.com[0] - x) ** 2 + (part.com[1] - y) ** 2) for part in parts)
+        history = self._point(mass, inertia)
+        row = self.layout.add("bodies", history=history, x=x - frame, y=y, mass=mass, inertia=inertia)
+        self.layout.operate(program.BODY, row)
+
+    def _beam(self, index: int, length: float) -> None:
+        """A flexible part of section `index`."""
+        section, n = self.scene.sections[index], self.scene.modes_of(index)
+        assert section.A is not None and section.I is not None and section.rho_A is not None
+        points = n + 2
+        basis = self.basis(n, points)
+        _, share = modes.gauss_points(points)
+        mass = (section.rho_A + (self.scene.line_fill or 0.0)) * length * share
+        turning = (section.rho_I or 0.0) * length * share
+        elastic = self.scene.material.E
+        part = len(self.beam_tables) + 1
+        z = self.layout.unknowns([f"q{k + 1}_part{part}" for k in range(n)] + [f"eps_part{part}"])
+        self.scale += [1.0] * n + [length]
+        history = self.layout.histories(
+            [m for m in mass for _ in range(2)], [m * g for m in mass for g in self.gravity]
+        )
+        if section.rho_I:
+            self.layout.histories(list(turning), [0.0] * points)
+        row = self.layout.add(
+            "beams",
+            z=z,
+            bending=n,
+            axial=1,
+            points=points,
+            rotary=points if section.rho_I else 0,
+            damped=n + 1 if section.beta else 0,
+            history=history,
+            beta=section.beta or 0.0,
+            axial_stiffness=elastic * section.A * length,
+        )
+        stiffness = modes.bending_stiffness(basis, elastic * section.I, length)
+        self.beam_tables.append((basis.psi, modes.integration_matrix(points) * length, stiffness, mass, turning))
+        self._mark_frame()
+        self.outline += [(1, history + 2 * k) for k in range(points)]
+        self.layout.operate(program.BEAM, row)
+
+    # -- bookkeeping ----------------------------------------------------------------------------------------------
+
+    def _point(self, mass: float, inertia: float) -> int:
+        """Histories x, y, angle of a mass."""
+        return self.layout.histories([mass, mass, inertia], [mass * self.gravity[0], mass * self.gravity[1], 0.0])
+
+    def _mark_frame(self) -> None:
+        self.outline.append((0, len(self.layout.rows["operations"])))
+
+    def finish(self) -> Plan:
+        """Payload, tip, and everything as arrays."""
+        layout, scene = self.layout, self.scene
+        if scene.tip is not None and scene.tip.payload:
+            self._body([RigidPart(mass=scene.tip.payload, com=(0.0, 0.0), inertia=0.0)], 0.0)
+        tip = layout.histories([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+        self._mark_frame()
+        unknowns = len(layout.names)
+        tables = Tables(
+            **{name: layout.table(name) for name in layout.rows},
+            **_stacked(self.beam_tables),
+            gravity=self.gravity,
+            moving=np.array([0.0 if scale == 0.0 else 1.0 for scale in self.scale]),
+            scale=np.array(self.scale),
+            tip=unknowns + tip,
+        )
+        shift = np.array([(kind, place + unknowns * kind) for kind, place in self.outline], dtype=np.int64)
+        zeros = [0.0] * unknowns
+        closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
+        return Plan(
+            tables, tuple(layout.names), np.array(zeros + layout.masses), np.array(zeros + layout.weights), shift, closed
+        )
+
+
+def _rod(mass_per_length: float, x0: float, x1: float) -> RigidPart:
+    """A thin rod from x0 to x1 along the section."""
+    mass = mass_per_length * (x1 - x0)
+    return RigidPart(mass=mass, com=((x0 + x1) / 2, 0.0), inertia=mass * (x1 - x0) ** 2 / 12)
+
+
+def _fields(row: np.record) -> dict[str, float]:
+    return {name: row[name] for name in LINKAGE.names or ()}
+
+
+def _stacked(parts: list[tuple[Array, Array, Array, Array, Array]]) -> dict[str, Array]:
+    """Tables of all beam parts, padded to the largest: psi, weights, stiffness, point_mass, point_rotary."""
+    names = ("psi", "weights", "stiffness", "point_mass", "point_rotary")
+    dimensions = (2, 2, 2, 1, 1)
+    stacked = {}
+    for i, name in enumerate(names):
+        shape = np.max([part[i].shape for part in parts], axis=0) if parts else np.zeros(dimensions[i], int)
+        block = np.zeros((len(parts), *shape))
+        for k, part in enumerate(parts):
+            block[(k, *(slice(size) for size in part[i].shape))] = part[i]
+        stacked[name] = block
+    return stacked
