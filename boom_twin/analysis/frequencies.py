@@ -1,0 +1,147 @@
+"""Natural frequencies and modes about an equilibrium, by counting.
+
+The sweep at A = -omega^2 condenses the dynamic stiffness K - omega^2 M with its full tangent. By Sylvester's law the number
+of negative pivots of all that is condensed, less the number of forces among the unknowns, is the number of natural
+frequencies below omega (the counting of Wittrick and Williams 1971). Bisection on that integer misses no mode and needs no
+starting guess; a mode follows by inverse iteration with the same sweep.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..chain.place import place
+from ..chain.program import JOINT_A, Motion, State, Work
+from ..chain.sweep import SWEPT, sweep_in, sweep_out
+from ..plan.compile import Plan
+from ..records import Array
+
+HIGHEST = 1e7  # rad/s; no mode is looked for above
+RELATIVE_WIDTH = 1e-11  # of the last bracket
+SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
+NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One undamped mode, scaled to unit modal mass.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz.
+    increments : ndarray, shape (unknowns,)
+        Of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
+    motion : ndarray, shape (histories,)
+        Of every mass point and angle.
+    """
+
+    frequency: float
+    increments: Array
+    motion: Array
+
+
+def constraints(plan: Plan) -> int:
+    """Number of forces among the unknowns."""
+    return int(np.sum(plan.tables.moving == 0.0))
+
+
+def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
+    """Negative pivots of K - omega^2 M at the present state."""
+    place(plan.tables, state, work)
+    motion = Motion(-omega * omega, 0.0, work.position.copy(), np.zeros_like(work.position))
+    drive = _drive(plan, state, work)
+    status, negative = sweep_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
+    if status != SWEPT:
+        return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
+    sizes = [2 if kind == JOINT_A else 6 for kind in plan.tables.operations.kind if kind <= 1]
+    return int(negative) + sum(_negative_eigenvalues(work.blocks[i, :size, :size]) for i, size in enumerate(sizes))
+
+
+def _drive(plan: Plan, state: State, work: Work) -> Array:
+    """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
+    t = plan.tables
+    return np.array([work.position[c.history] - c.compliance * state.z[c.z] for c in t.cylinders])
+
+
+def _negative_eigenvalues(block: Array) -> int:
+    """Of a small symmetric matrix whose rows differ by many orders of magnitude: balanced first, signs stay."""
+    scaled = block.copy()
+    for _ in range(6):
+        size = np.sqrt(np.abs(scaled).max(axis=1))
+        size[size == 0.0] = 1.0
+        scaled /= np.outer(size, size)
+    return int(np.sum(np.linalg.eigvalsh(scaled) < 0.0))
+
+
+def natural_modes(plan: Plan, state: State, work: Work, count: int) -> tuple[Mode, ...]:
+    """The lowest `count` modes about the equilibrium in `state`, or all if the model has fewer; state stays as it is."""
+    base = negative_pivots(plan, state, work, 0.0)
+
+    def below(omega: float) -> int:
+        return negative_pivots(plan, state, work, omega) - base
+
+    modes: list[Mode] = []
+    low = 0.0
+    for k in range(min(count, below(HIGHEST))):
+        omega = _bisect(below, k, low)
+        modes.append(_mode(plan, state, work, omega, modes))
+        low = omega * (1.0 - 1e-9)
+    place(plan.tables, state, work)
+    return tuple(modes)
+
+
+def _bisect(below, k: int, low: float) -> float:  # type: ignore[no-untyped-def]  # Callable[[float], int]
+    """The frequency (rad/s) at which the count rises from at most k to more."""
+    high = max(2.0 * low, 1.0)
+    while below(high) <= k:
+        low, high = high, 2.0 * high
+    while high - low > RELATIVE_WIDTH * high:
+        middle = 0.5 * (low + high)
+        if below(middle) > k:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
+
+
+def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode]) -> Mode:
+    """Inverse iteration from a random inertial load, a little beside `omega`, free of the `lower` modes."""
+    rng = np.random.default_rng(1)
+    motion = rng.standard_normal(len(plan.masses)) * (plan.masses > 0.0)
+    increments = np.zeros(len(plan.names))
+    for _ in range(3):
+        for mode in lower:
+            motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
+        increments = _response(plan, state, work, omega * (1.0 - SHIFT), motion)
+        motion = _moved(plan, state, work, increments)
+        size = math.sqrt(float(plan.masses @ motion**2))
+        motion, increments = motion / size, increments / size
+    return Mode(omega / (2.0 * math.pi), increments, motion)
+
+
+def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -> Array:
+    """Solve (K - omega^2 M) dz = M load, up to a factor."""
+    place(plan.tables, state, work)
+    hat = work.position + load
+    motion = Motion(-omega * omega, 0.0, hat, np.zeros_like(hat))
+    sweep_in(plan.tables, state, work, motion, _drive(plan, state, work), np.zeros(plan.joints))
+    sweep_out(plan.tables, state, work)
+    return work.dz.copy()
+
+
+def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
+    """Linearised motion of all histories by increments of the unknowns; central differences."""
+    z = state.z.copy()
+    size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
+    sides = []
+    for sign in (1.0, -1.0):
+        state.z[:] = z + sign * size * increments
+        place(plan.tables, state, work)
+        sides.append(work.position.copy())
+    state.z[:] = z
+    place(plan.tables, state, work)
+    return np.asarray((sides[0] - sides[1]) / (2.0 * size))

@@ -1,0 +1,149 @@
+"""Static equilibrium of a boom under gravity for given strokes, and small vibrations about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..chain.newton import OK, newton
+from ..chain.program import State, Work
+from ..chain.status import SENTENCES
+from ..chain.step import motion_at_rest, observe
+from ..errors import SolverError, UsageError
+from ..plan.compile import Plan, compile_scene
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
+from ..scene.parts import Scene
+from .frequencies import Mode, constraints, natural_modes, negative_pivots
+from .posture import rigid_tip, set_undeformed
+
+TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
+PASSES = 60
+LONGEST_INCREMENT = 0.1  # rad in one pass
+LOAD_STEPS = (0.05, 0.2, 0.4, 0.6, 0.8, 1.0)  # of gravity, where the full load at once does not converge
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A boom at rest. n sections.
+
+    Attributes
+    ----------
+    strokes : ndarray, shape (n,)
+        m.
+    tip_rigid, tip : ndarray, shape (2,)
+        Tip of the undeformed and of the deflected boom, m.
+    joints : ndarray, shape (n,)
+        Root of section i against head of section i - 1, rad.
+    cylinder_forces : ndarray, shape (n,)
+        N, positive in tension.
+    modes : tuple of Mode
+        Undamped, about this equilibrium, ascending.
+    outline : ndarray, shape (k, 2)
+        Points of the deflected centre line from base to tip, m.
+    """
+
+    strokes: Array
+    tip_rigid: Array
+    tip: Array
+    joints: Array
+    cylinder_forces: Array
+    modes: tuple[Mode, ...]
+    outline: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies, Hz, ascending, shape (modes,)."""
+        return np.array([mode.frequency for mode in self.modes])
+
+
+def statics(scene: Scene, strokes: Array | None = None, posture: str | None = None, modes: int = 6) -> Equilibrium:
+    """Equilibrium under gravity at absolute `strokes` (m), shape (n,), or at a named `posture` of the scene.
+
+    Raises
+    ------
+    UsageError
+        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
+    SolverError
+        No stable equilibrium was found.
+    """
+    if (strokes is None) == (posture is None):
+        raise UsageError("give either strokes or a posture, not both and not neither.")
+    if posture is not None:
+        strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
+    else:
+        assert strokes is not None
+        strokes = checked_strokes(scene, strokes)
+        angles = joint_angles_of_strokes(scene, strokes)
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes, angles)
+    row = np.empty(2 * plan.joints + 9)
+    observe(plan.tables, state, row)
+    n = plan.joints
+    return Equilibrium(
+        strokes=strokes,
+        tip_rigid=rigid_tip(scene, angles),
+        tip=state.frames[-1, :2].copy(),
+        joints=row[:n],
+        cylinder_forces=row[n : 2 * n],
+        modes=natural_modes(plan, state, work, modes),
+        outline=outline(plan, state, work.position),
+    )
+
+
+def checked_strokes(scene: Scene, strokes: Array) -> Array:
+    """`strokes` as an array, shape (n,); UsageError unless there is one for every cylinder, within its travel."""
+    values = np.asarray(strokes, dtype=float)
+    n = len(scene.joints)
+    if values.shape != (n,):
+        raise UsageError(f"strokes = {values.size} values: the scene has {n} cylinders. Give {n} values in m.")
+    for i, value in enumerate(values):
+        most = scene.joints[i].cylinder.max_stroke
+        if not 0.0 <= value <= most:
+            raise UsageError(f"stroke_{i + 1} = {value:g} m: cylinder {i + 1} travels 0 to {most:g} m. Give it in metres.")
+    return values
+
+
+def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
+    """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
+
+    The full load at once is tried first, then in steps. Histories are left as they were.
+    """
+    drive = plan.closed_lengths + strokes
+    for loads in ((1.0,), LOAD_STEPS):
+        set_undeformed(plan, state, angles)
+        status = OK
+        for load in loads:
+            status = _solve(plan, state, work, drive, load)
+            if status != OK:
+                break
+        if status == OK and is_stable(plan, state, work):
+            return
+    where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
+    reason = "the equilibrium found is not stable" if status == OK else SENTENCES[status]
+    raise SolverError(f"no equilibrium at strokes {where} m: {reason}. Check masses, stiffnesses and the posture.")
+
+
+def is_stable(plan: Plan, state: State, work: Work) -> bool:
+    """Whether energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
+    return negative_pivots(plan, state, work, 0.0) == constraints(plan)
+
+
+def _solve(plan: Plan, state: State, work: Work, drive: Array, load: float) -> int:
+    tables = plan.tables._replace(gravity=load * plan.tables.gravity)
+    motion = motion_at_rest(len(plan.masses))
+    still = np.zeros(plan.joints)
+    status, _, _ = newton(tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT)
+    return int(status)
+
+
+def outline(plan: Plan, state: State, position: Array) -> Array:
+    """Points (k, 2) of the centre line, base to tip, m; `position` holds all history positions."""
+    frames, points = plan.outline[:, 0] == 0, plan.outline[:, 0] == 1
+    line = np.empty((len(plan.outline), 2))
+    line[frames] = state.frames[plan.outline[frames, 1], :2]
+    at = plan.outline[points, 1]
+    line[points, 0], line[points, 1] = position[at], position[at + 1]
+    return line[1:]

@@ -1,0 +1,12 @@
+"""What a kernel's status code means, in one sentence with its remedy."""
+
+from __future__ import annotations
+
+from .newton import NOT_CONVERGED, NOT_FINITE, OK, SINGULAR
+
+SENTENCES = {
+    OK: "ok",
+    NOT_CONVERGED: "the equations did not converge; take a smaller step or a smoother stroke",
+    SINGULAR: "the equations are singular: a linkage stands at its dead centre, or a part is neither held nor has mass",
+    NOT_FINITE: "the equations gave a value that is not finite; check the strokes and take a smaller step",
+}
