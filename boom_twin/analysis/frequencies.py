@@ -9,12 +9,14 @@ starting guess; a mode follows by inverse iteration with the same sweep.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..chain.place import place
 from ..chain.program import JOINT_A, Motion, State, Work
+from ..chain.step import observe
 from ..chain.sweep import SWEPT, sweep_in, sweep_out
 from ..plan.compile import Plan
 from ..records import Array
@@ -77,8 +79,13 @@ def _negative_eigenvalues(block: Array) -> int:
     return int(np.sum(np.linalg.eigvalsh(scaled) < 0.0))
 
 
-def natural_modes(plan: Plan, state: State, work: Work, count: int) -> tuple[Mode, ...]:
-    """The lowest `count` modes about the equilibrium in `state`, or all if the model has fewer; state stays as it is."""
+def natural_modes(
+    plan: Plan, state: State, work: Work, count: int, width: float = RELATIVE_WIDTH, highest: float = HIGHEST
+) -> tuple[Mode, ...]:
+    """The lowest `count` modes below `highest` (rad/s) about the equilibrium in `state`, or all if there are fewer.
+
+    `width` is the relative accuracy of the frequencies. The state stays as it is.
+    """
     base = negative_pivots(plan, state, work, 0.0)
 
     def below(omega: float) -> int:
@@ -86,20 +93,20 @@ def natural_modes(plan: Plan, state: State, work: Work, count: int) -> tuple[Mod
 
     modes: list[Mode] = []
     low = 0.0
-    for k in range(min(count, below(HIGHEST))):
-        omega = _bisect(below, k, low)
+    for k in range(min(count, below(highest))):
+        omega = _bisect(below, k, low, width)
         modes.append(_mode(plan, state, work, omega, modes))
         low = omega * (1.0 - 1e-9)
     place(plan.tables, state, work)
     return tuple(modes)
 
 
-def _bisect(below, k: int, low: float) -> float:  # type: ignore[no-untyped-def]  # Callable[[float], int]
+def _bisect(below: Callable[[float], int], k: int, low: float, width: float) -> float:
     """The frequency (rad/s) at which the count rises from at most k to more."""
     high = max(2.0 * low, 1.0)
     while below(high) <= k:
         low, high = high, 2.0 * high
-    while high - low > RELATIVE_WIDTH * high:
+    while high - low > width * high:
         middle = 0.5 * (low + high)
         if below(middle) > k:
             high = middle
@@ -135,13 +142,29 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
 
 def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
     """Linearised motion of all histories by increments of the unknowns; central differences."""
+    return _difference(plan, state, work, increments, lambda: work.position.copy())
+
+
+def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
+    """Change of the joint angles, shape (n,), rad per unit of the modal coordinate."""
+    row = np.empty(2 * plan.joints + 9)
+
+    def angles() -> Array:
+        observe(plan.tables, state, row)
+        return row[: plan.joints].copy()
+
+    return _difference(plan, state, work, mode.increments, angles)
+
+
+def _difference(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
+    """Derivative of what `read` returns along `increments` of the unknowns."""
     z = state.z.copy()
     size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
     sides = []
     for sign in (1.0, -1.0):
         state.z[:] = z + sign * size * increments
         place(plan.tables, state, work)
-        sides.append(work.position.copy())
+        sides.append(read())
     state.z[:] = z
     place(plan.tables, state, work)
     return np.asarray((sides[0] - sides[1]) / (2.0 * size))

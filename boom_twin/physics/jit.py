@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-KERNEL_FOLDERS = ("physics", "chain")
+KERNEL_FOLDERS = ("physics", "chain", "estimate")
 
 
 def _source_hash() -> str:

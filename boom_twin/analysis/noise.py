@@ -1,0 +1,84 @@
+"""Noise of the stroke sensors, propagated through the model to joint angles and to the acceleration of the tip.
+
+Two ways lead from a stroke's noise to a predicted angle. The estimate of now is off by its own variance P, and turns the joint
+by dphi/ds. And what the strokes did before, white noise of density r T (variance times sample interval) as far as the smoother
+lets it through, has shaken the natural modes. Mode j with modal load N_ij by the drive of cylinder i (the increment of that
+cylinder's force, unit modal mass) collects, after a time t,
+
+    var eta_j = sum_i N_ij^2 / omega_j^4 . r T omega_j / (4 zeta_j) . G(omega_j)^2 (1 - exp(-2 zeta_j omega_j t)),
+    G(omega) = 1 / (1 + (omega/omega_c)^6),   omega_c = (q / (r T))^(1/6),
+
+G being the gain of the smoother for strokes that are integrated white jerk of density q. White noise through a resonance:
+Crandall and Mark, Random Vibration in Mechanical Systems, 1963.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..chain.program import State, Work
+from ..plan.compile import Plan
+from ..records import Array
+from .frequencies import Mode, joint_increments, natural_modes
+
+BAND = 2.5  # modes are looked at up to this multiple of the smoother's own frequency
+WIDTH = 1e-4  # relative accuracy of their frequencies
+
+
+@dataclass(frozen=True)
+class StrokeNoise:
+    """Variances that stroke noise gives predictions at one posture, per mode.
+
+    Attributes
+    ----------
+    joints : ndarray, shape (modes, n)
+        rad^2, once the mode has been shaken for long.
+    acceleration : ndarray, shape (modes, 2)
+        Of the tip, m^2/s^4, likewise.
+    decay : ndarray, shape (modes,)
+        2 zeta omega, 1/s.
+    """
+
+    joints: Array
+    acceleration: Array
+    decay: Array
+
+    def after(self, time: float) -> tuple[Array, Array]:
+        """Variances of joint angles (n,) and tip acceleration (2,) after `time` s from rest."""
+        grown = 1.0 - np.exp(-self.decay * time)
+        return grown @ self.joints, grown @ self.acceleration
+
+
+def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval: float, density: float) -> StrokeNoise:
+    """Propagate strokes measured with `variance` (m^2) every `interval` s, smoothed for jerk `density` (m^2/s^5)."""
+    spectrum = variance * interval
+    corner = (density / spectrum) ** (1.0 / 6.0)
+    modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=BAND * corner)
+    joints, acceleration, decay = [], [], []
+    tip = plan.tables.tip
+    for mode in modes:
+        omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
+        load = float(np.sum(mode.increments[plan.tables.cylinders.z] ** 2))
+        gain = 1.0 / (1.0 + (omega / corner) ** 6)
+        collected = load / omega**4 * spectrum * omega / (4.0 * max(zeta, 1e-6)) * gain**2
+        joints.append(collected * joint_increments(plan, state, work, mode) ** 2)
+        acceleration.append(collected * omega**4 * mode.motion[tip : tip + 2] ** 2)
+        decay.append(2.0 * zeta * omega)
+    n = plan.joints
+    return StrokeNoise(np.array(joints).reshape(-1, n), np.array(acceleration).reshape(-1, 2), np.array(decay))
+
+
+def damping_ratio(plan: Plan, mode: Mode) -> float:
+    """Of critical, by the power that oil dampers and beams take from the mode at its own frequency."""
+    t, omega = plan.tables, 2.0 * np.pi * mode.frequency
+    loss = 0.0
+    for cylinder in t.cylinders:
+        loss += cylinder.lag * cylinder.compliance * mode.increments[cylinder.z] ** 2
+    for row, beam in enumerate(t.beams):
+        q = mode.increments[beam.z : beam.z + beam.bending]
+        loss += beam.beta * float(q @ t.stiffness[row, : len(q), : len(q)] @ q)
+        if beam.axial:
+            loss += beam.beta * beam.axial_stiffness * mode.increments[beam.z + beam.bending] ** 2
+    return float(loss / (2.0 * omega))

@@ -1,0 +1,137 @@
+"""The boom's answer to given strokes, from rest in equilibrium."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ..chain.newton import OK
+from ..chain.status import SENTENCES
+from ..chain.step import observe, rest, run
+from ..errors import SolverError, UsageError
+from ..plan.compile import Plan, compile_scene
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.parts import Scene
+from .statics import checked_strokes, settle
+
+RHO = 0.8
+TOLERANCE = 1e-7  # rad in the last pass of a step; what is left is its square
+PASSES = 20
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Results at the rows of the drive. m rows, n sections.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        s.
+    strokes, joints, cylinder_forces : ndarray, shape (m, n)
+        m; rad; N (tension positive).
+    tip, tip_velocity, tip_acceleration : ndarray, shape (m, 3)
+        x, y, orientation of the last head, in m and rad, and their rates.
+    passes : float
+        Newton passes per step, mean.
+    """
+
+    times: Array
+    strokes: Array
+    joints: Array
+    cylinder_forces: Array
+    tip: Array
+    tip_velocity: Array
+    tip_acceleration: Array
+    passes: float
+
+    def columns(self) -> dict[str, Array]:
+        """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
+        n = self.strokes.shape[1]
+        columns = {"t_s": self.times}
+        columns |= {f"stroke_{i + 1}_m": self.strokes[:, i] for i in range(n)}
+        columns |= {f"joint_{i + 1}_rad": self.joints[:, i] for i in range(n)}
+        columns |= {"tip_x_m": self.tip[:, 0], "tip_y_m": self.tip[:, 1]}
+        columns |= {"tip_ax_m_s2": self.tip_acceleration[:, 0], "tip_ay_m_s2": self.tip_acceleration[:, 1]}
+        return columns | {f"cylinder_force_{i + 1}_N": self.cylinder_forces[:, i] for i in range(n)}
+
+
+def simulate(
+    scene: Scene, times: Array, strokes: Array, dt: float = 1e-3, angles: Array | None = None, rho: float = RHO
+) -> Simulation:
+    """Start at rest in the equilibrium of the first row and follow the strokes.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+        s, increasing, any spacing.
+    strokes : ndarray, shape (m, n)
+        Absolute strokes, m. Between rows they follow a monotone cubic (PCHIP): C1, no overshoot.
+    dt : float
+        Longest step, s; steps end on the rows.
+    angles : ndarray, shape (n,), optional
+        Joint angles (rad) next to which the first equilibrium is looked for.
+    rho : float
+        Spectral radius of generalised-alpha at infinite frequency.
+
+    Raises
+    ------
+    UsageError
+        Rows that do not increase, values that are not finite or out of the cylinders' travel, dt not positive.
+    SolverError
+        No equilibrium at the first row, or a step that failed; says when.
+    """
+    times, strokes = _checked(scene, times, strokes, dt)
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+    rest(state, work)
+    n = plan.joints
+    rows = np.empty((len(times), 2 * n + 9))
+    observe(plan.tables, state, rows[0])
+    steps, counts, drives, rates = _drive(plan, times, strokes, dt)
+    status, row, passes = run(
+        plan.tables, state, work, steps, counts, drives, rates, rho, TOLERANCE, PASSES, rows[1:]
+    )
+    if status != OK:
+        raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
+    tip = rows[:, 2 * n :].reshape(-1, 3, 3)
+    return Simulation(
+        times, strokes, rows[:, :n], rows[:, n : 2 * n], tip[:, 0], tip[:, 1], tip[:, 2], passes / max(int(counts.sum()), 1)
+    )
+
+
+def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:
+    times, strokes = np.asarray(times, dtype=float), np.asarray(strokes, dtype=float)
+    n = len(scene.joints)
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise UsageError(f"dt = {dt!r} s: must be positive. Take 0.001.")
+    if times.ndim != 1 or strokes.shape != (len(times), n) or len(times) < 1:
+        raise UsageError(f"strokes = array of shape {strokes.shape}: give one row per time and {n} columns.")
+    if not (np.isfinite(times).all() and np.isfinite(strokes).all()):
+        row = int(np.flatnonzero(~np.isfinite(np.column_stack([times, strokes])).all(axis=1))[0])
+        raise UsageError(f"row {row + 1} of the drive: not finite. Give a number in every column.")
+    if np.any(np.diff(times) <= 0.0):
+        row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
+        raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")
+    for values in (strokes.min(axis=0), strokes.max(axis=0), strokes[0]):
+        checked_strokes(scene, values)
+    return times, strokes
+
+
+def _drive(plan: Plan, times: Array, strokes: Array, dt: float) -> tuple[Array, Array, Array, Array]:
+    """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
+    spans = np.diff(times)
+    counts = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
+    if len(spans) == 0:
+        empty = np.zeros((0, plan.joints))
+        return spans, counts, empty, empty
+    steps = spans / counts
+    inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
+    at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
+    curve = PchipInterpolator(times, strokes, axis=0)
+    at = np.minimum(at, times[-1])
+    return steps, counts, plan.closed_lengths + curve(at), curve.derivative()(at)

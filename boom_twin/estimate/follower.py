@@ -1,0 +1,211 @@
+"""The boom follows smoothed strokes: an anchor behind, and a look ahead from it to now.
+
+Strokes estimated at the instant they are measured carry noise that the boom's lightly damped modes collect. The same strokes
+seen 60 ms later are three times quieter. So the boom that is remembered, the anchor, is stepped only as far as the smoother's
+window reaches back, with strokes that will not change much any more; for every new sample a copy of it runs through the
+window to now, in few long steps, and is the prediction. Nothing is delayed, and an error made in the window is forgotten with
+the copy.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..chain.newton import OK, newton
+from ..chain.program import Motion, State, Work
+from ..chain.step import advance, observe, rest
+from ..physics.integrators import generalised_alpha
+from ..physics.jit import kernel
+from ..physics.linkage import angle_of_length
+from ..plan.compile import Plan
+from ..records import Array
+from .smoother import add_node, drive_between, measure, start_node
+
+TOLERANCE, PASSES = 1e-7, 20
+NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
+REST_PASSES = 60
+WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
+
+
+class Tuning(NamedTuple):
+    """Numbers of the estimator; see `boom_twin.settings`. Lengths of time in s, variance in m^2, density in m^2/s^5."""
+
+    variance: float
+    density: float
+    lag: float
+    step: float
+    look_step: float
+    rho: float
+
+
+class Track(NamedTuple):
+    """What the follower remembers besides the anchor's state.
+
+    count : (1,) nodes in the window. moved : (1,) whether the anchor has left its first equilibrium.
+    times : (NODES,) s. x, c : nodes of the smoother. anchor : (n, 3) drive where the anchor stands.
+    angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch. zeros : (histories,)
+    """
+
+    count: np.ndarray
+    moved: np.ndarray
+    times: Array
+    x: Array
+    c: Array
+    anchor: Array
+    angles: Array
+    drive: Array
+    rate: Array
+    zeros: Array
+    closed: Array
+    lengths: Array
+
+
+def new_track(plan: Plan, lengths: Array) -> Track:
+    """An empty track for a compiled boom whose sections are `lengths` (m), shape (n,), long."""
+    n = plan.joints
+    return Track(
+        count=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES), x=np.zeros((NODES, n, 3)),
+        c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n), drive=np.zeros(n), rate=np.zeros(n),
+        zeros=np.zeros(len(plan.masses)), closed=plan.closed_lengths, lengths=lengths,
+    )  # fmt: skip
+
+
+@kernel
+def begin(t, anchor, live, work, track, tuning, y, out):
+    """First sample, at time 0: strokes y (m), shape (n,), at rest in equilibrium; `out` as in `follow`."""
+    track.count[0], track.moved[0], track.times[0] = 1, 0, 0.0
+    start_node(track.x, track.c, y, tuning.variance)
+    status = settle_anchor(t, anchor, work, track)
+    copy_state(anchor, live)
+    report(t, live, track, out)
+    return status
+
+
+@kernel
+def follow(t, anchor, live, work, track, tuning, time, y, out):
+    """Take strokes y (m; NaN = missing) measured at `time` (s) and write the prediction for it.
+
+    out : ndarray, shape (4 n + 11,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
+    variances, tip of the rigid boom (2).
+
+    Returns a status of `chain.newton`.
+    """
+    for j in range(track.count[0], 0, -1):
+        track.times[j] = track.times[j - 1]
+    add_node(track.x, track.c, track.count[0], time - track.times[1], tuning.density)
+    track.times[0] = time
+    track.count[0] += 1
+    measure(track.x, track.c, track.count[0], y, tuning.variance)
+    status = move_anchor(t, anchor, work, track, tuning)
+    if status != OK:
+        return status
+    copy_state(anchor, live)
+    status = look_ahead(t, live, work, track, tuning)
+    if status != OK:
+        return status
+    report(t, live, track, out)
+    return OK
+
+
+@kernel
+def report(t, live, track, out):
+    """Write what is predicted now; see `follow`."""
+    n = t.joints.shape[0]
+    observe(t, live, out)
+    at = 2 * n + 9
+    for i in range(n):
+        out[at + i], out[at + n + i] = track.x[0, i, 0], track.c[0, i, 0, 0]
+    out[at + 2 * n], out[at + 2 * n + 1] = rigid_tip(t, track)
+
+
+@kernel
+def move_anchor(t, anchor, work, track, tuning):
+    """Step the anchor to the youngest node that is older than the lag, and drop the nodes behind it."""
+    count = track.count
+    while count[0] > 2 and (track.times[0] - track.times[count[0] - 2] >= tuning.lag or count[0] == NODES):
+        old, new = count[0] - 1, count[0] - 2
+        span = track.times[new] - track.times[old]
+        status = glide(t, anchor, work, track, tuning, track.anchor, track.x[new], span, tuning.step)
+        if status != OK:
+            return status
+        track.anchor[:] = track.x[new]
+        track.moved[0] = 1
+        count[0] -= 1
+    if track.moved[0] == 0:
+        return settle_anchor(t, anchor, work, track)
+    return OK
+
+
+@kernel
+def settle_anchor(t, anchor, work, track):
+    """Equilibrium at the strokes of the oldest node, until the anchor moves."""
+    track.anchor[:] = track.x[track.count[0] - 1]
+    for i in range(track.drive.shape[0]):
+        track.anchor[i, 1], track.anchor[i, 2] = 0.0, 0.0
+        track.drive[i], track.rate[i] = track.closed[i] + track.anchor[i, 0], 0.0
+    still = Motion(0.0, 0.0, track.zeros, track.zeros)
+    status, _, _ = newton(t, anchor, work, still, track.drive, track.rate, TOLERANCE, REST_PASSES, 0.1)
+    rest(anchor, work)
+    return status
+
+
+@kernel
+def glide(t, state, work, track, tuning, old, new, span, longest):
+    """Follow the quintic between two nodes (n, 3), `span` s apart, in steps of at most `longest` s."""
+    steps = max(1, math.ceil(span / longest - 1e-6))
+    scheme = generalised_alpha(span / steps, tuning.rho)
+    for k in range(steps):
+        for i in range(track.drive.shape[0]):
+            position, velocity = drive_between(old[i], new[i], span, (k + 1) / steps)
+            track.drive[i], track.rate[i] = track.closed[i] + position, velocity
+        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, TOLERANCE, PASSES)
+        if status != OK:
+            return status
+    return OK
+
+
+@kernel
+def look_ahead(t, live, work, track, tuning):
+    """Run the copy from the anchor's node to the newest one, skipping nodes as long as steps stay below `look_step`."""
+    old = track.count[0] - 1
+    while old > 0:
+        new = old - 1
+        while new > 0 and track.times[new - 1] - track.times[old] <= tuning.look_step:
+            new -= 1
+        span = track.times[new] - track.times[old]
+        start = track.anchor if old == track.count[0] - 1 else track.x[old]
+        status = glide(t, live, work, track, tuning, start, track.x[new], span, tuning.look_step)
+        if status != OK:
+            return status
+        old = new
+    return OK
+
+
+@kernel
+def copy_state(source, target):
+    """Copy everything a boom remembers."""
+    target.z[:] = source.z
+    target.history[:] = source.history
+    target.frames[:] = source.frames
+    target.pins[:] = source.pins
+
+
+@kernel
+def rigid_tip(t, track):
+    """Tip (m) of the undeformed boom at the newest strokes; a stroke out of reach leaves its joint where it was."""
+    x, y, heading = t.joints[0].x, t.joints[0].y, 0.0
+    for i in range(track.angles.shape[0]):
+        length = track.closed[i] + track.x[0, i, 0]
+        angle = angle_of_length(t.linkages[i], length, track.angles[i], -WIDEST, WIDEST)
+        if math.isfinite(angle):
+            track.angles[i] = angle
+        heading += track.angles[i]
+        x += track.lengths[i] * math.cos(heading)
+        y += track.lengths[i] * math.sin(heading)
+    return x, y
+
+
+__all__ = ["NODES", "State", "Track", "Tuning", "Work", "begin", "follow", "new_track"]

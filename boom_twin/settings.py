@@ -1,0 +1,73 @@
+"""Parameters of the twin: one table with type, unit, bounds and meaning, used by the node and by replay."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML, YAMLError
+
+from .errors import UsageError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Settings(BaseModel):
+    """Numbers of the twin; SI units. Defaults are those of ``msg_config/twin.yaml``, which tells what each one does."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    stroke_sigma: NotNegative = Field(2.0e-5, description="noise of a stroke transducer, m")
+    stroke_resolution: Positive = Field(5.0e-6, description="resolution of a stroke transducer, m")
+    angle_sigma: NotNegative = Field(1.745e-4, description="noise of a joint encoder, rad")
+    angle_resolution: Positive = Field(8.727e-5, description="resolution of a joint encoder, rad")
+    imu_sigma: Positive = Field(0.05, description="noise of the tip IMU, m/s^2")
+    jerk_density: Positive = Field(4.0e-4, description="density of the strokes' white jerk, m^2/s^5")
+    lag: Positive = Field(0.060, description="time a stroke is smoothed for, s")
+    step: Positive = Field(0.005, description="longest step of the remembered boom, s")
+    look_step: Positive = Field(0.036, description="longest step of the look ahead to now, s")
+    rho: Annotated[float, Field(ge=0, lt=1)] = Field(0.8, description="spectral radius at infinite frequency")
+    gap: Positive = Field(0.1, description="longer pauses between strokes are flagged, s")
+    restart_gap: Positive = Field(5.0, description="longer pauses start again from rest, s")
+    jump_back: Positive = Field(1.0, description="a stamp earlier by more than this starts everything again, s")
+
+    @property
+    def stroke_variance(self) -> float:
+        """Noise and rounding of a stroke, m^2."""
+        return self.stroke_sigma**2 + self.stroke_resolution**2 / 12.0
+
+    @property
+    def angle_variance(self) -> float:
+        """Noise and rounding of a joint angle, rad^2."""
+        return self.angle_sigma**2 + self.angle_resolution**2 / 12.0
+
+
+def settings_from(values: dict[str, Any], source: str) -> Settings:
+    """Settings from names and values; UsageError names every value that is out of bounds."""
+    try:
+        return Settings(**values)
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
+        known = ", ".join(Settings.model_fields)
+        raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+
+
+def load_settings(path: Path | None = None) -> Settings:
+    """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
+
+    Parameters of the node alone (``scene``, ``autostart``) are passed over.
+    """
+    source = Path(str(files("boom_twin") / "msg_config" / "twin.yaml")) if path is None else Path(path)
+    try:
+        content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
+        values = dict(next(iter(content.values()))["ros__parameters"])
+    except OSError as error:
+        raise UsageError(f"{source}: {error.strerror}. Give a parameter file.") from None
+    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
+        raise UsageError(f"{source}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
+    for name in ("scene", "autostart"):
+        values.pop(name, None)
+    return settings_from(values, str(source))
