@@ -8,6 +8,8 @@
     +-- SolverError            equilibrium or step not found; says where and what to try
     +-- BagError               a session that cannot be read or written
 
+    SceneWarning               no exception but a warning: a scene that can be used and looks odd
+
 Kernels never raise: they return a status (see `boom_twin.chain.status`), and the caller decides.
 """
 
@@ -33,29 +35,60 @@ class BagError(BoomTwinError):
     """A session cannot be read or written; the text names the file, the place and the remedy."""
 
 
+class SceneWarning(UserWarning):
+    """A scene can be used but holds something odd; the text has the form of a `Fault`."""
+
+
+class _Absent:
+    """The value of a fault at a key that is not there."""
+
+    def __repr__(self) -> str:
+        return "absent"
+
+
+ABSENT = _Absent()
+
+
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong in a scene.
+    """One thing that is wrong (or, as a warning, odd) in a scene.
 
     Parameters
     ----------
     path : str
         Where, in the words of the file: ``sections[1].root.mass``.
     value : object
-        What stands there.
+        What stands there; `ABSENT` if nothing does.
     bound : str
         What would be allowed.
     remedy : str
         What to do about it.
+    line : int, optional
+        Line of the file, from 1.
     """
 
     path: str
     value: Any
     bound: str
     remedy: str
+    line: int | None = None
 
     def __str__(self) -> str:
-        return f"{self.path} = {self.value!r}: {self.bound}. {self.remedy}"
+        where = self.path if self.line is None else f"line {self.line}: {self.path}"
+        state = "is absent" if self.value is ABSENT else f"= {_shortened(self.value)}"
+        stop = "" if self.bound.endswith("?") else "."
+        return f"{where} {state}: {self.bound}{stop} {self.remedy}"
+
+
+def _shortened(value: Any, width: int = 60) -> str:
+    """Text of a value, cut in the middle where it is long; in the spelling of the file."""
+    if isinstance(value, tuple):
+        text = "[" + ", ".join(_shortened(item) for item in value) + "]"
+    elif value is None or isinstance(value, bool):
+        text = {None: "null", True: "true", False: "false"}[value]
+    else:
+        text = repr(value)
+    return text if len(text) <= width else f"{text[: width - 12]} ... {text[-7:]}"
 
 
 class SceneError(BoomTwinError):
@@ -67,10 +100,14 @@ class SceneError(BoomTwinError):
         The file, or where else the scene came from.
     faults : tuple of Fault
         All that was found, in the order of the file.
+    oddities : tuple of Fault
+        What would only have been a `SceneWarning`; often the cause of a fault.
     """
 
-    def __init__(self, source: str, faults: tuple[Fault, ...]) -> None:
+    def __init__(self, source: str, faults: tuple[Fault, ...], oddities: tuple[Fault, ...] = ()) -> None:
         self.source = source
         self.faults = faults
+        self.oddities = oddities
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-        super().__init__("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
+        lines = [f"{source}: {count}", *(f"  {fault}" for fault in faults)]
+        super().__init__("\n".join(lines + [f"  warning: {oddity}" for oddity in oddities]))

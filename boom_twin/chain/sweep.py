@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..physics.beam import transfer_beam
 from ..physics.jit import kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back, turned_by
@@ -10,6 +12,7 @@ from .substructure_a import close_base, join_rod
 from .substructure_b import close_loop
 
 SWEPT, SINGULAR = 0, 2
+SLOTS = np.int64(3)  # of a cut with nothing carried; typed, because numba compiles once more for every literal
 
 
 @kernel
@@ -50,7 +53,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate):
     status, negative : int
         SWEPT or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`).
     """
-    s, p, m, negative = work.s, work.p, 3, 0
+    s, p, m, negative = work.s, work.p, SLOTS, 0
     for i in range(3):
         p[i] = 0.0
         for j in range(3):
@@ -84,7 +87,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate):
 @kernel
 def sweep_out(t, state, work):
     """Increments of all unknowns from the gains that `sweep_in` kept; fills `work.dz` with what to ADD to the unknowns."""
-    cut, dz, gains, m = work.cut, work.dz, work.gains, 3
+    cut, dz, gains, m = work.cut, work.dz, work.gains, SLOTS
     for k in range(t.operations.shape[0]):
         kind, row, theta = t.operations[k].kind, t.operations[k].row, state.frames[k, 2]
         if kind == BEAM:

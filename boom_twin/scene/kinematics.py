@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 
 from ..errors import UsageError
 from ..physics.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angle_of_length, cylinder_length
 from ..records import Array
-from .parts import Joint, Scene
+from .parts import Base, Joint, Scene, Section
+
+MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
 def linkage(scene: Scene, index: int) -> np.record:
     """Geometry of joint `index` (0-based) as one record of `LINKAGE`."""
-    joint: Joint = scene.joints[index]
-    row = np.zeros(1, LINKAGE)
+    return linkage_of(scene.joints[index], scene.base, scene.sections[0])
+
+
+def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.record:
+    """Geometry of a joint from its parts; kind A needs the base and the first section, the others neither."""
+    row = np.zeros(1, LINKAGE).view(np.recarray)
     if joint.kind == "A":
-        rod_pin = scene.sections[0].rod_pin
-        pin, pivot = scene.base.cylinder_pin, scene.base.pivot
+        pin, pivot = base.cylinder_pin, base.pivot  # type: ignore[union-attr]
         row["mount"] = DIRECT
         row["cx"], row["cy"] = pin[0] - pivot[0], pin[1] - pivot[1]
-        row["ex"], row["ey"] = rod_pin  # type: ignore[misc]  # validated: A has a rod_pin
-        return row.view(np.recarray)[0]
+        row["ex"], row["ey"] = first.rod_pin  # type: ignore[misc, union-attr]  # validated: A has a rod_pin
+        return cast(np.record, row[0])
     row["cx"], row["cy"] = joint.C  # type: ignore[misc]  # validated: B has C, D, E, lL, lR
     row["dx"], row["dy"] = joint.D  # type: ignore[misc]
     row["ex"], row["ey"] = joint.E  # type: ignore[misc]
@@ -35,7 +41,7 @@ def linkage(scene: Scene, index: int) -> np.record:
     else:
         row["mount"] = LINK_R
         row["along"], row["left"] = joint.lR - joint.R[0], -joint.R[1]  # type: ignore[index, operator]
-    return row.view(np.recarray)[0]
+    return cast(np.record, row[0])
 
 
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
@@ -44,33 +50,38 @@ def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
     return np.array([cylinder_length(row, float(phi))[0] - closed for phi in np.atleast_1d(angles)])
 
 
-def strokes_of_posture(scene: Scene, name: str) -> Array:
-    """Strokes (m), shape (n,), that bring the undeformed boom to a named posture."""
+def posture_angles(scene: Scene, name: str) -> Array:
+    """Relative joint angles (rad), shape (n,), of the undeformed boom in a named posture."""
     if name not in scene.postures:
         known = ", ".join(scene.postures) or "none"
         raise UsageError(f"posture = {name!r}: the scene has {known}. Choose one of these or give the strokes.")
-    chord = np.radians(scene.postures[name])
-    relative = np.diff(chord, prepend=0.0)
+    return np.diff(np.radians(scene.postures[name]), prepend=0.0)
+
+
+def strokes_of_posture(scene: Scene, name: str) -> Array:
+    """Strokes (m), shape (n,), that bring the undeformed boom to a named posture."""
+    relative = posture_angles(scene, name)
     return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
 
 
-def joint_angles_of_strokes(scene: Scene, strokes: Array, samples: int = 181) -> Array:
+def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = None, samples: int = 181) -> Array:
     """Relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m).
+
+    Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given.
 
     Raises
     ------
     UsageError
-        If a stroke is not reached anywhere in its joint's ``range_deg``.
+        If a stroke is not reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
     angles = np.empty(len(scene.joints))
     for i, stroke in enumerate(strokes):
-        low, high = np.radians(scene.joints[i].range_deg)
+        low, high = np.radians(scene.joints[i].range_deg) + np.array([-MARGIN, MARGIN])
+        row, length = linkage(scene, i), scene.joints[i].cylinder.closed_length + float(stroke)
         grid = np.linspace(low, high, samples)
         curve = stroke_curve(scene, i, grid)
-        gap = curve - stroke
-        start = int(np.nanargmin(np.abs(gap)))
-        length = scene.joints[i].cylinder.closed_length + float(stroke)
-        angles[i] = angle_of_length(linkage(scene, i), length, grid[start], low - 1e-6, high + 1e-6)
+        start = near[i] if near is not None else grid[int(np.nanargmin(np.abs(curve - stroke)))]
+        angles[i] = angle_of_length(row, length, start, low, high)
         if not math.isfinite(angles[i]):
             raise UsageError(
                 f"stroke_{i + 1} = {stroke:.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "

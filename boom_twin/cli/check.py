@@ -1,0 +1,155 @@
+"""`boom_twin check`: validates a scene and tells in words and numbers what its model consists of."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import Fault
+from ..scene import Scene
+from ..scene.explain import Account, JointAccount, SectionAccount, explain
+from ..scene.load import DEFAULT_NAME, examine
+from .common import add_json, add_scene, print_json
+
+SIZE_A = "angle of the section, cylinder force"
+SIZE_B = "angles of section and two links, pin force (2), cylinder force"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Scene and ``--json``."""
+    add_scene(parser)
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Check and explain; a scene that cannot be used raises `SceneError`."""
+    scene, oddities = examine(args.scene)
+    account = explain(scene)
+    name = args.scene or DEFAULT_NAME
+    if args.json:
+        print_json(summary(name, account, oddities))
+    else:
+        print("\n".join(report(name, scene, account, oddities)))
+    return 0
+
+
+def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
+    """The account as one flat object."""
+    sections, joints = account.sections, account.joints
+    return {
+        "scene": name,
+        "sections": len(sections),
+        "kinds": [joint.kind for joint in joints],
+        "length_m": account.length,
+        "section_length_m": [section.length for section in sections],
+        "mass_kg": account.mass,
+        "section_mass_kg": [section.mass for section in sections],
+        "joint_mass_kg": [joint.mass for joint in joints],
+        "payload_kg": account.payload,
+        "flexible_parts": [len(section.parts) for section in sections],
+        "bending_per_part": [section.bending for section in sections],
+        "split_at_m": [[split.x for split in section.splits] for section in sections],
+        "section_unknowns": [section.unknowns for section in sections],
+        "joint_unknowns": [joint.unknowns for joint in joints],
+        "unknowns": account.unknowns,
+        "stroke_low_m": [joint.stroke_low for joint in joints],
+        "stroke_high_m": [joint.stroke_high for joint in joints],
+        "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
+        "warnings": [str(oddity) for oddity in oddities],
+    }
+
+
+def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
+    """Lines of text for a reader."""
+    kinds = " + ".join(joint.kind for joint in account.joints)
+    count = len(account.sections)
+    lines = [f"{name}: this scene can be used"]
+    lines += [f"  {scene.description}"] if scene.description else []
+    lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {account.length:.2f} m, {account.mass:.1f} kg"]
+    lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
+    lines += ["", "Sections", *_indent(_sections(account))]
+    lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
+    lines += ["", "Left out of the model (absent from the scene, or zero)", *_indent(_left_out(account))]
+    lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
+    lines += ["", f"Warnings: {len(oddities) or 'none'}", *(f"  {oddity}" for oddity in oddities)]
+    return lines
+
+
+def _masses(account: Account) -> list[str]:
+    rows = [["", "length m", "beam", "root", "head", "line fill", "links", "barrel", "rod", "sum"]]
+    for section, joint in zip(account.sections, account.joints, strict=True):
+        own = [section.beam_mass, section.root_mass, section.head_mass, section.fill_mass]
+        drive = [joint.link_mass, joint.barrel_mass, joint.rod_mass]
+        masses = [f"{mass:.1f}" if mass else "-" for mass in own + drive]
+        rows.append([f"section {section.number}", f"{section.length:.2f}", *masses, f"{sum(own + drive):.1f}"])
+    if account.payload:
+        rows.append(["payload", *[""] * 8, f"{account.payload:.1f}"])
+    rows.append(["total", f"{account.length:.2f}", *[""] * 7, f"{account.mass:.1f}"])
+    return _table(rows)
+
+
+def _sections(account: Account) -> list[str]:
+    return _table([[f"section {section.number}", _section_words(section)] for section in account.sections], left=2)
+
+
+def _section_words(section: SectionAccount) -> str:
+    if not section.parts and section.has_beam:
+        return "rigid (modes: 0), with the mass of its beam"
+    if not section.parts:
+        return "rigid (no beam), all of it described by root"
+    x0, x1 = section.parts[0][0], section.parts[-1][1]
+    coordinates = f"{section.bending} bending + 1 axial coordinates"
+    if not section.splits:
+        return f"flexible from {x0:g} to {x1:g} m: {coordinates}"
+    where = " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
+    return f"flexible from {x0:g} to {x1:g} m, split {where}: {len(section.parts)} parts with {coordinates} each"
+
+
+def _cylinders(account: Account) -> list[str]:
+    rows = [["", "kind", "range deg", "stroke used m", "of m", "oil spring"]]
+    for joint in account.joints:
+        low, high = joint.range_deg
+        used = f"{joint.stroke_low:.3f} to {joint.stroke_high:.3f}"
+        reach = [f"{low:g} to {high:g}", used, f"{joint.max_stroke:g}"]
+        rows.append([f"joint {joint.number}", joint.kind, *reach, _oil(joint)])
+    return _table(rows, left=6)
+
+
+def _oil(joint: JointAccount) -> str:
+    if joint.k is None:
+        return "incompressible"
+    damping = f"d = {joint.d / 1e3:.4g} kN s/m" if joint.d else "no damping"
+    return f"k = {joint.k / 1e6:.4g} kN/mm, {damping}"
+
+
+def _left_out(account: Account) -> list[str]:
+    return _table([[item.key, item.meaning] for item in account.left_out], left=2)
+
+
+def _unknowns(account: Account) -> list[str]:
+    rows = []
+    for section, joint in zip(account.sections, account.joints, strict=True):
+        rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.kind == "A" else SIZE_B])
+        if section.parts:
+            parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
+            words = f"{parts} x ({section.bending} bending + 1 axial)"
+            rows.append([f"section {section.number}", str(section.unknowns), words])
+    rows.append(["total", str(account.unknowns), ""])
+    width = max(len(row[1]) for row in rows)
+    return _table([[name, number.rjust(width), words] for name, number, words in rows], left=3)
+
+
+def _table(rows: list[list[str]], left: int = 1) -> list[str]:
+    """Aligned columns, the first `left` of them to the left, the others to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [cell.ljust(w) for cell, w in zip(row[:left], widths[:left], strict=True)]
+        cells += [cell.rjust(w) for cell, w in zip(row[left:], widths[left:], strict=True)]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def _indent(lines: list[str]) -> list[str]:
+    return [f"  {line}" for line in lines]

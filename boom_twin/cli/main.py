@@ -1,0 +1,82 @@
+"""The console script: picks the command and turns errors of the input into one message and an exit code.
+
+Exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Protocol, cast
+
+from .. import __version__
+from ..errors import BoomTwinError
+
+# name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
+COMMANDS: dict[str, tuple[str, str]] = {
+    "check": ("check", "validate a scene and tell what its model consists of"),
+    "scene": ("scene", "print the default scene file"),
+}
+
+DESCRIPTION = "Digital twin of a concrete placing boom."
+
+
+class Command(Protocol):
+    """A module of one command."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Declare the arguments of the command."""
+
+    def run(self, args: Namespace) -> int:
+        """Do it; returns the exit code."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program's name; by default those of the process.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    args = _parser(arguments).parse_args(arguments)
+    command = _command(args.command)
+    try:
+        code = command.run(args)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # the reader of stdout has gone; let nothing be flushed to it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except BoomTwinError as error:
+        reason = str(error)
+    except OSError as error:
+        reason = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    except KeyboardInterrupt:
+        reason = "stopped"
+    print(f"boom_twin {args.command}: {reason}", file=sys.stderr)
+    return 1
+
+
+def _command(name: str) -> Command:
+    return cast(Command, import_module(f".{COMMANDS[name][0]}", __package__))
+
+
+def _parser(arguments: Sequence[str]) -> ArgumentParser:
+    """The parser of all commands; only the module of the command that is named gets imported."""
+    parser = ArgumentParser(prog="boom_twin", description=DESCRIPTION)
+    parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, (_, purpose) in COMMANDS.items():
+        own = commands.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
+        if name in arguments:
+            _command(name).add_arguments(own)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""The records of one .mcap file, every checksum verified, in the order of the file or of their log times."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from operator import attrgetter
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex, McapRecord, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from .damage import STUMBLES
+
+
+def records(path: Path) -> Iterator[McapRecord]:
+    """All records in the order of the file; those inside a chunk follow it."""
+    with path.open("rb") as file:
+        limit = path.stat().st_size
+        for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
+            yield record
+            if isinstance(record, Chunk):
+                yield from _content(record)
+
+
+def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
+    """All messages by log time; at equal times in the order of the file.
+
+    Only chunks that overlap in time are held together; without an index of chunks, the whole file is.
+    """
+    by_time = attrgetter("log_time")
+    if not chunks:
+        yield from sorted((record for record in records(path) if isinstance(record, Message)), key=by_time)
+        return
+    with path.open("rb") as file:
+        for group in _overlapping(chunks):
+            content = [record for index in group for record in _content(chunk_at(file, index))]
+            yield from sorted((record for record in content if isinstance(record, Message)), key=by_time)
+
+
+def chunk_at(file: BinaryIO, index: ChunkIndex) -> Chunk:
+    """The chunk that `index` points at."""
+    file.seek(index.chunk_start_offset)
+    raw = file.read(index.chunk_length)
+    if len(raw) != index.chunk_length or raw[:9] != struct.pack("<BQ", Opcode.CHUNK, len(raw) - 9):
+        raise McapError(f"no chunk of {index.chunk_length} bytes at byte {index.chunk_start_offset}")
+    chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(raw[9:])))
+    return chunk
+
+
+def _overlapping(chunks: Sequence[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
+    """Groups of chunks, each later than the one before; within a group in the order of the file."""
+    group: list[ChunkIndex] = []
+    end = 0
+    for index in sorted(chunks, key=attrgetter("message_start_time", "chunk_start_offset")):
+        if group and index.message_start_time >= end:
+            yield sorted(group, key=attrgetter("chunk_start_offset"))
+            group = []
+        group.append(index)
+        end = max(end, index.message_end_time)
+    yield sorted(group, key=attrgetter("chunk_start_offset"))
+
+
+def _content(chunk: Chunk) -> list[McapRecord]:
+    """The records inside a chunk, its checksum verified."""
+    if chunk.compression not in ("", "zstd", "lz4"):
+        raise McapError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
+    try:
+        return breakup_chunk(chunk, validate_crc=True)
+    except STUMBLES as error:
+        span = f"{chunk.message_start_time} to {chunk.message_end_time} ns"
+        raise McapError(f"chunk with log times {span}: {error}") from error

@@ -1,0 +1,135 @@
+"""From a report of the twin to messages.
+
+The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import nan
+from typing import Any
+
+from ..records import Array, Prediction, Report, Residuals
+from .factory import Types
+from .topics import TYPES, Output
+
+FRAME = "base_link"
+SHAPE_PERIOD = 50_000_000
+"""Length of one slot in nanoseconds: one shape is sent in each, 20 a second."""
+LINE_WIDTH = 0.12
+LINE_COLOUR = (0.90, 0.45, 0.10, 1.0)
+_LINE_STRIP, _ADD = 4, 0
+
+Messages = list[tuple[Output, Any]]
+
+
+class Outlet:
+    """Fills messages; the same reports in the same order give the same messages.
+
+    Parameters
+    ----------
+    types : Types
+        Makes the empty messages.
+    """
+
+    def __init__(self, types: Types) -> None:
+        self._types = types
+        self._slot: int | None = None
+
+    def fill(self, report: Report) -> Messages:
+        """The messages of one report, in the order of `Output`.
+
+        Returns
+        -------
+        list of (Output, message)
+            ``tip_displacement`` (m), ``tip_position`` (m), ``tip_acceleration`` (m/s^2, rad/s^2), ``joint_states`` and,
+            once in `SHAPE_PERIOD` of stamps, ``shape`` if there is a prediction; ``residuals`` for each set of them.
+        """
+        messages: Messages = []
+        if (prediction := report.prediction) is not None:
+            messages += [
+                (Output.TIP_DISPLACEMENT, self._displacement(prediction)),
+                (Output.TIP_POSITION, self._position(prediction)),
+                (Output.TIP_ACCELERATION, self._acceleration(prediction)),
+                (Output.JOINT_STATES, self._joint_states(prediction)),
+            ]
+        messages += [(Output.RESIDUALS, self._residuals(residuals)) for residuals in report.residuals]
+        if prediction is not None and self._is_due(prediction.stamp):
+            messages.append((Output.SHAPE, self._shape(prediction)))
+        return messages
+
+    def _is_due(self, stamp: int) -> bool:
+        """Whether `stamp` is the first in its slot of time; a rule of the stamps only, indifferent to their jitter."""
+        before, self._slot = self._slot, stamp // SHAPE_PERIOD
+        return self._slot != before
+
+    def _empty(self, key: Output, stamp: int) -> Any:
+        """A message for `key` with its header filled."""
+        msg = self._types.make(TYPES[key])
+        fill_header(msg.header, stamp)
+        return msg
+
+    def _displacement(self, prediction: Prediction) -> Any:
+        msg = self._empty(Output.TIP_DISPLACEMENT, prediction.stamp)
+        _fill_xz(msg.vector, prediction.tip_displacement)
+        return msg
+
+    def _position(self, prediction: Prediction) -> Any:
+        msg = self._empty(Output.TIP_POSITION, prediction.stamp)
+        _fill_xz(msg.point, prediction.tip_position)
+        return msg
+
+    def _acceleration(self, prediction: Prediction) -> Any:
+        msg = self._empty(Output.TIP_ACCELERATION, prediction.stamp)
+        _fill_xz(msg.accel.linear, prediction.tip_acceleration)
+        msg.accel.angular.y = -float(prediction.tip_angular_acceleration)
+        return msg
+
+    def _joint_states(self, prediction: Prediction) -> Any:
+        """Joints first, cylinders after them; a joint has no effort of its own."""
+        msg, count = self._empty(Output.JOINT_STATES, prediction.stamp), len(prediction.joints)
+        msg.name = list(_joint_state_names(count))
+        msg.position = self._types.doubles(prediction.joints.tolist() + prediction.strokes.tolist())
+        msg.effort = self._types.doubles([nan] * count + prediction.cylinder_forces.tolist())
+        return msg
+
+    def _residuals(self, residuals: Residuals) -> Any:
+        """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
+        msg = self._empty(Output.RESIDUALS, residuals.stamp)
+        msg.name = list(residuals.names)
+        msg.position = self._types.doubles(residuals.values)
+        msg.velocity = self._types.doubles(residuals.normalised)
+        msg.effort = self._types.doubles(residuals.sigmas)
+        return msg
+
+    def _shape(self, prediction: Prediction) -> Any:
+        msg = self._types.make(TYPES[Output.SHAPE])
+        marker = self._types.make("visualization_msgs/msg/Marker")
+        fill_header(marker.header, prediction.stamp)
+        marker.ns, marker.type, marker.action = "boom", _LINE_STRIP, _ADD
+        marker.pose.orientation.w, marker.scale.x = 1.0, LINE_WIDTH
+        marker.color.r, marker.color.g, marker.color.b, marker.color.a = LINE_COLOUR
+        marker.points = [self._point(place) for place in prediction.shape]
+        msg.markers = [marker]
+        return msg
+
+    def _point(self, place: Array) -> Any:
+        point = self._types.make("geometry_msgs/msg/Point")
+        _fill_xz(point, place)
+        return point
+
+
+@lru_cache(maxsize=8)
+def _joint_state_names(count: int) -> tuple[str, ...]:
+    return tuple(f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1))
+
+
+def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
+    """Put a stamp (nanoseconds) and a frame into a ``std_msgs/Header``."""
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    header.frame_id = frame
+
+
+def _fill_xz(target: Any, values: Array) -> None:
+    """Model x to x, model y to z; y is 0."""
+    target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

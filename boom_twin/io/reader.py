@@ -1,0 +1,191 @@
+"""A recorded session: what it holds, its messages decoded in the order of their log times.
+
+A session is a rosbag2 directory, a directory of .mcap files without ``metadata.yaml``, or a bare .mcap.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from ..errors import BagError
+from .bagmeta import FILE_NAME, read_metadata
+from .blocks import messages
+from .damage import RESCUE, STUMBLES, blame, compare_counts
+from .definitions import check_encoding
+from .survey import McapFile, survey
+from .typestore import jazzy
+
+
+@dataclass(frozen=True, slots=True)
+class TopicInfo:
+    """One topic of a session: name, type (``package/msg/Name``) and number of messages."""
+
+    name: str
+    type: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What a session holds.
+
+    Attributes
+    ----------
+    path : Path
+        As it was given.
+    files : tuple of McapFile
+    topics : tuple of TopicInfo
+        By name.
+    start, end : int
+        First and last log time in nanoseconds; 0 without messages.
+    checked : bool
+        Whether all its messages are under a checksum. If not (the default of ``ros2 bag record``), a flipped bit in
+        a value cannot be noticed.
+    notes : dict of str to str
+        What the writer noted, for instance that the session is synthetic.
+    """
+
+    path: Path
+    files: tuple[McapFile, ...]
+    topics: tuple[TopicInfo, ...]
+    start: int
+    end: int
+    checked: bool
+    notes: dict[str, str]
+
+    def find(self, name: str) -> TopicInfo | None:
+        """The topic of that name, with or without its leading slash."""
+        return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
+
+
+def scan(path: Path) -> Session:
+    """What the session at `path` holds; cheap, reads no messages where the files have a summary.
+
+    Raises
+    ------
+    BagError
+        If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
+    """
+    metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
+    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else _mcap_files(path)
+    files = tuple(survey(file) for file in named)
+    topics = _topics(path, files)
+    notes = {key: value for file in files for key, value in file.notes.items()}
+    if metadata is not None:
+        told = Counter[str]()
+        for entry in metadata.topics_with_message_count:
+            told[entry.topic_metadata.name] += entry.message_count
+        compare_counts(path, FILE_NAME, told, "files", {topic.name: topic.count for topic in topics})
+        notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()}
+    filled = [file for file in files if any(file.counts.values())]
+    return Session(
+        path=path,
+        files=files,
+        topics=topics,
+        start=min((file.start for file in filled), default=0),
+        end=max((file.end for file in filled), default=0),
+        checked=all(file.checked for file in filled),
+        notes=notes,
+    )
+
+
+def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+    """The messages of some topics by log time.
+
+    Parameters
+    ----------
+    session : Session
+        From `scan`.
+    wanted : dict of str to str
+        Message type by topic, with or without the leading slash.
+
+    Returns
+    -------
+    iterator of (str, int, message)
+        The topic as in `wanted`, log time in nanoseconds, message of rosbags.
+
+    Raises
+    ------
+    BagError
+        At once if a topic is missing, empty, or of another type, encoding or definition; while iterating if a checksum
+        does not fit or a message cannot be decoded; at the end if the files did not hold what their statistics say.
+    """
+    asked: dict[str, str] = {}
+    for name, type_name in wanted.items():
+        asked[_check_topic(session, name, type_name).name] = name
+    for file in session.files:
+        check_encoding(file, asked)
+    streams = [_decoded(file, asked) for file in session.files]
+    return heapq.merge(*streams, key=itemgetter(1))
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    """The files of a session without metadata."""
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
+    files = sorted(path.glob("*.mcap"))
+    if not files:
+        there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
+        raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
+    return files
+
+
+def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
+    """The topics of all files together."""
+    counts: Counter[str] = Counter()
+    types: dict[str, str] = {}
+    for file in files:
+        for channel in file.channels.values():
+            schema = file.schemas.get(channel.schema_id)
+            name = schema.name if schema else ""
+            if types.setdefault(channel.topic, name) != name:
+                raise BagError(
+                    f"{path}: topic {channel.topic} has two types, {types[channel.topic]} and {name}. "
+                    "Record it again with one of them, or split the bag with `ros2 bag convert`."
+                )
+            counts[channel.topic] += file.counts.get(channel.id, 0)
+    return tuple(TopicInfo(name, types[name], counts[name]) for name in sorted(types))
+
+
+def _check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
+    """The topic, if it is there, of that type and not empty."""
+    topic = session.find(name)
+    if topic is None:
+        names = [known.name for known in session.topics]
+        near = get_close_matches("/" + name.lstrip("/"), names, n=1, cutoff=0.5)
+        remedy = f"Did you mean {near[0]}?" if near else "Record it, or give its name in topics.yaml."
+        raise BagError(f"{session.path}: no topic {name}; the session has {', '.join(names) or 'none'}. {remedy}")
+    if topic.type != type_name:
+        raise BagError(f"{session.path}: topic {topic.name} has type {topic.type!r}, not {type_name}. Remap the topic.")
+    if topic.count == 0:
+        raise BagError(f"{session.path}: topic {topic.name} has no messages. Check that its publisher was running.")
+    return topic
+
+
+def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+    """The wanted messages of one file; all others are counted."""
+    channels = file.channels
+    seen: Counter[int] = Counter()
+    decode = jazzy().deserialize_cdr
+    with blame(file.path):
+        for message in messages(file.path, file.chunks):
+            channel = channels[message.channel_id]
+            seen[message.channel_id] += 1
+            if (name := asked.get(channel.topic)) is None:
+                continue
+            try:
+                decoded = decode(message.data, file.schemas[channel.schema_id].name)
+            except STUMBLES as error:
+                place = f"{file.path}: topic {channel.topic} at log time {message.log_time} ns"
+                raise BagError(f"{place}: {error} {RESCUE}") from error
+            yield name, message.log_time, decoded
+        compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))

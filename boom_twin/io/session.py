@@ -1,0 +1,100 @@
+"""A rig session from arrays: strokes, joint angles, tip IMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..records import Array, Stream
+from .factory import RosbagsTypes
+from .outlet import FRAME, fill_header
+from .topics import TYPES, load_topics
+from .writer import SessionWriter
+
+IMU_FRAME = "tip"
+_UNKNOWN = -1.0
+"""First element of a covariance: the quantity is not measured (REP-145)."""
+
+
+def write_session(
+    directory: Path,
+    stamps_ns: NDArray[np.int64],
+    strokes: Array,
+    joints: Array,
+    imu: Array | None,
+    description: Mapping[str, str],
+) -> None:
+    """Write the bag of one session; log times are the stamps.
+
+    Parameters
+    ----------
+    directory : Path
+        New or empty.
+    stamps_ns : ndarray of int, shape (k,)
+        Nanoseconds.
+    strokes, joints : ndarray, shape (k, n)
+        m; rad.
+    imu : ndarray, shape (k, 2), optional
+        Specific force along x and z of the tip, m/s^2.
+    description : dict of str to str
+        Kept as notes of the bag: say here what the session is, and that it is synthetic if it is.
+
+    Raises
+    ------
+    UsageError
+        If the shapes do not agree.
+    BagError
+        If `directory` holds anything.
+    """
+    _check_shapes(stamps_ns, strokes, joints, imu)
+    topics = load_topics().inputs
+    if imu is None:
+        topics = {stream: topic for stream, topic in topics.items() if stream is not Stream.IMU}
+    messages = _Messages(strokes.shape[1])
+    with SessionWriter(directory, {stream.value: topic for stream, topic in topics.items()}, description) as bag:
+        for row, stamp in enumerate(stamps_ns.tolist()):
+            bag.write(Stream.STROKES.value, stamp, messages.joint_state("cylinder", stamp, strokes[row]))
+            bag.write(Stream.ANGLES.value, stamp, messages.joint_state("joint", stamp, joints[row]))
+            if imu is not None:
+                bag.write(Stream.IMU.value, stamp, messages.imu(stamp, imu[row]))
+
+
+class _Messages:
+    """Messages as the sensors of a rig would send them."""
+
+    def __init__(self, count: int) -> None:
+        self._types = RosbagsTypes()
+        self._names = {kind: [f"{kind}_{i}" for i in range(1, count + 1)] for kind in ("cylinder", "joint")}
+
+    def joint_state(self, kind: str, stamp: int, values: Array) -> Any:
+        msg = self._types.make(TYPES[Stream.STROKES])
+        fill_header(msg.header, stamp, FRAME)
+        msg.name = self._names[kind]
+        msg.position = self._types.doubles(values)
+        return msg
+
+    def imu(self, stamp: int, values: Array) -> Any:
+        """Of the three quantities of an Imu only the acceleration is there, and of it only the plane."""
+        msg = self._types.make(TYPES[Stream.IMU])
+        fill_header(msg.header, stamp, IMU_FRAME)
+        msg.linear_acceleration.x, msg.linear_acceleration.z = float(values[0]), float(values[1])
+        msg.orientation.w = 1.0
+        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
+        return msg
+
+
+def _check_shapes(stamps: NDArray[np.int64], strokes: Array, joints: Array, imu: Array | None) -> None:
+    rows = len(stamps)
+    expected: Sequence[tuple[str, Array | None, tuple[int, ...]]] = (
+        ("strokes", strokes, (rows, strokes.shape[-1])),
+        ("joints", joints, (rows, strokes.shape[-1])),
+        ("imu", imu, (rows, 2)),
+    )
+    for name, values, shape in expected:
+        if values is not None and values.shape != shape:
+            raise UsageError(f"{name} has shape {values.shape}, not {shape}. Give one row for each of {rows} stamps.")

@@ -1,0 +1,160 @@
+"""What one .mcap file holds, without its messages."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
+from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
+
+from ..errors import BagError
+from .blocks import chunk_at, records
+from .damage import RESCUE, blame, compare_counts
+
+PROFILE = "ros2"
+NOTES = "boom_twin"
+"""Name of the metadata record that holds the notes on a session."""
+
+_FOOTER = struct.Struct("<BQQQI8s")
+
+
+@dataclass(frozen=True, slots=True)
+class McapFile:
+    """What one file holds.
+
+    Attributes
+    ----------
+    path : Path
+    channels : dict of int to Channel
+    schemas : dict of int to Schema
+    counts : dict of int to int
+        Messages by channel.
+    start, end : int
+        First and last log time in nanoseconds; 0 without messages.
+    chunks : tuple of ChunkIndex
+        Empty when the file has no complete index and must be read as a whole.
+    checked : bool
+        Whether its messages are under a checksum and counted. If not, a flipped bit can pass without notice.
+    notes : dict of str to str
+    """
+
+    path: Path
+    channels: dict[int, Channel]
+    schemas: dict[int, Schema]
+    counts: dict[int, int]
+    start: int
+    end: int
+    chunks: tuple[ChunkIndex, ...]
+    checked: bool
+    notes: dict[str, str]
+
+    def by_topic(self, counts: dict[int, int]) -> dict[str, int]:
+        """Counts by channel, added up by the name of the topic."""
+        topics: Counter[str] = Counter()
+        for channel, count in counts.items():
+            topics[self.channels[channel].topic] += count
+        return dict(topics)
+
+
+def survey(path: Path) -> McapFile:
+    """Look at one file: only at its summary if that is complete, else at all of it.
+
+    Raises
+    ------
+    BagError
+        If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
+    """
+    with blame(path), path.open("rb") as file:
+        _check_ends(path, file)
+        file.seek(0)
+        reader = SeekingReader(file, validate_crcs=True, record_size_limit=path.stat().st_size)
+        if (profile := reader.get_header().profile) != PROFILE:
+            raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
+        summary = reader.get_summary()
+        told = summary.statistics if summary else None
+        if summary is None or told is None or not _is_complete(summary, told):
+            return _walk(path)
+        return McapFile(
+            path=path,
+            channels=summary.channels,
+            schemas=summary.schemas,
+            counts=dict(told.channel_message_counts),
+            start=told.message_start_time,
+            end=told.message_end_time,
+            chunks=tuple(summary.chunk_indexes),
+            checked=chunk_at(file, summary.chunk_indexes[0]).uncompressed_crc != 0,
+            notes=_notes(reader.iter_metadata()),
+        )
+
+
+def _check_ends(path: Path, file: BinaryIO) -> None:
+    """Magic at both ends, footer, checksum of the summary."""
+    size = path.stat().st_size
+    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
+    file.seek(max(0, size - _FOOTER.size))
+    tail = file.read()
+    if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
+        raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
+    _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
+    file.seek(start or size - _FOOTER.size)
+    covered = file.read()[: -len(MCAP0_MAGIC) - 4]
+    if checksum not in (0, zlib.crc32(covered)):
+        raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
+
+
+def _is_complete(summary: Summary, told: Statistics) -> bool:
+    """Whether the summary alone tells what is in the file and where."""
+    return (
+        0 < told.chunk_count == len(summary.chunk_indexes)
+        and told.channel_message_counts.keys() <= summary.channels.keys()
+        and {channel.schema_id for channel in summary.channels.values()} <= {0, *summary.schemas}
+    )
+
+
+def _walk(path: Path) -> McapFile:
+    """Look at all of a file, and compare its statistics, if it has them, with what is there."""
+    channels: dict[int, Channel] = {}
+    schemas: dict[int, Schema] = {}
+    notes: list[Metadata] = []
+    counts: Counter[int] = Counter()
+    start, end = 2**64, 0
+    told: Statistics | None = None
+    is_summed = are_chunks_summed = False
+    for record in records(path):
+        match record:
+            case Message():
+                counts[record.channel_id] += 1
+                start, end = min(start, record.log_time), max(end, record.log_time)
+            case Channel():
+                channels[record.id] = record
+            case Schema():
+                schemas[record.id] = record
+            case Metadata():
+                notes.append(record)
+            case Chunk():
+                are_chunks_summed = record.uncompressed_crc != 0
+            case DataEnd():
+                is_summed = record.data_section_crc != 0
+            case Statistics():
+                told = record
+    start = start if counts else 0
+    checked = is_summed or (are_chunks_summed and told is not None)
+    held = McapFile(path, channels, schemas, dict(counts), start, end, (), checked, _notes(notes))
+    if told is not None:
+        expected = held.by_topic(told.channel_message_counts)
+        compare_counts(path, "statistics", expected, "in the file", held.by_topic(counts))
+    return held
+
+
+def _notes(found: Iterable[Metadata]) -> dict[str, str]:
+    return {key: value for record in found if record.name == NOTES for key, value in record.metadata.items()}

@@ -1,0 +1,20 @@
+"""All checks of what single values cannot show, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from . import consistency, placement, reach, units
+from .draft import Draft
+from .finding import Finding
+
+CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
+    consistency.counts,
+    consistency.sections,
+    consistency.joints,
+    placement.pins,
+    placement.thin_parts,
+    placement.centres,
+    reach.joints,
+    units.suspects,
+)

@@ -1,0 +1,134 @@
+"""Keys that need each other, exclude each other, or must agree in number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..errors import ABSENT
+from .draft import Draft
+from .finding import Finding, odd, wrong
+from .glossary import MEANING
+from .parts import Joint, Point, Section
+
+BEAM_NEEDS = ("A", "I", "rho_A")
+BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "head")
+LINK_KEYS = ("C", "D", "E", "lL", "lR")
+SIX_BAR_ONLY = (*LINK_KEYS, "R", "mL", "mR")
+
+
+def counts(draft: Draft) -> Iterator[Finding]:
+    """One joint, and one angle of every posture, for each section."""
+    number = len(draft.sections)
+    if number == 0:
+        return
+    if draft.joints and len(draft.joints) != number:
+        bound = f"there are {_several(number, 'section')}, and every section has one joint"
+        yield wrong(draft, ("joints",), len(draft.joints), bound, "Add or remove joints or sections.")
+    for name, angles in draft.postures.items():
+        if len(angles) != number:
+            bound = f"it has {_several(len(angles), 'angle')}, the boom has {_several(number, 'section')}"
+            remedy = "Give one angle per section, degrees to the horizontal."
+            yield wrong(draft, ("postures", name), angles, bound, remedy)
+
+
+def sections(draft: Draft) -> Iterator[Finding]:
+    """Flexible sections have their cross-section, rigid ones only a root; the rod pin is on the first section."""
+    for i, section in enumerate(draft.sections):
+        if section is not None:
+            yield from _rigid(draft, i, section) if section.beam is None else _flexible(draft, i, section, section.beam)
+            yield from _rod_pin(draft, i, section)
+
+
+def _flexible(draft: Draft, i: int, section: Section, beam: Point) -> Iterator[Finding]:
+    place = ("sections", i)
+    for key in BEAM_NEEDS:
+        if getattr(section, key) is None:
+            remedy = f"Give {key}, {MEANING[Section][key]}, or leave out `beam` for a rigid section."
+            yield wrong(draft, (*place, key), ABSENT, "a section with a beam needs it", remedy)
+    x0, x1 = beam
+    if not 0 <= x0 < x1 <= section.length:
+        bound = f"[x0, x1] must have 0 <= x0 < x1 <= length = {section.length:g} m"
+        yield wrong(draft, (*place, "beam"), beam, bound, "Both are measured from the inboard pivot.")
+
+
+def _rigid(draft: Draft, i: int, section: Section) -> Iterator[Finding]:
+    place = ("sections", i)
+    if section.root is None:
+        bound = "this section has no `beam`, so it is rigid, and `root` is all of it"
+        yield wrong(draft, (*place, "root"), ABSENT, bound, "Give root: {mass, com, inertia}, or a beam.")
+    elif section.root.mass == 0:
+        bound = "this rigid section weighs nothing"
+        yield odd(draft, (*place, "root", "mass"), 0.0, bound, "Give its mass in kg.")
+    for key in BEAM_ONLY:
+        value = getattr(section, key)
+        if value is not None:
+            shown = value.model_dump() if key == "head" else value
+            bound = "this section has no `beam`, so it is rigid, all of it described by `root`"
+            remedy = f"Remove `{key}`, or give beam: [x0, x1] if the section bends."
+            yield wrong(draft, (*place, key), shown, bound, remedy)
+
+
+def _rod_pin(draft: Draft, i: int, section: Section) -> Iterator[Finding]:
+    place = ("sections", i, "rod_pin")
+    if i == 0 and section.rod_pin is None:
+        bound = "cylinder 1 pushes on the first section and needs a pin there"
+        yield wrong(draft, place, ABSENT, bound, f"Give {MEANING[Section]['rod_pin']}.")
+    if i > 0 and section.rod_pin is not None:
+        bound = "only the first section has a rod pin; the later cylinders push on links"
+        yield wrong(draft, place, section.rod_pin, bound, f"Remove it; R in joints[{i}] places the pin on a link.")
+
+
+def joints(draft: Draft) -> Iterator[Finding]:
+    """Kinds in their order, with the keys of their kind and no others; angles and cylinders in themselves sound."""
+    for i, joint in enumerate(draft.joints):
+        if joint is not None:
+            yield from _kind(draft, i, joint)
+            yield from _keys_of_kind(draft, i, joint)
+            yield from _range(draft, i, joint)
+            if joint.cylinder.d is not None and joint.cylinder.k is None:
+                bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
+                remedy = "Give k, stiffness of the oil spring in N/m, or remove d."
+                yield wrong(draft, ("joints", i, "cylinder", "d"), joint.cylinder.d, bound, remedy)
+
+
+def _kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
+    place = ("joints", i, "kind")
+    if i == 0 and joint.kind != "A":
+        bound = "joint 1 turns the boom on its base and must be of kind A"
+        yield wrong(draft, place, joint.kind, bound, "Put a joint of kind A first.")
+    if i > 0 and joint.kind == "A":
+        bound = "kind A stands on the base, so only joint 1 can be of it"
+        yield wrong(draft, place, joint.kind, bound, "Choose B1, B2 or B3.")
+
+
+def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
+    place = ("joints", i)
+    needed = {"A": (), "B1": LINK_KEYS}.get(joint.kind, (*LINK_KEYS, "R"))
+    refused = {"A": SIX_BAR_ONLY, "B1": ("R",)}.get(joint.kind, ())
+    for key in needed:
+        if getattr(joint, key) is None:
+            remedy = f"Give {key}, {MEANING[Joint][key]}."
+            yield wrong(draft, (*place, key), ABSENT, f"a joint of kind {joint.kind} needs it", remedy)
+    for key in refused:
+        value = getattr(joint, key)
+        if value is not None:
+            why = "has no links" if joint.kind == "A" else "has its rod pin where the links meet"
+            bound = f"a joint of kind {joint.kind} {why}"
+            yield wrong(draft, (*place, key), value, bound, f"Remove `{key}`, or choose another kind.")
+
+
+def _range(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
+    low, high = joint.range_deg
+    if not -360 <= low < high <= 360:
+        bound = "[low, high] must have -360 <= low < high <= 360 degrees"
+        yield wrong(
+            draft,
+            ("joints", i, "range_deg"),
+            joint.range_deg,
+            bound,
+            "Give the lower angle first, both within one turn.",
+        )
+
+
+def _several(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

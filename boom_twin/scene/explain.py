@@ -1,0 +1,145 @@
+"""What a model of a scene consists of, in numbers: lengths, masses, coordinates, reach, and what is left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .kinematics import stroke_curve
+from .left_out import LeftOut, left_out
+from .parts import Scene
+from .splits import Split, flexible_parts, splits
+
+UNKNOWNS_A, UNKNOWNS_B = 2, 6
+
+
+@dataclass(frozen=True, slots=True)
+class SectionAccount:
+    """Section `number` (from 1). Lengths in m, masses in kg.
+
+    ``parts`` are the ends of its flexible parts, ``bending`` the bending coordinates of each, ``unknowns`` those of all
+    its parts together (each has one axial coordinate besides). ``beam_mass`` counts without the line fill.
+    """
+
+    number: int
+    length: float
+    has_beam: bool
+    parts: tuple[tuple[float, float], ...]
+    splits: tuple[Split, ...]
+    bending: int
+    beam_mass: float
+    root_mass: float
+    head_mass: float
+    fill_mass: float
+    unknowns: int
+
+    @property
+    def mass(self) -> float:
+        """All of the section, kg."""
+        return self.beam_mass + self.root_mass + self.head_mass + self.fill_mass
+
+
+@dataclass(frozen=True, slots=True)
+class JointAccount:
+    """Joint `number` (from 1) with its links and its cylinder. Masses in kg, strokes in m, angles in degrees.
+
+    ``stroke_low``, ``stroke_high`` are reached over ``range_deg`` where links close and the cylinder reaches. The joint
+    of kind A has two unknowns (angle of the section, cylinder force), a six-bar six (angles of section and two links,
+    two components of the pin force, cylinder force).
+    """
+
+    number: int
+    kind: str
+    range_deg: tuple[float, float]
+    stroke_low: float
+    stroke_high: float
+    max_stroke: float
+    k: float | None
+    d: float | None
+    link_mass: float
+    barrel_mass: float
+    rod_mass: float
+    unknowns: int
+
+    @property
+    def mass(self) -> float:
+        """Links, barrel and rod, kg."""
+        return self.link_mass + self.barrel_mass + self.rod_mass
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Everything about a scene's model. ``length`` is the sum of all sections (m), ``payload`` in kg."""
+
+    sections: tuple[SectionAccount, ...]
+    joints: tuple[JointAccount, ...]
+    payload: float
+    left_out: tuple[LeftOut, ...]
+
+    @property
+    def length(self) -> float:
+        """Straight boom, pivot of section 1 to the tip, m."""
+        return sum(section.length for section in self.sections)
+
+    @property
+    def mass(self) -> float:
+        """Whole boom with its cylinders, line fill and payload, kg."""
+        return sum(s.mass for s in self.sections) + sum(j.mass for j in self.joints) + self.payload
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of one step."""
+        return sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
+
+
+def explain(scene: Scene) -> Account:
+    """Bookkeeping of the model that a scene describes."""
+    numbers = range(len(scene.sections))
+    payload = scene.tip.payload if scene.tip is not None else None
+    return Account(
+        sections=tuple(_section(scene, i) for i in numbers),
+        joints=tuple(_joint(scene, i) for i in numbers),
+        payload=payload or 0.0,
+        left_out=left_out(scene),
+    )
+
+
+def _section(scene: Scene, i: int) -> SectionAccount:
+    section = scene.sections[i]
+    parts = flexible_parts(scene, i)
+    bending = scene.modes_of(i) if parts else 0
+    beam = section.beam or (0.0, 0.0)
+    return SectionAccount(
+        number=i + 1,
+        length=section.length,
+        has_beam=section.beam is not None,
+        parts=parts,
+        splits=splits(scene, i),
+        bending=bending,
+        beam_mass=(section.rho_A or 0.0) * (beam[1] - beam[0]),
+        root_mass=section.root.mass if section.root is not None else 0.0,
+        head_mass=section.head.mass if section.head is not None else 0.0,
+        fill_mass=(scene.line_fill or 0.0) * section.length,
+        unknowns=len(parts) * (bending + 1),
+    )
+
+
+def _joint(scene: Scene, i: int) -> JointAccount:
+    joint = scene.joints[i]
+    cylinder = joint.cylinder
+    strokes = stroke_curve(scene, i, np.radians(np.linspace(*joint.range_deg, 721)))
+    return JointAccount(
+        number=i + 1,
+        kind=joint.kind,
+        range_deg=joint.range_deg,
+        stroke_low=max(float(np.nanmin(strokes)), 0.0),
+        stroke_high=min(float(np.nanmax(strokes)), cylinder.max_stroke),
+        max_stroke=cylinder.max_stroke,
+        k=cylinder.k,
+        d=cylinder.d,
+        link_mass=(joint.mL or 0.0) + (joint.mR or 0.0),
+        barrel_mass=cylinder.barrel.mass if cylinder.barrel is not None else 0.0,
+        rod_mass=cylinder.rod.mass if cylinder.rod is not None else 0.0,
+        unknowns=UNKNOWNS_A if joint.kind == "A" else UNKNOWNS_B,
+    )

@@ -1,0 +1,69 @@
+"""`load_scene`: from a file to a validated `Scene`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+
+from ..errors import Fault, SceneError, SceneWarning
+from .checks import CHECKS
+from .parts import Scene
+from .read import parse, read_text
+from .structure import structure
+
+DEFAULT_NAME = "default scene"
+
+
+def default_text() -> str:
+    """Text of the package's default scene."""
+    return (files("boom_twin") / "msg_config" / "scene.yaml").read_text(encoding="utf-8")
+
+
+def load_scene(source: str | Path | None = None) -> Scene:
+    """A boom as its scene file describes it.
+
+    Parameters
+    ----------
+    source : str or Path, optional
+        A YAML file; without it, the package's default scene.
+
+    Returns
+    -------
+    Scene
+        Frozen, complete and checked; SI units.
+
+    Raises
+    ------
+    SceneError
+        With every fault that was found: place, value, bound, remedy.
+
+    Warns
+    -----
+    SceneWarning
+        One for each thing that can be computed but looks odd.
+    """
+    scene, oddities = examine(source)
+    for oddity in oddities:
+        warnings.warn(str(oddity), SceneWarning, stacklevel=2)
+    return scene
+
+
+def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
+    """Like `load_scene`, with the oddities returned instead of issued as warnings."""
+    name = DEFAULT_NAME if source is None else str(source)
+    text = default_text() if source is None else read_text(Path(source))
+    document = parse(text, name)
+    scene, draft, faults = structure(document)
+    findings = [finding for check in CHECKS for finding in check(draft)]
+    faults += document.faults + [finding.fault for finding in findings if not finding.odd]
+    oddities = _in_order(finding.fault for finding in findings if finding.odd)
+    if faults or scene is None:
+        raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
+    return scene, oddities
+
+
+def _in_order(faults: Iterable[Fault]) -> list[Fault]:
+    """Sorted by their lines in the file."""
+    return sorted(faults, key=lambda fault: fault.line or 0)

@@ -1,0 +1,123 @@
+"""The words for a key that is not known and for a value that pydantic refuses."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from ..errors import ABSENT, Fault
+from .glossary import BLOCKS, HOME, MEANING
+from .parts import Scene
+from .read import NUMBER, Document, Place, words
+
+BOUNDS = {
+    "finite_number": "it must be a finite number",
+    "greater_than": "it must be greater than {gt:g}",
+    "greater_than_equal": "it must not be less than {ge:g}",
+    "less_than_equal": "it must not be more than {le:g}",
+    "literal_error": "it must be {expected}",
+    "string_type": "text is needed, not {what}",
+    "tuple_type": "a list is needed, not {what}",
+    "dict_type": "a block of keys is needed, not {what}",
+    "model_type": "a block of keys is needed, not {what}",
+}
+
+ITEMS = {MEANING[Scene][key]: "a block of keys, as in the default scene" for key in ("sections", "joints")}
+
+
+def unknown_key(document: Document, place: Place, value: Any, model: type[BaseModel]) -> Fault:
+    """A key that `model` does not have: the nearest one, and where the key belongs if it is known elsewhere."""
+    key = str(place[-1])
+    if key == "clearance":
+        bound = "clearance is not built yet: this version knows ideal pins only"
+        return document.fault(place, value, bound, "Remove the block `clearance` to go on with ideal pins.")
+    if key.isdigit() and value is None:
+        bound = "a number stands where a key is expected"
+        return document.fault(place, value, bound, "Decimals take a point, not a comma.")
+    here = {name.lower(): name for name in reversed(model.model_fields)}
+    near = difflib.get_close_matches(key.lower(), here, n=1, cutoff=0.0)
+    remedy = f"The nearest known key here is `{here[near[0]]}`."
+    homes = [HOME[other] for other in MEANING if other is not model and key in other.model_fields]
+    if homes:
+        remedy = f"`{key}` is a key of {' or '.join(homes)}. " + remedy
+    elif not difflib.get_close_matches(key.lower(), here, n=1):
+        remedy += f" All of them: {', '.join(model.model_fields)}."
+    where = f"in {words(place[:-1])}" if len(place) > 1 else "at the top level"
+    return document.fault(place, value, f"unknown key {where}", remedy)
+
+
+def value_fault(document: Document, detail: ErrorDetails, place: Place) -> Fault:
+    """A pydantic error in the words of the file."""
+    kind, value, limits = detail["type"], detail["input"], detail.get("ctx", {})
+    meaning = _meaning(place)
+    give = f"Give {meaning}." if meaning else "Give such a value."
+    if kind == "missing" and not isinstance(place[-1], int):
+        return document.fault(place, ABSENT, "it is needed", give)
+    if kind == "missing" or kind in ("too_long", "too_short"):
+        return _length_fault(document, detail, place, give)
+    if kind in ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing"):
+        whole = "a whole number" if kind.startswith("int") else "a number"
+        bound = f"{whole} is needed, not {_what(value)}"
+        return document.fault(place, value, bound, _number_remedy(value, give))
+    if kind == "string_type":
+        give = "Put it in quotes."
+    bound = BOUNDS[kind].format(what=_what(value), **limits) if kind in BOUNDS else detail["msg"]
+    return document.fault(place, value, bound, give)
+
+
+def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: str) -> Fault:
+    """A list with too few or too many entries."""
+    if detail["type"] == "missing":
+        place = place[:-1]
+    value = detail["input"]
+    found = len(value) if isinstance(value, tuple) else 0
+    if place in (("sections",), ("joints",)):
+        return document.fault(place, value, "at least one entry is needed", give)
+    bound = f"a list of 2 numbers is needed, it has {found}"
+    if found > 2:
+        give += " Decimals take a point, not a comma."
+    return document.fault(place, value, bound, give)
+
+
+def _meaning(place: Place) -> str:
+    """Words and unit of the key at or around a place, empty if there are none."""
+    model: type[BaseModel] = Scene
+    meaning = ""
+    for step in place:
+        if isinstance(step, int):
+            meaning = ITEMS.get(meaning, meaning)
+        else:
+            meaning = MEANING[model].get(step, meaning)
+            model = BLOCKS.get(model, {}).get(step, model)
+    return "section angles to the horizontal, degrees" if place[:1] == ("postures",) and len(place) > 1 else meaning
+
+
+def _what(value: Any) -> str:
+    """What kind of value this is, in a newcomer's words."""
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, str):
+        return "text"
+    if isinstance(value, int | float):
+        return "a whole number" if isinstance(value, int) else "a decimal number"
+    if value is None:
+        return "nothing"
+    return "a list" if isinstance(value, tuple) else "a block"
+
+
+def _number_remedy(value: Any, give: str) -> str:
+    """What to do about a value that should be a number."""
+    if not isinstance(value, str):
+        return give
+    text = value.strip()
+    pointed = text.replace(",", ".", 1)
+    if NUMBER.fullmatch(text):
+        return f"Write it without quotes: {text}."
+    if NUMBER.fullmatch(pointed):
+        return f"Write a decimal point: {pointed}."
+    if (start := NUMBER.match(text)) and text[start.end() :].strip().isalnum():
+        return f"Write the number alone, {start[0]}, if that is {give.removeprefix('Give ')}"
+    return give

@@ -1,0 +1,176 @@
+"""From YAML text to plain values, with the line of every one of them.
+
+The text is composed to nodes and the nodes are turned into values here, so that no tag of the text can make an object:
+mappings become dict, sequences become tuple, scalars become float, int, bool, str or None.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+
+from ..errors import Fault, SceneError
+
+Place = tuple[str | int, ...]
+
+MAX_BYTES = 4_000_000
+MAX_VALUES = 200_000
+MAX_DEPTH = 20
+TAG = "tag:yaml.org,2002:"
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+def words(place: Place) -> str:
+    """A place in the words of the file: ``sections[1].root.mass``."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text or "scene"
+
+
+@dataclass
+class Document:
+    """Values of a YAML text, the line (from 1) of every place in it, and what was wrong with the writing."""
+
+    values: Any = None
+    lines: dict[Place, int] = field(default_factory=dict)
+    faults: list[Fault] = field(default_factory=list)
+
+    def line(self, place: Place) -> int | None:
+        """Line of a place; of the nearest block around it if the place itself is not in the text."""
+        while place not in self.lines and place:
+            place = place[:-1]
+        return self.lines.get(place)
+
+    def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
+        """A fault at a place of this text."""
+        return Fault(words(place), value, bound, remedy, self.line(place))
+
+
+def read_text(path: Path) -> str:
+    """Text of a scene file.
+
+    Raises
+    ------
+    SceneError
+        If there is no such file, or it is no UTF-8 text of at most `MAX_BYTES`.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            bound = f"more than {MAX_BYTES // 1_000_000} MB"
+            raise _refusal(str(path), bound, "A scene has a few kB: is this the right file?")
+        return data.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise _refusal(str(path), "this is not a text file in UTF-8", "Give a scene file in YAML.") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        remedy = "Give the path of a scene file; `boom_twin scene` prints one to start from."
+        raise _refusal(str(path), reason, remedy) from None
+
+
+def parse(text: str, source: str) -> Document:
+    """Plain values of a YAML text.
+
+    Raises
+    ------
+    SceneError
+        If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        root = yaml.compose(text)
+    except (YAMLError, RecursionError, ValueError) as error:
+        raise SceneError(source, (_syntax_fault(text, error),)) from None
+    document = Document()
+    if root is None:
+        raise _refusal(source, "the file is empty", "Start from the one that `boom_twin scene` prints.")
+    document.values = _Reader(document, yaml.constructor).value(root, ())
+    return document
+
+
+def _refusal(source: str, bound: str, remedy: str) -> SceneError:
+    return SceneError(source, (Fault("scene file", source, bound, remedy),))
+
+
+def _syntax_fault(text: str, error: Exception) -> Fault:
+    """What the YAML parser stumbled over, with the line that it names."""
+    line, what, rows = None, "brackets nested too deeply", text.splitlines()
+    if isinstance(error, MarkedYAMLError):
+        mark = error.problem_mark or error.context_mark
+        what = str(error.problem or error.context)
+        line = None if mark is None else min(mark.line + 1, len(rows))
+    elif isinstance(error, YAMLError):
+        what = str(error)
+    what = " ".join(what.split())
+    shown = rows[line - 1].strip() if line else text[:40].strip()
+    return Fault("text", shown, f"this is not valid YAML, {what}", _yaml_remedy(what), line)
+
+
+def _yaml_remedy(what: str) -> str:
+    if "\\t" in what:
+        return "Indent with spaces, not with tabs."
+    return "Mend the text on this line or just above it: brackets, commas, colons, indentation."
+
+
+class _Reader:
+    """Turns nodes into values; notes lines and faults in its document."""
+
+    def __init__(self, document: Document, constructor: Any) -> None:
+        self.document = document
+        self.constructor = constructor
+        self.count = 0
+
+    def value(self, node: Node, place: Place) -> Any:
+        self.count += 1
+        self.document.lines.setdefault(place, node.start_mark.line + 1)
+        if len(place) > MAX_DEPTH or self.count > MAX_VALUES:
+            if self.count <= MAX_VALUES + 1:
+                bound = "nested too deeply, or too many values, for a scene"
+                self._fault(place, "...", bound, "Write it without aliases that hold themselves.")
+            return None
+        if isinstance(node, MappingNode):
+            return self._mapping(node, place)
+        if isinstance(node, ScalarNode):
+            return self._scalar(node, place)
+        return tuple(self.value(item, (*place, i)) for i, item in enumerate(node.value))
+
+    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key = str(key_node.value) if isinstance(key_node, ScalarNode) else "?"
+            here = (*place, key)
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, ScalarNode) or key_node.tag == TAG + "merge":
+                self._fault(here, "...", "this kind of key is not used in scenes", "Write plain keys.")
+            elif key in found:
+                bound = f"the key is there twice, on line {self.document.lines[here]} and on line {line}"
+                self._fault(here, found[key], bound, "Keep one of them.")
+            else:
+                self.document.lines[here] = line
+                found[key] = self.value(value_node, here)
+        return found
+
+    def _scalar(self, node: ScalarNode, place: Place) -> Any:
+        kind = str(node.tag).removeprefix(TAG)
+        if kind in ("int", "float", "bool", "null"):
+            try:
+                return self.constructor.construct_object(node)
+            except (ValueError, OverflowError, YAMLError):
+                return node.value
+        if kind not in ("str", "timestamp"):
+            remedy = "Remove the tag: a scene holds plain values only."
+            self._fault(place, node.value, f"the tag {node.tag} is not allowed", remedy)
+        elif node.style is None and NUMBER.fullmatch(node.value):  # +.5e3, which YAML takes for text
+            return float(node.value)
+        return node.value
+
+    def _fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
+        self.document.faults.append(self.document.fault(place, value, bound, remedy))

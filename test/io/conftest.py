@@ -1,0 +1,118 @@
+"""A small session, and files of it written in other ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+
+from boom_twin.io.reader import Session, read
+from boom_twin.io.session import write_session
+from boom_twin.io.writer import FILE_NAME
+
+NOTES = {"origin": "synthetic, made for a test"}
+JOINT_STATE = "sensor_msgs/msg/JointState"
+WANTED = {"cylinder_strokes": JOINT_STATE, "joint_angles": JOINT_STATE, "tip_imu": "sensor_msgs/msg/Imu"}
+ROWS = 40
+
+
+@pytest.fixture(scope="session")
+def arrays() -> dict[str, Any]:
+    """Stamps (ns), strokes (m), joints (rad), imu (m/s^2) of a short session of a boom with three sections."""
+    random = np.random.default_rng(7)
+    return {
+        "stamps_ns": 1_700_000_000_000_000_000 + np.arange(ROWS) * 5_000_000 + random.integers(-200_000, 200_000, ROWS),
+        "strokes": random.uniform(0.0, 0.5, (ROWS, 3)),
+        "joints": random.uniform(-2.0, 1.0, (ROWS, 3)),
+        "imu": random.normal((0.0, 9.81), 0.05, (ROWS, 2)),
+    }
+
+
+@pytest.fixture
+def bag(tmp_path: Path, arrays: dict[str, Any]) -> Path:
+    """The session as a rosbag2 directory."""
+    write_session(tmp_path / "bag", **arrays, description=NOTES)
+    return tmp_path / "bag"
+
+
+@pytest.fixture
+def wanted() -> dict[str, str]:
+    return dict(WANTED)
+
+
+@pytest.fixture
+def content() -> Callable[[Session], list[tuple[Any, ...]]]:
+    """All that matters of a session, as plain values that compare."""
+
+    def values(session: Session) -> list[tuple[Any, ...]]:
+        return [(name, time, *_plain(msg)) for name, time, msg in read(session, WANTED)]
+
+    return values
+
+
+def _plain(msg: Any) -> tuple[Any, ...]:
+    stamp = (msg.header.stamp.sec, msg.header.stamp.nanosec, msg.header.frame_id)
+    if hasattr(msg, "position"):
+        return (*stamp, tuple(msg.name), tuple(msg.position), tuple(msg.velocity), tuple(msg.effort))
+    force = msg.linear_acceleration
+    return (*stamp, force.x, force.y, force.z, tuple(msg.linear_acceleration_covariance))
+
+
+@pytest.fixture
+def rewritten(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the messages of a bag into another .mcap file: other options, order, or names."""
+
+    def rewrite(
+        bag: Path,
+        name: str = "other.mcap",
+        *,
+        profile: str = "ros2",
+        encoding: str = "cdr",
+        schema_encoding: str = "ros2msg",
+        change: Callable[[bytes], bytes] = bytes,
+        backwards: bool = False,
+        **options: Any,
+    ) -> Path:
+        path = tmp_path / name
+        options = {"chunk_size": 2048, "compression": CompressionType.NONE, **options}
+        with (bag / FILE_NAME).open("rb") as source, path.open("wb") as target:
+            writer = Writer(target, **options)
+            writer.start(profile=profile, library="test")
+            channels: dict[str, int] = {}
+            found = list(make_reader(source).iter_messages())
+            for schema, channel, message in reversed(found) if backwards else found:
+                if channel.topic not in channels:
+                    kind = writer.register_schema(schema.name, schema_encoding, change(schema.data))
+                    channels[channel.topic] = writer.register_channel(channel.topic, encoding, kind)
+                writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+            writer.finish()
+        return path
+
+    return rewrite
+
+
+UNINDEXED = {
+    "no message index": {"index_types": IndexType.CHUNK},
+    "no index": {"index_types": IndexType.NONE},
+    "no summary": {
+        "index_types": IndexType.NONE,
+        "use_statistics": False,
+        "use_summary_offsets": False,
+        "repeat_channels": False,
+        "repeat_schemas": False,
+    },
+    "no repeated channels": {"repeat_channels": False, "repeat_schemas": False},
+    "no chunks": {"use_chunking": False, "enable_data_crcs": True},
+    "no checksums": {"enable_crcs": False},
+}
+
+
+@pytest.fixture(params=UNINDEXED, ids=lambda name: name.replace(" ", "-"))
+def lacking(request: pytest.FixtureRequest) -> dict[str, Any]:
+    """Options of a writer that leaves something out."""
+    return UNINDEXED[request.param]

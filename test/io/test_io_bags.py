@@ -1,0 +1,230 @@
+"""Sessions written and read again: here, by rosbags, by the plain mcap reader."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.rosbag2 import Reader
+from ruamel.yaml import YAML
+
+from boom_twin.errors import BagError, UsageError
+from boom_twin.io.bagmeta import read_metadata, write_metadata
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.reader import Session, read, scan
+from boom_twin.io.session import write_session
+from boom_twin.io.topics import Qos, Topic, load_topics
+from boom_twin.io.typestore import jazzy
+from boom_twin.io.writer import FILE_NAME, SessionWriter
+from boom_twin.records import Stream
+
+Content = Callable[[Session], list[tuple[Any, ...]]]
+POINT = Topic(
+    name="~/tip/position",
+    type="geometry_msgs/msg/PointStamped",
+    qos=Qos(reliability="reliable", durability="transient_local", depth=7),
+    unit="m",
+    meaning="a point",
+)
+
+
+def write_points(directory: Path, count: int, compression: CompressionType = CompressionType.ZSTD) -> None:
+    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression) as bag:
+        for number in range(count):
+            msg = RosbagsTypes().make(POINT.type)
+            msg.point.x = float(number)
+            bag.write("point", 10 * number, msg)
+
+
+def test_what_is_written_is_read(bag: Path, arrays: dict[str, Any], wanted: dict[str, str]) -> None:
+    found = list(read(scan(bag), wanted))
+    rows = {name: [msg for topic, _, msg in found if topic == name] for name in wanted}
+    assert [time for _, time, _ in found] == np.repeat(arrays["stamps_ns"], 3).tolist()
+    assert [name for name, _, _ in found[:3]] == ["cylinder_strokes", "joint_angles", "tip_imu"]
+    np.testing.assert_array_equal([msg.position for msg in rows["cylinder_strokes"]], arrays["strokes"])
+    np.testing.assert_array_equal([msg.position for msg in rows["joint_angles"]], arrays["joints"])
+    forces = [(msg.linear_acceleration.x, msg.linear_acceleration.z) for msg in rows["tip_imu"]]
+    np.testing.assert_array_equal(forces, arrays["imu"])
+    assert rows["joint_angles"][5].name == ["joint_1", "joint_2", "joint_3"]
+    stamps = [msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec for msg in rows["tip_imu"]]
+    assert stamps == arrays["stamps_ns"].tolist()
+
+
+def test_scan_tells_what_is_there(bag: Path, arrays: dict[str, Any]) -> None:
+    session = scan(bag)
+    assert [(topic.name, topic.count) for topic in session.topics] == [
+        ("/cylinder_strokes", 40),
+        ("/joint_angles", 40),
+        ("/tip_imu", 40),
+    ]
+    assert (session.start, session.end) == (arrays["stamps_ns"][0], arrays["stamps_ns"][-1])
+    assert session.notes == {"origin": "synthetic, made for a test"}
+    assert session.checked
+    assert session.find("tip_imu") == session.find("/tip_imu") == session.topics[2]
+    assert session.find("imu") is None
+
+
+def test_a_session_without_imu_has_no_imu_topic(tmp_path: Path, arrays: dict[str, Any]) -> None:
+    write_session(tmp_path / "bag", **{**arrays, "imu": None}, description={})
+    assert [topic.name for topic in scan(tmp_path / "bag").topics] == ["/cylinder_strokes", "/joint_angles"]
+
+
+def test_same_input_gives_same_bytes(bag: Path, tmp_path: Path, arrays: dict[str, Any]) -> None:
+    other = tmp_path / "elsewhere" / "under another name"
+    write_session(other, **arrays, description={"origin": "synthetic, made for a test"})
+    for name in (FILE_NAME, "metadata.yaml"):
+        assert (
+            hashlib.sha256((bag / name).read_bytes()).digest() == hashlib.sha256((other / name).read_bytes()).digest()
+        )
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_rosbags_reads_it(tmp_path: Path, compression: CompressionType) -> None:
+    write_points(tmp_path / "bag", 3000, compression)
+    with Reader(tmp_path / "bag") as reader:
+        (connection,) = reader.connections
+        assert (reader.message_count, reader.duration) == (3000, 29_991)
+        assert (connection.topic, connection.msgtype) == ("/boom_twin/tip/position", POINT.type)
+        assert connection.digest == jazzy().hash_rihs01(POINT.type)
+        (qos,) = connection.ext.offered_qos_profiles
+        assert qos.reliability is QosReliability.RELIABLE and qos.durability is QosDurability.TRANSIENT_LOCAL
+        assert qos.depth == 7
+    with AnyReader([tmp_path / "bag"]) as reader:
+        found = [reader.deserialize(raw, POINT.type).point.x for _, _, raw in reader.messages()]
+    assert found == list(range(3000))
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_every_compression_is_read_here(tmp_path: Path, compression: CompressionType) -> None:
+    write_points(tmp_path / "bag", 3000, compression)
+    session = scan(tmp_path / "bag")
+    assert len(session.files[0].chunks) > 2
+    assert [msg.point.x for _, _, msg in read(session, {"/boom_twin/tip/position": POINT.type})] == list(range(3000))
+
+
+def test_rosbags_writes_what_is_read_here(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/p", POINT.type, typestore=jazzy())
+        for number in range(20):
+            bag.write(connection, number, jazzy().serialize_cdr(RosbagsTypes().make(POINT.type), POINT.type))
+    session = scan(tmp_path / "bag")
+    assert not session.checked
+    assert [time for _, time, _ in read(session, {"p": POINT.type})] == list(range(20))
+
+
+def test_file_is_as_the_contract_says(bag: Path) -> None:
+    with (bag / FILE_NAME).open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        header, summary = reader.get_header(), reader.get_summary()
+        notes = [record for record in reader.iter_metadata()]
+    assert (header.profile, header.library) == ("ros2", "boom_twin")
+    assert summary is not None
+    assert {schema.encoding for schema in summary.schemas.values()} == {"ros2msg"}
+    assert {channel.message_encoding for channel in summary.channels.values()} == {"cdr"}
+    definition = next(schema.data.decode() for schema in summary.schemas.values() if "Joint" in schema.name)
+    assert "MSG: std_msgs/Header" in definition and "MSG: builtin_interfaces/Time" in definition
+    assert [(record.name, record.metadata) for record in notes] == [
+        ("boom_twin", {"origin": "synthetic, made for a test"})
+    ]
+    root = YAML(typ="safe").load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert (root["version"], root["storage_identifier"], root["ros_distro"]) == (9, "mcap", "jazzy")
+    assert root["custom_data"] == {"origin": "synthetic, made for a test"}
+    qos = root["topics_with_message_count"][0]["topic_metadata"]["offered_qos_profiles"][0]
+    assert (qos["reliability"], qos["durability"], qos["history"]) == ("best_effort", "volatile", "keep_last")
+
+
+def test_little_waits_in_memory(tmp_path: Path) -> None:
+    with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
+        for number in range(5000):
+            bag.write("point", number, RosbagsTypes().make(POINT.type))
+        written = (tmp_path / "bag" / FILE_NAME).stat().st_size
+    assert written > 0.7 * (tmp_path / "bag" / FILE_NAME).stat().st_size
+
+
+def test_a_run_that_fails_leaves_a_whole_bag(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), SessionWriter(tmp_path / "bag", {"point": POINT}) as bag:
+        bag.write("point", 1, RosbagsTypes().make(POINT.type))
+        raise ZeroDivisionError
+    assert scan(tmp_path / "bag").find("/boom_twin/tip/position").count == 1
+
+
+def test_nothing_is_overwritten(bag: Path, arrays: dict[str, Any]) -> None:
+    before = (bag / FILE_NAME).read_bytes()
+    with pytest.raises(BagError, match=r"holds metadata\.yaml already.*new directory"):
+        write_session(bag, **arrays, description={})
+    assert (bag / FILE_NAME).read_bytes() == before
+
+
+def test_shapes_that_disagree_are_refused(tmp_path: Path, arrays: dict[str, Any]) -> None:
+    with pytest.raises(UsageError, match=r"joints has shape \(40, 2\), not \(40, 3\)"):
+        write_session(tmp_path / "bag", **{**arrays, "joints": arrays["joints"][:, :2]}, description={})
+    assert not (tmp_path / "bag").exists()
+
+
+def test_an_empty_bag_is_whole_but_its_topic_is_refused(tmp_path: Path) -> None:
+    with SessionWriter(tmp_path / "bag", {"strokes": load_topics().inputs[Stream.STROKES]}):
+        pass
+    session = scan(tmp_path / "bag")
+    assert [(topic.name, topic.count) for topic in session.topics] == [("/cylinder_strokes", 0)]
+    with pytest.raises(BagError, match="no messages"):
+        read(session, {"cylinder_strokes": "sensor_msgs/msg/JointState"})
+
+
+def test_bare_file_and_directory_without_metadata(bag: Path, content: Content) -> None:
+    whole = content(scan(bag))
+    assert content(scan(bag / FILE_NAME)) == whole
+    (bag / "metadata.yaml").unlink()
+    session = scan(bag)
+    assert content(session) == whole
+    assert session.notes == {"origin": "synthetic, made for a test"}
+
+
+def test_split_files_are_merged_by_time(tmp_path: Path, arrays: dict[str, Any], bag: Path, content: Content) -> None:
+    cuts = {"late": slice(25, None), "early": slice(None, 25)}
+    (tmp_path / "split").mkdir()
+    metadata = read_metadata(bag / "metadata.yaml")
+    for name, cut in cuts.items():
+        write_session(tmp_path / name, **{key: value[cut] for key, value in arrays.items()}, description={})
+        (tmp_path / name / FILE_NAME).rename(tmp_path / "split" / f"{name}.mcap")
+    write_metadata(
+        tmp_path / "split" / "metadata.yaml",
+        metadata.model_copy(update={"relative_file_paths": [f"{name}.mcap" for name in cuts]}),
+    )
+    assert content(scan(tmp_path / "split")) == content(scan(bag))
+
+
+def test_files_that_lack_something_are_read_fully(
+    bag: Path, rewritten: Callable[..., Path], lacking: dict[str, Any], content: Content
+) -> None:
+    session = scan(rewritten(bag, **lacking))
+    assert [topic.count for topic in session.topics] == [40, 40, 40]
+    assert content(session) == content(scan(bag))
+
+
+@pytest.mark.parametrize("options", [{}, {"use_chunking": False}], ids=["indexed", "unindexed"])
+def test_messages_come_by_time_whatever_their_order_in_the_file(
+    bag: Path, rewritten: Callable[..., Path], options: dict[str, Any], content: Content
+) -> None:
+    found = content(scan(rewritten(bag, backwards=True, **options)))
+    assert [entry[1] for entry in found] == sorted(entry[1] for entry in found)
+    assert sorted(found, key=str) == sorted(content(scan(bag)), key=str)
+
+
+def test_chunks_that_overlap_are_merged(tmp_path: Path) -> None:
+    times = [int(time) for time in np.random.default_rng(3).permutation(4000)]
+    with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
+        for time in times:
+            bag.write("point", time, RosbagsTypes().make(POINT.type))
+    session = scan(tmp_path / "bag")
+    assert len(session.files[0].chunks) > 2
+    assert [time for _, time, _ in read(session, {"boom_twin/tip/position": POINT.type})] == list(range(4000))

@@ -1,0 +1,185 @@
+"""Sessions that are damaged, cut off, or something else: refused by name, never read wrongly."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, IndexType
+
+from boom_twin.errors import BagError
+from boom_twin.io.reader import Session, read, scan
+from boom_twin.io.topics import load_topics
+from boom_twin.io.writer import FILE_NAME, SessionWriter
+from boom_twin.records import Stream
+
+Content = Callable[[Session], list[tuple[Any, ...]]]
+JOINT_STATE = "sensor_msgs/msg/JointState"
+
+
+def refusal(path: Path, content: Content) -> str:
+    with pytest.raises(BagError) as caught:
+        content(scan(path))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"compression": CompressionType.NONE},
+        {"compression": CompressionType.LZ4},
+        {"compression": CompressionType.ZSTD},
+        {"index_types": IndexType.NONE},
+        {"use_chunking": False, "enable_data_crcs": True},
+    ],
+    ids=["none", "lz4", "zstd", "unindexed", "unchunked"],
+)
+def test_a_flipped_bit_is_never_read_as_data(
+    bag: Path, rewritten: Callable[..., Path], options: dict[str, Any], content: Content
+) -> None:
+    path = rewritten(bag, **options)
+    truth, whole = content(scan(path)), path.read_bytes()
+    random, refused = np.random.default_rng(11), 0
+    for place, bit in zip(random.integers(0, len(whole), 60), random.integers(0, 8, 60), strict=True):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(bit)
+        path.write_bytes(damaged)
+        try:
+            found = content(scan(path))
+        except BagError as error:
+            assert str(path) in str(error)
+            refused += 1
+        else:
+            assert found == truth, f"bit {bit} of byte {place}"
+    assert refused > 10
+
+
+@pytest.mark.parametrize("kept", [0, 5, 8, 30, 1000, 0.5, 0.9, -1])
+def test_a_file_cut_off_is_refused_by_name(bag: Path, kept: float, content: Content) -> None:
+    file = bag / FILE_NAME
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(kept * len(whole)) if isinstance(kept, float) else kept])
+    assert str(file) in refusal(bag, content)
+
+
+def test_a_cut_file_names_the_remedy(bag: Path, content: Content) -> None:
+    (bag / FILE_NAME).write_bytes((bag / FILE_NAME).read_bytes()[:-100])
+    message = refusal(bag, content)
+    assert "the end is missing" in message and "boom_twin recover" in message
+
+
+def test_counts_of_metadata_and_file_are_compared(bag: Path, content: Content) -> None:
+    metadata = bag / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("message_count: 40", "message_count: 41", 1))
+    assert "/cylinder_strokes: metadata.yaml 41, files 40" in refusal(bag, content)
+
+
+def test_a_topic_that_only_metadata_knows_is_a_difference(bag: Path, content: Content) -> None:
+    metadata = bag / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("name: /tip_imu", "name: /imu"))
+    message = refusal(bag, content)
+    assert "/imu: metadata.yaml 40, files 0" in message and "/tip_imu: metadata.yaml 0, files 40" in message
+
+
+def test_counts_of_statistics_and_messages_are_compared(bag: Path, content: Content) -> None:
+    session = scan(bag)
+    file = session.files[0]
+    file.counts[next(iter(file.counts))] += 1
+    with pytest.raises(BagError, match="statistics 41, read 40"):
+        content(session)
+
+
+def test_a_missing_topic_names_those_that_are_there(bag: Path) -> None:
+    with pytest.raises(BagError) as caught:
+        read(scan(bag), {"joint_angels": JOINT_STATE})
+    message = str(caught.value)
+    assert "no topic joint_angels" in message and "/cylinder_strokes, /joint_angles, /tip_imu" in message
+    assert "Did you mean /joint_angles?" in message
+
+
+def test_another_type_is_refused(bag: Path) -> None:
+    with pytest.raises(BagError, match=r"/tip_imu has type 'sensor_msgs/msg/Imu', not sensor_msgs/msg/JointState"):
+        read(scan(bag), {"tip_imu": JOINT_STATE})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"profile": "ros1"}, "profile = 'ros1'"),
+        ({"encoding": "json"}, "message encoding 'json'"),
+        ({"schema_encoding": "jsonschema"}, "schema encoding 'jsonschema'"),
+        ({"change": lambda text: text.replace(b"float64[] velocity", b"float32[] velocity")}, "defined otherwise"),
+        ({"change": lambda text: b"} no definition {"}, "cannot be parsed"),
+    ],
+)
+def test_what_is_not_ros2_is_refused(
+    bag: Path, rewritten: Callable[..., Path], options: dict[str, Any], words: str, content: Content
+) -> None:
+    path = rewritten(bag, **options)
+    message = refusal(path, content)
+    assert words in message and str(path) in message
+
+
+def test_an_empty_definition_is_taken_by_its_name(bag: Path, rewritten: Callable[..., Path], content: Content) -> None:
+    assert content(scan(rewritten(bag, change=lambda text: b""))) == content(scan(bag))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("storage_identifier: mcap", "storage_identifier: sqlite3", "storage_identifier = 'sqlite3'"),
+        ("compression_mode: ''", "compression_mode: FILE", "compression_mode = 'FILE'"),
+        ("version: 9", "version: nine", "version: Input should be a valid integer"),
+        ("rosbag2_bagfile_information:", "other:", "not rosbag2 metadata"),
+        ("rosbag2_bagfile_information:", "{", "not a readable YAML file"),
+        ("- session_0.mcap", "- session_1.mcap", "session_1.mcap: cannot be read (No such file"),
+    ],
+)
+def test_metadata_that_cannot_be_used_is_refused(bag: Path, old: str, new: str, words: str, content: Content) -> None:
+    metadata = bag / "metadata.yaml"
+    assert old in metadata.read_text()
+    metadata.write_text(metadata.read_text().replace(old, new))
+    assert words in refusal(bag, content)
+
+
+def test_nothing_there(tmp_path: Path, content: Content) -> None:
+    assert "no such file or directory" in refusal(tmp_path / "none", content)
+    (tmp_path / "notes.txt").write_text("x")
+    assert "no .mcap file and no metadata.yaml in it (there is: notes.txt)" in refusal(tmp_path, content)
+    shutil.copy(tmp_path / "notes.txt", tmp_path / "notes.mcap")
+    assert "not an MCAP file" in refusal(tmp_path, content)
+
+
+def test_a_chunk_that_is_not_recognised_is_missed(bag: Path, rewritten: Callable[..., Path], content: Content) -> None:
+    """Without an index nothing but the statistics tells that a record of unknown kind was a chunk."""
+    path = rewritten(bag, index_types=IndexType.NONE)
+    whole = bytearray(path.read_bytes())
+    first_chunk = 8 + 9 + int.from_bytes(whole[9:17], "little")
+    assert whole[first_chunk] == Opcode.CHUNK
+    whole[first_chunk] = 0x80
+    path.write_bytes(whole)
+    assert "message counts differ" in refusal(path, content)
+
+
+def test_a_damaged_chunk_is_named_by_its_times(
+    bag: Path, rewritten: Callable[..., Path], arrays: dict[str, Any], content: Content
+) -> None:
+    path = rewritten(bag, chunk_size=1 << 20)
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"cylinder_2", b"cylinder_7", 1))
+    first, last = arrays["stamps_ns"][[0, -1]]
+    assert f"{path}: chunk with log times {first} to {last} ns: crc validation failed" in refusal(path, content)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00\x01\x00\x00\x05", b"\x00\x01\x00\x00" + bytes(500)])
+def test_a_message_that_cannot_be_decoded_is_named(tmp_path: Path, data: bytes) -> None:
+    topic = load_topics().inputs[Stream.STROKES]
+    with SessionWriter(tmp_path / "bag", {"strokes": topic}) as bag:
+        bag.write_encoded("strokes", 77, data)
+    with pytest.raises(BagError, match=r"session_0\.mcap: topic /cylinder_strokes at log time 77 ns"):
+        list(read(scan(tmp_path / "bag"), {"cylinder_strokes": JOINT_STATE}))
