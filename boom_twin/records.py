@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -52,8 +52,8 @@ class Prediction:
         Of the last section's head; rad, rad/s, rad/s^2.
     joints, strokes, cylinder_forces : ndarray, shape (n,)
         rad; m (as estimated); N (positive in tension).
-    shape : ndarray, shape (k, 2)
-        Points of the deflected centre line from the base pivot to the tip, m.
+    shape : ndarray, shape (k, 2), or None
+        Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 50 ms.
     """
 
     stamp: int
@@ -67,7 +67,7 @@ class Prediction:
     joints: Array
     strokes: Array
     cylinder_forces: Array
-    shape: Array
+    shape: Array | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,4 +123,3 @@ class Report:
     residuals: tuple[Residuals, ...] = ()
     events: tuple[str, ...] = ()
     status: str = "ok"
-    counts: dict[str, int] = field(default_factory=dict)

@@ -36,7 +36,8 @@ EVENTS = {
 NANO = 1e-9
 MEMORY = 2_000_000_000  # ns of predictions kept for samples that come late
 PENDING = 4096  # most samples that wait for a stroke
-POSTURE_STEP = 0.02  # m of stroke after which the noise is propagated anew
+SHAPE_PERIOD = 50_000_000  # ns of one slot; one shape is given in each, 20 a second
+POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 NOISE_INTERVAL = 250_000_000  # ns between evaluations of its growth
 SMOOTH_INTERVAL = 0.1  # weight of a new sample interval in the running mean
 
@@ -169,8 +170,13 @@ class Twin:
             joints=row[:n],
             strokes=row[2 * n + 9 : 3 * n + 9],
             cylinder_forces=row[n : 2 * n],
-            shape=outline(self.plan, self._live, self._work.position),
+            shape=self._shape(stamp),
         )
+
+    def _shape(self, stamp: int) -> Array | None:
+        """The centre line at the first stamp of its slot of time: a rule of the stamps only, indifferent to jitter."""
+        before, self._slot = self._slot, stamp // SHAPE_PERIOD
+        return outline(self.plan, self._live, self._work.position) if self._slot != before else None
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
@@ -272,6 +278,7 @@ class Twin:
 
     def _clear(self) -> None:
         self._newest: int | None = None
+        self._slot: int | None = None
         self._epoch: int | None = None
         self._interval = 0.0
         self._newest_measured: dict[Stream, int] = {}

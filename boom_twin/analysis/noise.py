@@ -24,7 +24,7 @@ from ..records import Array
 from .frequencies import Mode, joint_increments, natural_modes
 
 BAND = 2.5  # modes are looked at up to this multiple of the smoother's own frequency
-WIDTH = 1e-4  # relative accuracy of their frequencies
+WIDTH = 1e-3  # relative accuracy of their frequencies
 
 
 @dataclass(frozen=True)

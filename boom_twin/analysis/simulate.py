@@ -20,7 +20,7 @@ from .statics import checked_strokes, settle
 
 RHO = 0.8
 TOLERANCE = 1e-7  # rad in the last pass of a step; what is left is its square
-PASSES = 20
+PASSES = np.int64(20)
 
 
 @dataclass(frozen=True)

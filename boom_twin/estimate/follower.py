@@ -24,9 +24,10 @@ from ..plan.compile import Plan
 from ..records import Array
 from .smoother import add_node, drive_between, measure, start_node
 
-TOLERANCE, PASSES = 1e-7, 20
+TOLERANCE = 1e-5  # rad in the last pass of a step; what is left is about its square
+PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
-REST_PASSES = 60
+REST_PASSES = np.int64(60)
 WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
 
 

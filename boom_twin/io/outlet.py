@@ -14,8 +14,6 @@ from .factory import Types
 from .topics import TYPES, Output
 
 FRAME = "base_link"
-SHAPE_PERIOD = 50_000_000
-"""Length of one slot in nanoseconds: one shape is sent in each, 20 a second."""
 LINE_WIDTH = 0.12
 LINE_COLOUR = (0.90, 0.45, 0.10, 1.0)
 _LINE_STRIP, _ADD = 4, 0
@@ -34,7 +32,6 @@ class Outlet:
 
     def __init__(self, types: Types) -> None:
         self._types = types
-        self._slot: int | None = None
 
     def fill(self, report: Report) -> Messages:
         """The messages of one report, in the order of `Output`.
@@ -42,8 +39,8 @@ class Outlet:
         Returns
         -------
         list of (Output, message)
-            ``tip_displacement`` (m), ``tip_position`` (m), ``tip_acceleration`` (m/s^2, rad/s^2), ``joint_states`` and,
-            once in `SHAPE_PERIOD` of stamps, ``shape`` if there is a prediction; ``residuals`` for each set of them.
+            ``tip_displacement`` (m), ``tip_position`` (m), ``tip_acceleration`` (m/s^2, rad/s^2), ``joint_states``, and
+            ``shape`` where it has one, if there is a prediction; ``residuals`` for each set of them.
         """
         messages: Messages = []
         if (prediction := report.prediction) is not None:
@@ -54,14 +51,9 @@ class Outlet:
                 (Output.JOINT_STATES, self._joint_states(prediction)),
             ]
         messages += [(Output.RESIDUALS, self._residuals(residuals)) for residuals in report.residuals]
-        if prediction is not None and self._is_due(prediction.stamp):
-            messages.append((Output.SHAPE, self._shape(prediction)))
+        if prediction is not None and prediction.shape is not None:
+            messages.append((Output.SHAPE, self._shape(prediction.stamp, prediction.shape)))
         return messages
-
-    def _is_due(self, stamp: int) -> bool:
-        """Whether `stamp` is the first in its slot of time; a rule of the stamps only, indifferent to their jitter."""
-        before, self._slot = self._slot, stamp // SHAPE_PERIOD
-        return self._slot != before
 
     def _empty(self, key: Output, stamp: int) -> Any:
         """A message for `key` with its header filled."""
@@ -102,14 +94,14 @@ class Outlet:
         msg.effort = self._types.doubles(residuals.sigmas)
         return msg
 
-    def _shape(self, prediction: Prediction) -> Any:
+    def _shape(self, stamp: int, line: Array) -> Any:
         msg = self._types.make(TYPES[Output.SHAPE])
         marker = self._types.make("visualization_msgs/msg/Marker")
-        fill_header(marker.header, prediction.stamp)
+        fill_header(marker.header, stamp)
         marker.ns, marker.type, marker.action = "boom", _LINE_STRIP, _ADD
         marker.pose.orientation.w, marker.scale.x = 1.0, LINE_WIDTH
         marker.color.r, marker.color.g, marker.color.b, marker.color.a = LINE_COLOUR
-        marker.points = [self._point(place) for place in prediction.shape]
+        marker.points = [self._point(place) for place in line]
         msg.markers = [marker]
         return msg
 

@@ -1,0 +1,79 @@
+"""What every rigid part of a boom weighs, gathered about a reference point of its section."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..scene.parts import Point, RigidPart, Scene, Section
+
+
+@dataclass(frozen=True, slots=True)
+class Lump:
+    """A rigid mass: kg, centre (m), inertia about that centre (kg m^2)."""
+
+    mass: float
+    com: Point
+    inertia: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """Mass (kg), centre from the reference point (m), inertia about the REFERENCE POINT (kg m^2)."""
+
+    mass: float
+    com: Point
+    inertia: float
+
+
+def gather(lumps: list[Lump], reference_x: float) -> Gathered:
+    """One rigid mass for many, about the point (`reference_x`, 0) of the section's axes."""
+    mass = sum(lump.mass for lump in lumps)
+    if mass == 0.0:
+        return Gathered(0.0, (0.0, 0.0), sum(lump.inertia for lump in lumps))
+    x = sum(lump.mass * (lump.com[0] - reference_x) for lump in lumps) / mass
+    y = sum(lump.mass * lump.com[1] for lump in lumps) / mass
+    inertia = sum(lump.inertia + lump.mass * ((lump.com[0] - reference_x) ** 2 + lump.com[1] ** 2) for lump in lumps)
+    return Gathered(mass, (x, y), inertia)
+
+
+def rod(start: float, end: float, per_length: float, rotary: float = 0.0) -> Lump:
+    """Uniform straight rod on the section's axis: kg/m, and rotary inertia per length (kg m)."""
+    length = end - start
+    mass = per_length * length
+    return Lump(mass, ((start + end) / 2, 0.0), mass * length**2 / 12 + rotary * length)
+
+
+def _part(part: RigidPart | None) -> list[Lump]:
+    return [] if part is None else [Lump(part.mass, part.com, part.inertia)]
+
+
+def _tip(scene: Scene, index: int) -> list[Lump]:
+    """The payload, if section `index` is the last one."""
+    if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
+        return []
+    return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]
+
+
+def rigid_section(scene: Scene, index: int) -> list[Lump]:
+    """All of a section that does not bend, its beam included if it has one."""
+    section = scene.sections[index]
+    beam = [] if section.beam is None else [rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
+    fill = rod(0.0, section.length, scene.line_fill or 0.0)
+    return [*_part(section.root), *_part(section.head), *beam, fill, *_tip(scene, index)]
+
+
+def flexible_root(scene: Scene, section: Section) -> list[Lump]:
+    """Inboard of the beam: the root with its concrete."""
+    return [*_part(section.root), rod(0.0, _beam(section)[0], scene.line_fill or 0.0)]
+
+
+def flexible_head(scene: Scene, index: int) -> list[Lump]:
+    """Outboard of the beam: the head with its concrete and the payload."""
+    section = scene.sections[index]
+    fill = rod(_beam(section)[1], section.length, scene.line_fill or 0.0)
+    return [*_part(section.head), fill, *_tip(scene, index)]
+
+
+def _beam(section: Section) -> Point:
+    assert section.beam is not None
+    return section.beam

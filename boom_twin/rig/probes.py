@@ -1,0 +1,106 @@
+"""What is read from the Exudyn boom: tip, joints and cylinder forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..records import Array
+from .peer import exudyn, items
+from .system import Boom, Station
+
+
+@dataclass(frozen=True, slots=True)
+class Probes:
+    """Numbers of the sensors that record while the boom moves."""
+
+    tip: tuple[int, int]  # position, acceleration
+    head: tuple[int, int]  # velocities and accelerations of the last head's node
+    roots: tuple[int, ...]
+    heads: tuple[int, ...]
+    forces: tuple[int, ...]
+
+
+def attach(boom: Boom) -> Probes:
+    """Add all sensors; to be called before the system is assembled."""
+    kind, last = exudyn.OutputVariableType, boom.sections[-1].head
+    return Probes(
+        tip=(_at_tip(boom, kind.Position), _at_tip(boom, kind.Acceleration)),
+        head=(
+            _on_node(boom, last, kind.Coordinates_t),
+            _on_node(boom, last, kind.Coordinates_tt),
+        ),
+        roots=tuple(_on_node(boom, section.root, kind.Coordinates) for section in boom.sections),
+        heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
+        forces=tuple(_on_drive(boom, drive, name) for drive, name in boom.drives),
+    )
+
+
+def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
+    """All that was recorded, m rows; or, `at_rest`, the equilibrium just found, one row.
+
+    Returns
+    -------
+    dict
+        ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
+        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension.
+    """
+    data = partial(_data, boom, at_rest=at_rest)
+    roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
+    heads = np.column_stack([_angle(data(p), s.head) for p, s in zip(probes.heads, boom.sections, strict=True)])
+    before = np.column_stack([np.zeros(len(heads)), heads[:, :-1]])
+    return {
+        "t": data(probes.tip[0])[:, 0],
+        "tip": data(probes.tip[0])[:, 1:3],
+        "tip_acc": data(probes.tip[1])[:, 1:3],
+        "tip_angle": heads[:, -1],
+        "tip_rate": data(probes.head[0])[:, 3],
+        "tip_rate_dot": data(probes.head[1])[:, 3],
+        "joints": roots - before,
+        "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
+    }
+
+
+def _data(boom: Boom, number: int, at_rest: bool) -> Array:
+    """Time in column 0, then the sensor's values: what was recorded, or one row of the present state."""
+    if at_rest:
+        return np.hstack([0.0, boom.system.GetSensorValues(number)])[None, :]
+    return np.asarray(boom.system.GetSensorStoredData(number), float)
+
+
+def _angle(data: Array, station: Station) -> Array:
+    """Absolute angle of a rigid frame (rad): the node keeps only the change from its reference."""
+    return np.asarray(data[:, 3] + station.angle)
+
+
+def _force(boom: Boom, index: int, number: int, at_rest: bool) -> Array:
+    """Cylinder force (N), positive in tension.
+
+    The multiplier of a distance is positive in tension in Exudyn's dynamic solver, in compression in its static one
+    (seen in 1.13.6).
+    """
+    force = _data(boom, number, at_rest)[:, 1]
+    return -force if at_rest and boom.scene.joints[index].cylinder.k is None else force
+
+
+def _at_tip(boom: Boom, kind: Any) -> int:
+    head, length = boom.sections[-1].head, boom.scene.sections[-1].length
+    sensor = items.SensorBody(bodyNumber=head.body, localPosition=[length - head.x, 0.0, 0.0], **_inside(kind))
+    return int(boom.system.AddSensor(sensor))
+
+
+def _on_node(boom: Boom, station: Station, kind: Any) -> int:
+    return int(boom.system.AddSensor(items.SensorNode(nodeNumber=station.node, **_inside(kind))))
+
+
+def _on_drive(boom: Boom, drive: int, name: str) -> int:
+    kind = exudyn.OutputVariableType.Force if name == "distance" else exudyn.OutputVariableType.ForceLocal
+    return int(boom.system.AddSensor(items.SensorObject(objectNumber=drive, **_inside(kind))))
+
+
+def _inside(kind: Any) -> dict[str, Any]:
+    """Keep values in memory, write no file."""
+    return {"outputVariableType": kind, "storeInternal": True, "writeToFile": False}

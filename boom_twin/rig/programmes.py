@@ -1,0 +1,100 @@
+"""Drive programmes: the hand-made one of the bundled session, and seeded random ones for any scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import UsageError
+from ..records import Array
+from ..scene.kinematics import stroke_curve, strokes_of_posture
+from ..scene.parts import Scene
+from .assembly import section_frames
+from .motion import Move, Programme
+
+BUNDLED_DURATION = 60.0
+"""Seconds of the bundled session."""
+
+BUNDLED_MOVES = (
+    Move(0, 3.0, 1.5, 0.665),
+    Move(2, 8.5, 3.0, 0.200),
+    Move(3, 8.5, 3.0, 0.160),
+    Move(0, 15.5, 5.0, 0.580),
+    Move(1, 15.5, 4.0, 0.150),
+    Move(2, 16.0, 4.5, 0.225),
+    Move(3, 26.0, 1.5, 0.185),
+    Move(1, 30.5, 2.5, 0.170),
+    Move(0, 38.0, 6.0, 0.500),
+    Move(2, 38.0, 5.0, 0.170),
+    Move(3, 38.5, 5.5, 0.120),
+    Move(0, 48.0, 2.5, 0.530),
+    Move(1, 48.5, 2.0, 0.160),
+    Move(0, 53.0, 3.0, 0.590),
+    Move(2, 53.0, 3.0, 0.200),
+)
+"""Cylinder (0-based), start (s), duration (s), target (m): for the default scene from its posture arch."""
+
+TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
+MARGIN = 0.08  # of the range of a stroke, kept free at both ends
+HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
+FIRST_HOLD = 3.0  # s
+
+
+def bundled(scene: Scene) -> Programme:
+    """The programme of the bundled session: 60 s from posture arch of the default scene, ending in a hold."""
+    return Programme(tuple(strokes_of_posture(scene, "arch").tolist()), BUNDLED_MOVES)
+
+
+def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> Programme:
+    """Moves of one to three cylinders at once with holds between, in range and slower than `TIP_SPEED` at the tip.
+
+    Parameters
+    ----------
+    posture : str
+        Where it starts.
+    duration : float
+        Seconds; no move ends later than a hold before it.
+    """
+    rng = np.random.default_rng(seed)
+    first = strokes_of_posture(scene, posture)
+    now, time, moves = first.copy(), FIRST_HOLD, list[Move]()
+    while True:
+        span = rng.uniform(*DURATION)
+        if time + span + HOLD[0] > duration:
+            return Programme(tuple(first.tolist()), tuple(moves))
+        count = int(rng.integers(1, 1 + min(3, len(now))))
+        aim = _reachable(scene, now, rng.choice(len(now), count, replace=False).tolist(), span, rng)
+        moves += [Move(int(i), time, span, float(aim[i])) for i in np.flatnonzero(aim != now)]
+        now, time = aim, time + span + rng.uniform(*HOLD)
+
+
+def stroke_range(scene: Scene, cylinder: int) -> tuple[float, float]:
+    """Least and greatest stroke (m) within both ``max_stroke`` and ``range_deg``."""
+    joint = scene.joints[cylinder]
+    angles = np.radians(np.linspace(joint.range_deg[0], joint.range_deg[1], 91))
+    curve = stroke_curve(scene, cylinder, angles)
+    low, high = max(0.0, float(np.nanmin(curve))), min(joint.cylinder.max_stroke, float(np.nanmax(curve)))
+    if low >= high:
+        raise UsageError(f"cylinder_{cylinder + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
+    return low, high
+
+
+def tip_speed(scene: Scene, programme: Programme, times: Array) -> Array:
+    """Speed of the tip (m/s) between successive `times` (m,), shape (m - 1,), of the undeformed boom."""
+    end = (scene.sections[-1].length, 0.0)
+    path = np.array([section_frames(scene, strokes)[-1].point(end) for strokes in programme(times)[0]])
+    return np.asarray(np.hypot(*np.diff(path, axis=0).T) / np.diff(times))
+
+
+def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng: np.random.Generator) -> Array:
+    """Random targets of some cylinders, drawn nearer until the tip is slow enough."""
+    aim = now.copy()
+    for i in cylinders:
+        low, high = stroke_range(scene, i)
+        free = MARGIN * (high - low)
+        aim[i] = rng.uniform(low + free, high - free)
+    while True:
+        trial = Programme(tuple(now.tolist()), tuple(Move(i, 0.0, span, float(aim[i])) for i in cylinders))
+        fastest = float(tip_speed(scene, trial, np.linspace(0.0, span, 21)).max())
+        if fastest <= TIP_SPEED:
+            return aim
+        aim = now + 0.95 * min(1.0, TIP_SPEED / fastest) * (aim - now)

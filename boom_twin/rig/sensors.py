@@ -1,0 +1,76 @@
+"""What the rig's transducers make of the truth.
+
+A surrogate: no sensor was measured for it. The instant of sampling is the stamp itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records import Array
+from ..scene.parts import Point
+
+NANO = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Sampling and noise: Hz, s, m, rad, m/s^2; a resolution of zero means no rounding.
+
+    Standard deviations are those before rounding.
+    """
+
+    rate: float = 200.0
+    jitter: float = 2e-4
+    stroke_sigma: float = 2e-5
+    stroke_resolution: float = 5e-6
+    angle_sigma: float = math.radians(0.01)
+    angle_resolution: float = math.radians(0.005)
+    imu_sigma: float = 0.05
+
+
+def noise_free() -> Sensors:
+    """The same sampling instants, the true values."""
+    return Sensors(stroke_sigma=0.0, stroke_resolution=0.0, angle_sigma=0.0, angle_resolution=0.0, imu_sigma=0.0)
+
+
+def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Stamps (ns, int64) within `duration` (s) after `start` (ns), uniformly jittered about the grid.
+
+    The grid begins half a period after the start, so that no jitter reaches beyond either end.
+    """
+    count = round(duration * sensors.rate)
+    instants = (np.arange(count) + 0.5) / sensors.rate + rng.uniform(-sensors.jitter, sensors.jitter, count)
+    return start + np.rint(instants * NANO).astype(np.int64)
+
+
+def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator) -> Array:
+    """Values with normal noise of `sigma`, rounded to `resolution`; all in one unit, any shape."""
+    noisy = true + sigma * rng.standard_normal(true.shape)
+    return noisy if resolution == 0.0 else np.asarray(np.rint(noisy / resolution) * resolution)
+
+
+def specific_force(acceleration: Array, angle: Array, gravity: Point) -> Array:
+    """What an ideal accelerometer on the tip reads: acceleration minus gravity in the tip's axes.
+
+    Parameters
+    ----------
+    acceleration : ndarray, shape (m, 2)
+        Of the point, without gravity, in the base's axes (m/s^2).
+    angle : ndarray, shape (m,)
+        Of the last head to the base's x axis (rad).
+    gravity : tuple of float
+        In the base's axes (m/s^2).
+
+    Returns
+    -------
+    ndarray, shape (m, 2)
+        Along the last head outward, and 90 degrees anticlockwise from it (m/s^2).
+    """
+    fx, fy = acceleration[:, 0] - gravity[0], acceleration[:, 1] - gravity[1]
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * fx + s * fy, -s * fx + c * fy])

@@ -1,0 +1,122 @@
+"""A recorded session of the virtual rig: Exudyn's motion seen through the sensor model.
+
+Synthetic by construction: the scene's parameters are surrogates, and no hardware took part.
+"""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ..records import Array
+from ..scene.parts import Scene
+from .assembly import gravity_in_base
+from .motion import Programme
+from .sensors import NANO, Sensors, read, sampling_stamps, specific_force
+from .solve import simulate
+
+EPOCH = 1_700_000_000 * NANO
+"""Stamp (ns) of the start of every session."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """Samples of all sensors on common stamps, with the truth at the same instants.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (m,)
+        Nanoseconds.
+    strokes, joints : ndarray, shape (m, n)
+        As the transducers read them; m, rad.
+    imu : ndarray, shape (m, 2)
+        Specific force at the tip along its x and z; m/s^2.
+    truth : dict of ndarray
+        ``t`` (m,) s after the start; ``strokes`` (m, n) m; ``joints`` (m, n) rad; ``forces`` (m, n) N; ``tip``,
+        ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad.
+    """
+
+    stamps: NDArray[np.int64]
+    strokes: Array
+    joints: Array
+    imu: Array
+    truth: dict[str, Array]
+
+    def save_truth(self, path: Path) -> None:
+        """Write the truth as a gzipped CSV; equal truths give equal bytes."""
+        text = [",".join(name for name, _, _ in self._columns())]
+        columns = [
+            [f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0] for _, digits, values in self._columns()
+        ]
+        text += [",".join(row) for row in zip(*columns, strict=True)]
+        with path.open("wb") as file, gzip.GzipFile("", "wb", 9, file, mtime=0) as packed:
+            packed.write(("\n".join(text) + "\n").encode())
+
+    def _columns(self) -> list[tuple[str, int, Array]]:
+        """Name with unit, decimals and values of every column of the truth."""
+        truth, number = self.truth, range(self.strokes.shape[1])
+        return [
+            ("t_s", 9, truth["t"]),
+            ("tip_x_m", 6, truth["tip"][:, 0]),
+            ("tip_y_m", 6, truth["tip"][:, 1]),
+            ("tip_ax_m_s2", 4, truth["tip_acc"][:, 0]),
+            ("tip_ay_m_s2", 4, truth["tip_acc"][:, 1]),
+            ("tip_angle_rad", 7, truth["tip_angle"]),
+            *((f"stroke_{i + 1}_m", 7, truth["strokes"][:, i]) for i in number),
+            *((f"joint_{i + 1}_rad", 7, truth["joints"][:, i]) for i in number),
+            *((f"cylinder_force_{i + 1}_N", 1, truth["forces"][:, i]) for i in number),
+        ]
+
+
+def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
+    """The columns of a simulation stacked into the arrays of a session's truth, without its strokes."""
+    number = range(1, 1 + sum(name.startswith("stroke_") for name in rows))
+    return {
+        "tip": np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]),
+        "tip_acc": np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]]),
+        "tip_angle": rows["tip_angle_rad"],
+        "joints": np.column_stack([rows[f"joint_{i}_rad"] for i in number]),
+        "forces": np.column_stack([rows[f"cylinder_force_{i}_N"] for i in number]),
+    }
+
+
+def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors: Sensors, seed: int) -> Session:
+    """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
+
+    Parameters
+    ----------
+    rows : dict of ndarray
+        What `simulate` gave for this programme.
+    """
+    clock, stroke_noise, angle_noise, imu_noise = np.random.default_rng(seed).spawn(4)
+    stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
+    times = (stamps - EPOCH) / NANO
+    truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
+    truth |= {"t": times, "strokes": programme(times)[0]}
+    force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
+    return Session(
+        stamps,
+        read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
+        read(truth["joints"], sensors.angle_sigma, sensors.angle_resolution, angle_noise),
+        read(force, sensors.imu_sigma, 0.0, imu_noise),
+        truth,
+    )
+
+
+def record(
+    scene: Scene,
+    programme: Programme,
+    duration: float,
+    sensors: Sensors | None = None,
+    seed: int = 0,
+    step: float = 5e-4,
+    elements: int = 16,
+) -> Session:
+    """Simulate a programme for `duration` (s) and sample it."""
+    rows = simulate(scene, programme, duration, step, 2 * step, elements)
+    return observe(scene, programme, rows, sensors or Sensors(), seed)

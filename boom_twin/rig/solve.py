@@ -1,0 +1,157 @@
+"""Equilibrium and motion of the Exudyn boom."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import SolverError, UsageError
+from ..records import Array
+from ..scene.parts import Scene
+from .assembly import section_frames
+from .equilibrium import find_equilibrium
+from .exudyn_boom import build
+from .peer import exudyn
+from .probes import attach, read
+from .system import Boom
+
+Drive = Callable[[Array], tuple[Array, Array]]
+"""Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s."""
+
+SPECTRAL_RADIUS = 0.8
+TOLERANCE = 1e-6  # relative, of a step; Exudyn's rounding allows no less
+STEP_FORCE = 1e-6  # N, absolute, of a step
+
+
+def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
+    """Equilibrium under gravity at absolute `strokes` (m), shape (n,).
+
+    Returns
+    -------
+    dict
+        ``stroke_m``, ``tip_rigid_m``, ``tip_m``, ``joint_rad``, ``cylinder_force_N``: lists, SI, the base's axes. There
+        are no frequencies, for Exudyn's eigenvalues lack the geometric stiffness.
+    """
+    strokes = np.asarray(strokes, float)
+    boom = build(scene, strokes, elements)
+    probes = attach(boom)
+    settle(boom, strokes)
+    found = {key: values[-1] for key, values in read(boom, probes, at_rest=True).items()}
+    rigid = section_frames(scene, strokes)[-1].point((scene.sections[-1].length, 0.0))
+    return {
+        "stroke_m": strokes.tolist(),
+        "tip_rigid_m": rigid.tolist(),
+        "tip_m": found["tip"].tolist(),
+        "joint_rad": found["joints"].tolist(),
+        "cylinder_force_N": found["forces"].tolist(),
+    }
+
+
+def simulate(
+    scene: Scene, drive: Drive, t_end: float, step: float = 5e-4, output_step: float = 1e-3, elements: int = 16
+) -> dict[str, Array]:
+    """Motion from rest in the equilibrium of the drive's first strokes.
+
+    Parameters
+    ----------
+    drive : callable
+        Times (m,) -> strokes and rates (m, n); the rates are zero at t = 0.
+    t_end, step, output_step : float
+        Seconds; both `t_end` and `output_step` are multiples of `step`.
+    elements : int
+        Finite elements per flexible section.
+
+    Returns
+    -------
+    dict
+        The columns of a simulation (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_y_m``,
+        ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
+        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``; each of shape (rows,).
+    """
+    every = _ratio("output_step", output_step, step)
+    count = _ratio("t_end", t_end, step)
+    times: Array = step * np.arange(count + 1, dtype=np.float64)
+    strokes, rates = drive(times)
+    boom = build(scene, strokes[0], elements)
+    probes = attach(boom)
+    settle(boom, strokes[0])
+    rest = read(boom, probes, at_rest=True)["forces"][-1]
+    _feed(boom, strokes, rates, step)
+    _run(boom, count, step, output_step)
+    found = read(boom, probes, at_rest=False)
+    found["forces"][0] = rest  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
+    return _columns(found, strokes[::every], times[::every])
+
+
+def settle(boom: Boom, strokes: Array) -> None:
+    """Assemble the boom and bring it to its equilibrium; it is the start of what follows."""
+    boom.system.Assemble()
+    find_equilibrium(boom.system, f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m")
+
+
+def _run(boom: Boom, count: int, step: float, output_step: float) -> None:
+    settings = exudyn.SimulationSettings()
+    settings.solution.file.write = False
+    settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
+    settings.solution.sensors.writePeriod = output_step
+    scheme = settings.timeIntegration
+    scheme.numberOfSteps, scheme.endTime = count, count * step
+    scheme.adaptiveStep = scheme.automaticStepSize = False
+    scheme.verboseMode = 0
+    scheme.newton.relativeTolerance, scheme.newton.absoluteTolerance = TOLERANCE, STEP_FORCE
+    scheme.newton.useModifiedNewton = True
+    scheme.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
+    scheme.generalizedAlpha.computeInitialAccelerations = False  # at rest they are zero
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            boom.system.SolveDynamic(settings)
+    except exudyn.SolverError as failure:
+        raise SolverError(
+            f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
+        ) from failure
+
+
+def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> None:
+    """Before every step, hand the drives their lengths and rates at its end."""
+    closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
+    lengths, speeds = (strokes + closed).tolist(), rates.tolist()
+
+    def before_step(system: Any, time: float) -> bool:
+        row = round(time / step)
+        for i, (drive, name) in enumerate(boom.drives):
+            system.SetObjectParameter(drive, name, lengths[row][i])
+            if name == "referenceLength":
+                system.SetObjectParameter(drive, "velocityOffset", speeds[row][i])
+        return True
+
+    boom.system.SetPreStepUserFunction(before_step)
+
+
+def _ratio(name: str, whole: float, step: float) -> int:
+    count = round(whole / step)
+    if count < 1 or abs(count * step - whole) > 1e-6 * step:
+        raise UsageError(f"{name} = {whole:g} s: not a multiple of step = {step:g} s. Choose one that is.")
+    return count
+
+
+def _columns(found: dict[str, Array], strokes: Array, times: Array) -> dict[str, Array]:
+    if len(found["t"]) != len(times) or np.abs(found["t"] - times).max() > 1e-6:
+        raise SolverError(f"Exudyn recorded {len(found['t'])} of {len(times)} rows. Choose another output_step.")
+    number = range(1, strokes.shape[1] + 1)
+    return {
+        "t_s": times,
+        **{f"stroke_{i}_m": strokes[:, i - 1] for i in number},
+        **{f"joint_{i}_rad": found["joints"][:, i - 1] for i in number},
+        "tip_x_m": found["tip"][:, 0],
+        "tip_y_m": found["tip"][:, 1],
+        "tip_ax_m_s2": found["tip_acc"][:, 0],
+        "tip_ay_m_s2": found["tip_acc"][:, 1],
+        **{f"cylinder_force_{i}_N": found["forces"][:, i - 1] for i in number},
+        "tip_angle_rad": found["tip_angle"],
+        "tip_angular_velocity_rad_s": found["tip_rate"],
+        "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
+    }
