@@ -29,10 +29,12 @@ class BuiltSection:
 
     @property
     def root(self) -> Station:
+        """The rigid frame of the pivot."""
         return self.stations[0]
 
     @property
     def head(self) -> Station:
+        """The rigid frame of the next pivot; of a rigid section, its only one."""
         return self.stations[-1]
 
     def at(self, x: float) -> Station:

@@ -1,0 +1,44 @@
+"""The virtual rig against the reference numbers of the default scene."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.rig import Move, Programme, simulate, statics
+from boom_twin.scene import load_scene
+
+REFERENCE = Path(__file__).parents[1] / "data" / "reference"
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch"])
+def test_statics(posture):
+    expected = json.loads((REFERENCE / "statics.json").read_text())[posture]
+    found = statics(load_scene(), expected["stroke_m"])
+    assert found["tip_rigid_m"] == pytest.approx(expected["tip_rigid_m"], abs=1e-7)
+    assert found["tip_m"] == pytest.approx(expected["tip_m"], abs=1e-4)
+    assert found["joint_rad"] == pytest.approx(expected["joint_rad"], abs=1e-5)
+    assert found["cylinder_force_N"] == pytest.approx(expected["cylinder_force_N"], rel=1e-3)
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-4])
+def test_arch_move(step):
+    expected = np.genfromtxt(REFERENCE / "arch_move.csv", delimiter=",", names=True)
+    first = tuple(float(expected[f"stroke_{i}_m"][0]) for i in range(1, 5))
+    move = Programme(first, (Move(0, 0.0, 1.5, first[0] + 0.05), Move(2, 0.0, 1.5, first[2] + 0.03)))
+    found = simulate(load_scene(), move, 4.0, step=step)
+
+    def rms(*names):
+        return np.sqrt(np.mean(np.sum([(found[name] - expected[name]) ** 2 for name in names], axis=0)))
+
+    acceleration = np.sqrt(np.mean(expected["tip_ax_m_s2"] ** 2 + expected["tip_ay_m_s2"] ** 2))
+    assert rms("tip_x_m", "tip_y_m") < 1e-5
+    assert rms("tip_ax_m_s2", "tip_ay_m_s2") < 1e-3 * acceleration
+    for i in range(1, 5):
+        assert rms(f"joint_{i}_rad") < 1e-6
+        assert rms(f"cylinder_force_{i}_N") < 5.0

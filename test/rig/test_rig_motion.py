@@ -1,0 +1,71 @@
+"""Drive programmes: smooth, in range, slow enough."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.errors import UsageError
+from boom_twin.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
+from boom_twin.rig.programmes import BUNDLED_MOVES, stroke_range, tip_speed
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import joint_angles_of_strokes
+
+SCENE = load_scene()
+
+
+def programmes():
+    return [bundled(SCENE), *(random_programme(SCENE, "arch", 60.0, seed) for seed in range(3))]
+
+
+def test_move_starts_and_ends_where_told():
+    programme = Programme((0.1, 0.2), (Move(1, 4.0, 1.0, 0.3), Move(1, 1.0, 2.0, 0.5)))
+    strokes, rates = programme(np.array([0.0, 1.0, 2.0, 3.0, 4.0, 4.5, 9.0]))
+    assert strokes[:, 0] == pytest.approx(0.1)
+    assert strokes[:, 1] == pytest.approx([0.2, 0.2, 0.35, 0.5, 0.5, 0.4, 0.3])
+    assert rates[[0, 1, 3, 4, 6]] == pytest.approx(0.0)
+    assert rates[2, 1] == pytest.approx(1.875 * 0.3 / 2.0)
+
+
+def test_strokes_are_twice_continuously_differentiable():
+    step = 1e-3
+    times = np.arange(0.0, 10.0, step)
+    strokes, rates = Programme((0.0,), (Move(0, 1.0, 2.0, 0.2), Move(0, 3.0, 1.5, 0.1)))(times)
+    assert np.gradient(strokes[:, 0], step)[1:-1] == pytest.approx(rates[1:-1, 0], abs=1e-6)
+    acceleration = np.diff(rates[:, 0]) / step
+    steepest = 60.0 * 0.2 / 2.0**3 + 60.0 * 0.1 / 1.5**3  # third derivative of the ease is at most 60
+    assert np.abs(np.diff(acceleration)).max() < steepest * step
+
+
+def test_overlapping_moves_are_refused():
+    with pytest.raises(UsageError, match="moves of cylinder_1: the one at 2 s starts before"):
+        Programme((0.0,), (Move(0, 1.0, 2.0, 0.2), Move(0, 2.0, 1.0, 0.1)))
+
+
+@pytest.mark.parametrize("programme", programmes())
+def test_programmes_stay_in_range(programme):
+    strokes = programme(np.linspace(0.0, 60.0, 121))[0]
+    for cylinder in range(4):
+        low, high = stroke_range(SCENE, cylinder)
+        assert low < strokes[:, cylinder].min() and strokes[:, cylinder].max() < high
+    assert np.isfinite([joint_angles_of_strokes(SCENE, row) for row in strokes[::10]]).all()  # raises if out of reach
+
+
+@pytest.mark.parametrize("programme", programmes())
+def test_programmes_are_slow_enough(programme):
+    fastest = tip_speed(SCENE, programme, np.linspace(0.0, 60.0, 601)).max()
+    assert 0.3 < fastest < 1.3
+
+
+def test_bundled_programme_begins_and_ends_in_a_hold():
+    assert min(move.start for move in BUNDLED_MOVES) == 3.0
+    assert BUNDLED_DURATION - max(move.end for move in BUNDLED_MOVES) >= 3.0
+    assert {move.cylinder for move in BUNDLED_MOVES} == {0, 1, 2, 3}
+    assert all(1.5 <= move.duration <= 6.0 for move in BUNDLED_MOVES)
+
+
+def test_random_programme_depends_on_its_seed():
+    assert random_programme(SCENE, "low", 30.0, 1) == random_programme(SCENE, "low", 30.0, 1)
+    assert random_programme(SCENE, "low", 30.0, 1) != random_programme(SCENE, "low", 30.0, 2)

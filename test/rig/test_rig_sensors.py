@@ -1,0 +1,55 @@
+"""The sensor model's statistics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.rig.sensors import Sensors, noise_free, read, sampling_stamps, specific_force
+
+START = 1_700_000_000_000_000_000
+
+
+def test_stamps_lie_within_the_jitter_of_the_grid():
+    stamps = sampling_stamps(Sensors(), 20.0, START, np.random.default_rng(3))
+    off = (stamps - START) * 1e-9 - (np.arange(4000) + 0.5) / 200.0
+    assert stamps.dtype == np.int64
+    assert np.abs(off).max() <= 2e-4 + 1e-9
+    assert off.std() == pytest.approx(2e-4 / math.sqrt(3), rel=0.05)
+    assert abs(off.mean()) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("sigma", "resolution"),
+    [(2e-5, 5e-6), (math.radians(0.01), math.radians(0.005))],
+)
+def test_noise_and_rounding(sigma, resolution):
+    true = np.full((20_000, 2), 0.123456)
+    values = read(true, sigma, resolution, np.random.default_rng(5))
+    steps = values / resolution
+    assert np.abs(steps - np.rint(steps)).max() < 1e-6
+    expected = math.sqrt(sigma**2 + resolution**2 / 12)
+    assert (values - true).std(axis=0) == pytest.approx(expected, rel=0.03)
+    assert np.abs((values - true).mean(axis=0)).max() < 4 * expected / math.sqrt(20_000)
+
+
+def test_noise_can_be_switched_off():
+    true, sensors = np.linspace(0.0, 1.0, 7), noise_free()
+    rng = np.random.default_rng(0)
+    assert read(true, sensors.stroke_sigma, sensors.stroke_resolution, rng).tolist() == true.tolist()
+    assert sensors.jitter == Sensors().jitter
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.0])
+def test_resting_imu_reads_gravity_upwards(angle):
+    force = specific_force(np.zeros((1, 2)), np.array([angle]), (0.0, -9.81))[0]
+    assert force == pytest.approx([9.81 * math.sin(angle), 9.81 * math.cos(angle)])
+
+
+def test_imu_reads_outward_acceleration_along_x():
+    outward = np.array([[math.cos(0.4), math.sin(0.4)]])
+    assert specific_force(outward, np.array([0.4]), (0.0, 0.0))[0] == pytest.approx([1.0, 0.0], abs=1e-12)

@@ -1,0 +1,57 @@
+"""Sessions: common stamps, truth at the stamps, repeatable files."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.rig import Move, Programme, noise_free, observe, simulate
+from boom_twin.rig.sensors import Sensors
+from boom_twin.rig.session import EPOCH
+from boom_twin.scene.parts import Scene
+
+MOVE = Programme((0.5,), (Move(0, 0.2, 0.6, 0.56),))
+
+
+@pytest.fixture
+def motion(one_rigid):
+    scene = Scene.model_validate(one_rigid)
+    return scene, simulate(scene, MOVE, 1.0, step=1e-3)
+
+
+def test_noise_free_session_is_the_truth(motion):
+    scene, rows = motion
+    session = observe(scene, MOVE, rows, noise_free(), seed=1)
+    assert session.joints.shape == (200, 1)
+    assert np.array_equal(session.joints, session.truth["joints"])
+    assert session.strokes == pytest.approx(MOVE((session.stamps - EPOCH) * 1e-9)[0], abs=1e-12)
+    angle = session.truth["joints"][:, 0]
+    assert session.truth["tip"] == pytest.approx(3.0 * np.column_stack([np.cos(angle), np.sin(angle)]), abs=1e-8)
+    resting = session.imu[session.truth["t"] < 0.2]
+    assert np.hypot(*resting.T) == pytest.approx(9.81, abs=1e-3)
+
+
+def test_stamps_do_not_depend_on_noise_but_on_the_seed(motion):
+    scene, rows = motion
+    noisy, clean = observe(scene, MOVE, rows, Sensors(), 1), observe(scene, MOVE, rows, noise_free(), 1)
+    assert np.array_equal(noisy.stamps, clean.stamps)
+    assert not np.array_equal(noisy.joints, clean.joints)
+    assert not np.array_equal(observe(scene, MOVE, rows, Sensors(), 2).stamps, clean.stamps)
+
+
+def test_truth_file_repeats_and_reads_back(motion, tmp_path):
+    scene, rows = motion
+    session = observe(scene, MOVE, rows, Sensors(), seed=1)
+    session.save_truth(tmp_path / "a.csv.gz")
+    session.save_truth(tmp_path / "b.csv.gz")
+    assert (tmp_path / "a.csv.gz").read_bytes() == (tmp_path / "b.csv.gz").read_bytes()
+    with gzip.open(tmp_path / "a.csv.gz", "rt") as file:
+        table = np.genfromtxt(file, delimiter=",", names=True)
+    assert EPOCH + np.rint(table["t_s"] * 1e9).astype(np.int64) == pytest.approx(session.stamps, abs=0)
+    assert table["tip_y_m"] == pytest.approx(session.truth["tip"][:, 1], abs=6e-7)
+    assert table["joint_1_rad"] == pytest.approx(session.truth["joints"][:, 0], abs=6e-8)
+    assert table["cylinder_force_1_N"] == pytest.approx(session.truth["forces"][:, 0], abs=0.06)

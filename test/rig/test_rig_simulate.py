@@ -1,0 +1,114 @@
+"""The rig in motion against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.errors import UsageError
+from boom_twin.rig import Move, Programme, simulate
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.scene.parts import Scene
+
+
+def slider_crank_length(document, angle):
+    pin, rod = document["base"]["cylinder_pin"], document["sections"][0]["rod_pin"]
+    x = rod[0] * np.cos(angle) - rod[1] * np.sin(angle) - pin[0]
+    y = rod[0] * np.sin(angle) + rod[1] * np.cos(angle) - pin[1]
+    return np.hypot(x, y)
+
+
+def mean_frequency(times, signal):
+    """Of the rising zero crossings of a signal about its mean (Hz)."""
+    signal = signal - signal.mean()
+    rising = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
+    crossings = times[rising] - signal[rising] * (times[1] - times[0]) / (signal[rising + 1] - signal[rising])
+    return (len(crossings) - 1) / (crossings[-1] - crossings[0])
+
+
+def test_drive_at_rest_stays_at_rest(document):
+    scene = Scene.model_validate(document)
+    hold = Programme(tuple(strokes_of_posture(scene, "arch")), ())
+    rows = simulate(scene, hold, 0.5, step=1e-3, elements=4)
+    assert np.ptp(rows["tip_y_m"]) < 1e-8
+    assert np.hypot(rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]).max() < 1e-4
+    assert np.ptp(rows["cylinder_force_1_N"]) < 0.1
+
+
+def test_force_is_spring_and_damper_against_the_drive(one_rigid):
+    cylinder = one_rigid["joints"][0]["cylinder"]
+    cylinder["d"] = 6.0e4
+    move = Programme((0.5,), (Move(0, 0.05, 0.3, 0.55),))
+    rows = simulate(Scene.model_validate(one_rigid), move, 0.4, step=2.5e-4, output_step=2.5e-4)
+    length = slider_crank_length(one_rigid, rows["joint_1_rad"])
+    strokes, rates = move(rows["t_s"])
+    rate = np.gradient(length, rows["t_s"], edge_order=2)
+    spring = cylinder["k"] * (length - cylinder["closed_length"] - strokes[:, 0])
+    damper = cylinder["d"] * (rate - rates[:, 0])
+    assert np.abs(damper).max() > 300.0
+    assert rows["cylinder_force_1_N"] == pytest.approx(spring + damper, abs=3.0)
+
+
+def test_work_of_the_drive_becomes_energy(one_rigid):
+    move = Programme((0.5,), (Move(0, 0.05, 0.4, 0.56),))
+    rows = simulate(Scene.model_validate(one_rigid), move, 0.8, step=2.5e-4, output_step=2.5e-4)
+    root, rate = one_rigid["sections"][0]["root"], rows["tip_angular_velocity_rad_s"]
+    angle, force = rows["joint_1_rad"], rows["cylinder_force_1_N"]
+    inertia = root["inertia"] + root["mass"] * (root["com"][0] ** 2 + root["com"][1] ** 2)
+    height = root["com"][0] * np.sin(angle) + root["com"][1] * np.cos(angle)
+    energy = inertia * rate**2 / 2 + root["mass"] * 9.81 * height + force**2 / (2 * 2.0e6)
+    power = -force * move(rows["t_s"])[1][:, 0]
+    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * 2.5e-4)])
+    assert energy[-1] - energy[0] > 30.0
+    assert energy - energy[0] == pytest.approx(work, abs=0.05)
+
+
+def test_first_frequency_of_a_cantilever(cantilever):
+    scene = Scene.model_validate(cantilever)
+    first = float(strokes_of_posture(scene, "flat")[0])
+    nudge = Programme((first,), (Move(0, 0.0, 0.08, first + 1e-4),))
+    rows = simulate(scene, nudge, 1.6, step=1e-3, elements=12)
+    closed_form = (1.87510407 / 4.0) ** 2 * np.sqrt(2.06e11 * 1.0e-5 / 20.0) / (2 * np.pi)
+    free = slice(100, None)
+    assert mean_frequency(rows["t_s"][free], rows["tip_y_m"][free]) == pytest.approx(closed_form, rel=5e-3)
+
+
+def test_rigid_boom_on_incompressible_cylinders_follows_the_geometry(document):
+    for joint in document["joints"]:
+        for part in ("k", "d", "barrel", "rod"):
+            joint["cylinder"].pop(part)
+    scene = Scene.model_validate(document | {"modes": 0})
+    strokes = strokes_of_posture(scene, "arch")
+    move = Programme(tuple(strokes), (Move(0, 0.05, 0.4, 0.66), Move(2, 0.05, 0.4, 0.22), Move(3, 0.1, 0.4, 0.2)))
+    rows = simulate(scene, move, 0.5, step=1e-3)
+    for row in (0, 250, 500):
+        angles = joint_angles_of_strokes(scene, move(rows["t_s"][row : row + 1])[0][0])
+        assert [rows[f"joint_{i}_rad"][row] for i in range(1, 5)] == pytest.approx(angles, abs=1e-7)
+    for i in range(1, 5):  # at rest first, so the equilibrium's force is that of the motion
+        force = rows[f"cylinder_force_{i}_N"]
+        assert force[0] == pytest.approx(force[1:50].mean(), rel=1e-4)
+
+
+def test_massless_parts_can_move(document):
+    """No roots, heads, links, barrels, rods, rotary inertia or damping: the solver still finds every step."""
+    for section in document["sections"]:
+        for part in ("root", "head", "rho_I", "beta"):
+            section.pop(part)
+    for joint in document["joints"]:
+        joint.pop("mL", None), joint.pop("mR", None)
+        joint["cylinder"].pop("barrel"), joint["cylinder"].pop("rod")
+    scene = Scene.model_validate(document)
+    strokes = strokes_of_posture(scene, "arch")
+    rows = simulate(scene, Programme(tuple(strokes), (Move(0, 0.0, 0.5, 0.65),)), 0.5, step=1e-3, elements=4)
+    path = np.column_stack([rows["tip_x_m"], rows["tip_y_m"]])
+    second = np.diff(path, 2, axis=0) / 1e-6
+    found = np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]])[1:-1]
+    assert np.abs(found).max() > 0.5
+    assert np.abs(found - second).max() < 0.01
+
+
+def test_step_that_does_not_divide_is_refused(one_rigid):
+    with pytest.raises(UsageError, match=r"output_step = 0\.0015 s: not a multiple of step = 0\.001 s"):
+        simulate(Scene.model_validate(one_rigid), Programme((0.5,), ()), 0.3, step=1e-3, output_step=1.5e-3)

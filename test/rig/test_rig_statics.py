@@ -1,0 +1,97 @@
+"""The rig at rest against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.rig import statics
+from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_curve, strokes_of_posture
+from boom_twin.scene.parts import Scene
+
+G = 9.81
+
+
+def length_of_slider_crank(document, angle):
+    pin, rod = document["base"]["cylinder_pin"], document["sections"][0]["rod_pin"]
+    x = rod[0] * np.cos(angle) - rod[1] * np.sin(angle) - pin[0]
+    y = rod[0] * np.sin(angle) + rod[1] * np.cos(angle) - pin[1]
+    return np.hypot(x, y)
+
+
+@pytest.mark.parametrize("inclination", [0.0, 0.2])
+def test_moment_balance_of_one_rigid_section(one_rigid, inclination):
+    one_rigid["base"] = one_rigid["base"] | {"inclination": inclination}
+    found = statics(Scene.model_validate(one_rigid), np.array([0.5]))
+    angle, force = found["joint_rad"][0], found["cylinder_force_N"][0]
+    root = one_rigid["sections"][0]["root"]
+    arm = root["com"][0] * np.cos(angle + inclination) - root["com"][1] * np.sin(angle + inclination)
+    lever = (length_of_slider_crank(one_rigid, angle + 1e-6) - length_of_slider_crank(one_rigid, angle - 1e-6)) / 2e-6
+    assert force == pytest.approx(-root["mass"] * G * arm / lever, rel=1e-6)
+    cylinder = one_rigid["joints"][0]["cylinder"]
+    spring = length_of_slider_crank(one_rigid, angle) - cylinder["closed_length"] - 0.5
+    assert cylinder["k"] * spring == pytest.approx(force, rel=1e-6)
+    assert found["tip_m"] == pytest.approx([3 * np.cos(angle), 3 * np.sin(angle)], abs=1e-9)
+
+
+def test_cantilever_under_payload_and_own_weight(cantilever):
+    cantilever |= {"tip": {"payload": 5.0}, "line_fill": 10.0}
+    scene = Scene.model_validate(cantilever)
+    found = statics(scene, strokes_of_posture(scene, "flat"), elements=32)
+    bending = 2.06e11 * 1.0e-5
+    sag = 5.0 * G * 4.0**3 / (3 * bending) + (20.0 + 10.0) * G * 4.0**4 / (8 * bending)
+    assert found["joint_rad"][0] == pytest.approx(0.0, abs=1e-9)
+    assert -found["tip_m"][1] == pytest.approx(sag, rel=1e-3)
+
+
+def test_bracket_on_a_beam_turns_with_the_cross_section(cantilever):
+    """A rod pin in the middle of a beam, with the base's pivot as the other support: a beam on two supports."""
+    cantilever["sections"][0]["rod_pin"] = [2.0, 0.0]
+    cantilever["base"]["cylinder_pin"] = [2.0, -1.0]
+    scene = Scene.model_validate(cantilever)
+    found = statics(scene, strokes_of_posture(scene, "flat"), elements=32)
+    weight = 20.0 * G * 4.0
+    assert found["cylinder_force_N"][0] == pytest.approx(-weight, rel=1e-4)
+    # slope at an end support of a span with a moment M at the other: M a / 6EI, and q a^3 / 24EI of its own load
+    bending, moment = 2.06e11 * 1.0e-5, 20.0 * G * 2.0**2 / 2
+    slope = moment * 2.0 / (6 * bending) - 20.0 * G * 2.0**3 / (24 * bending)
+    assert found["joint_rad"][0] == pytest.approx(slope, rel=2e-2)
+
+
+@pytest.mark.parametrize("kind", [1, 2, 3])
+def test_six_bar_obeys_virtual_work(document, kind):
+    """Rigid sections, massless cylinder and links: force = torque of gravity / (d stroke / d angle)."""
+    joint = document["joints"][kind]
+    for part in ("k", "d", "barrel", "rod"):
+        joint["cylinder"].pop(part)
+        document["joints"][0]["cylinder"].pop(part)
+    joint.pop("mL"), joint.pop("mR")
+    turned = {"length": 3.0, "root": {"mass": 50.0, "com": [1.5, 0.1], "inertia": 20.0}}
+    document |= {"modes": 0, "sections": [document["sections"][kind - 1], turned], "postures": {}}
+    document["sections"][0]["rod_pin"] = [0.60, -0.12]
+    document["joints"] = [document["joints"][0], joint]
+    scene = Scene.model_validate(document)
+    strokes = np.array([0.3, stroke_curve(scene, 1, np.array([-0.7]))[0]])
+    found = statics(scene, strokes)
+    angles = joint_angles_of_strokes(scene, strokes)
+    assert found["joint_rad"] == pytest.approx(angles, abs=1e-8)
+    assert found["tip_m"] == pytest.approx(found["tip_rigid_m"], abs=1e-8)
+    total = angles.sum()
+    torque = -50.0 * G * (1.5 * np.cos(total) - 0.1 * np.sin(total))
+    lever = np.diff(stroke_curve(scene, 1, angles[1] + np.array([-1e-5, 1e-5])))[0] / 2e-5
+    assert found["cylinder_force_N"][1] == pytest.approx(torque / lever, rel=1e-5)
+
+
+def test_massless_links_are_the_limit_of_light_ones(document):
+    strokes = np.array([0.630236054, 0.164991266, 0.234932998, 0.18681445])
+
+    def force(mass):
+        for joint in document["joints"][1:]:
+            joint["mL"], joint["mR"] = mass, mass
+        return np.array(statics(Scene.model_validate(document), strokes, elements=4)["cylinder_force_N"])
+
+    none, light, heavier = force(None), force(1e-3), force(2e-3)
+    assert np.abs(heavier - none) == pytest.approx(2 * np.abs(light - none), rel=1e-2)
+    assert np.abs(light - none).max() < 5.0
