@@ -24,6 +24,7 @@ from .io.writer import FILE_NAME, SessionWriter
 from .records import Array, Prediction, Report, Residuals, Stream
 from .scene.parts import Scene
 from .settings import Settings
+from .truth import TipTruth, load_truth
 from .twin import Twin
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
@@ -60,6 +61,7 @@ class Replay:
     summary: dict[str, Any]
     recording: Recording
     session: Session
+    truth: TipTruth | None
 
 
 def replay(
@@ -106,9 +108,12 @@ def replay(
             f"{session.path}: no stroke sample could be used ({_told(twin)}). "
             f"It needs names cylinder_1..{twin.plan.joints}, values in m within the cylinders' travel, and stamps."
         )
+    truth = load_truth(session.path)
     summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME)
+    if truth is not None:
+        summary |= truth.errors(recording.predictions)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    return Replay(summary, recording, session)
+    return Replay(summary, recording, session, truth)
 
 
 def _wanted(session: Session) -> dict[str, Stream]:

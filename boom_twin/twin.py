@@ -38,7 +38,7 @@ MEMORY = 2_000_000_000  # ns of predictions kept for samples that come late
 PENDING = 4096  # most samples that wait for a stroke
 SHAPE_PERIOD = 50_000_000  # ns of one slot; one shape is given in each, 20 a second
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
-NOISE_INTERVAL = 250_000_000  # ns between evaluations of its growth
+NOISE_INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
 SMOOTH_INTERVAL = 0.1  # weight of a new sample interval in the running mean
 
 
@@ -95,15 +95,16 @@ class Twin:
 
     def update(self, sample: Sample) -> Report:
         """Take one sample; see `Report` for what comes back. Never raises on what a sample holds."""
-        if not np.isfinite(sample.values).any():
+        complete = math.isfinite(sample.values.sum())
+        if not complete and not np.isfinite(sample.values).any():
             return self._refuse(sample, "empty")
         if sample.stream is Stream.STROKES:
-            return self._take_strokes(sample)
-        return self._take_measured(sample)
+            return self._take_strokes(sample, complete)
+        return self._take_measured(sample, complete)
 
     # -- strokes ----------------------------------------------------------------------------------------------------
 
-    def _take_strokes(self, sample: Sample) -> Report:
+    def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         events: list[str] = []
         if self._newest is not None:
             span = (sample.stamp - self._newest) * NANO
@@ -114,7 +115,6 @@ class Twin:
                 self._clear()
             elif span > self.settings.gap:
                 events.append("gap")
-        complete = bool(np.isfinite(sample.values).all())
         if not complete:
             events.append("partial")
         if self._newest is None:
@@ -151,7 +151,7 @@ class Twin:
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
         self._newest = sample.stamp
         prediction = self._prediction(sample.stamp)
-        self._remember(prediction)
+        self._remember(prediction, self._row[3 * self.plan.joints + 9 : 4 * self.plan.joints + 9])
         self.counts.update(events)
         return Report(sample.stamp, True, prediction, self._settle_pending(), tuple(events))
 
@@ -180,12 +180,12 @@ class Twin:
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
-    def _take_measured(self, sample: Sample) -> Report:
+    def _take_measured(self, sample: Sample, complete: bool) -> Report:
         newest = self._newest_measured.get(sample.stream)
         if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
             return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
         self._newest_measured[sample.stream] = sample.stamp
-        events = () if np.isfinite(sample.values).all() else ("partial",)
+        events = () if complete else ("partial",)
         self.counts.update(events)
         if self._newest is None or sample.stamp > self._newest:
             if len(self._pending) == PENDING:
@@ -218,13 +218,12 @@ class Twin:
             return Residuals(sample.stream, sample.stamp, self._names, sample.values - joints, sigmas)
         return Residuals(sample.stream, sample.stamp, ("tip_imu_x", "tip_imu_z"), sample.values - force, force_sigmas)
 
-    def _remember(self, prediction: Prediction) -> None:
+    def _remember(self, prediction: Prediction, variances: Array) -> None:
         """Keep what residuals need: joint angles, specific force at the tip, and the deviations to expect."""
         c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
         ax, ay = prediction.tip_acceleration - self._gravity
         force = np.array([c * ax + s * ay, c * ay - s * ax])
         self._refresh_noise(prediction)
-        variances = self._row[3 * self.plan.joints + 9 : 4 * self.plan.joints + 9]
         sigmas = np.sqrt(self._quiet[0] + self._slopes2 * variances)
         self._past.append((prediction.stamp, prediction.joints, force, sigmas, self._quiet[1]))
         while self._past[0][0] < prediction.stamp - MEMORY:
@@ -250,16 +249,15 @@ class Twin:
     def _refresh_noise(self, prediction: Prediction) -> None:
         """Propagate stroke noise anew when the posture has changed, and let it grow with time."""
         assert self._epoch is not None
-        moved = self._noise is None or float(np.max(np.abs(prediction.strokes - self._noise_at))) > POSTURE_STEP
-        if moved:
-            self._propagate(prediction)
-        elif prediction.stamp < self._noise_stamp + NOISE_INTERVAL:
+        if self._noise is not None and prediction.stamp < self._noise_stamp + NOISE_INTERVAL:
             return
+        if self._noise is None or float(np.max(np.abs(prediction.strokes - self._noise_at))) > POSTURE_STEP:
+            self._propagate(prediction)
         assert self._noise is not None
         self._noise_stamp = prediction.stamp
-        joints, acceleration = self._noise.after((prediction.stamp - self._epoch) * NANO)
-        total = math.sqrt(self.settings.imu_sigma**2 + float(np.mean(acceleration)))
-        self._quiet = (self.settings.angle_variance + joints, np.array([total, total]))
+        time = (prediction.stamp - self._epoch) * NANO
+        joints, acceleration = self._noise.after(time, prediction.tip_angle)
+        self._quiet = (self.settings.angle_variance + joints, np.sqrt(self.settings.imu_sigma**2 + acceleration))
 
     def _propagate(self, prediction: Prediction) -> None:
         tuned = self.settings

@@ -35,20 +35,21 @@ class StrokeNoise:
     ----------
     joints : ndarray, shape (modes, n)
         rad^2, once the mode has been shaken for long.
-    acceleration : ndarray, shape (modes, 2)
-        Of the tip, m^2/s^4, likewise.
+    swing : ndarray, shape (modes, 2)
+        Deviation of the tip's acceleration, as a vector along the mode's motion there, m/s^2, likewise.
     decay : ndarray, shape (modes,)
         2 zeta omega, 1/s.
     """
 
     joints: Array
-    acceleration: Array
+    swing: Array
     decay: Array
 
-    def after(self, time: float) -> tuple[Array, Array]:
-        """Variances of joint angles (n,) and tip acceleration (2,) after `time` s from rest."""
+    def after(self, time: float, angle: float) -> tuple[Array, Array]:
+        """Variances of joint angles (n,), and of tip acceleration (2,) in axes turned by `angle`, `time` s from rest."""
         grown = 1.0 - np.exp(-self.decay * time)
-        return grown @ self.joints, grown @ self.acceleration
+        c, s = np.cos(angle), np.sin(angle)
+        return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2
 
 
 def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval: float, density: float) -> StrokeNoise:
@@ -56,7 +57,7 @@ def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval
     spectrum = variance * interval
     corner = (density / spectrum) ** (1.0 / 6.0)
     modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=BAND * corner)
-    joints, acceleration, decay = [], [], []
+    joints, swing, decay = [], [], []
     tip = plan.tables.tip
     for mode in modes:
         omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
@@ -64,10 +65,10 @@ def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval
         gain = 1.0 / (1.0 + (omega / corner) ** 6)
         collected = load / omega**4 * spectrum * omega / (4.0 * max(zeta, 1e-6)) * gain**2
         joints.append(collected * joint_increments(plan, state, work, mode) ** 2)
-        acceleration.append(collected * omega**4 * mode.motion[tip : tip + 2] ** 2)
+        swing.append(np.sqrt(collected) * omega**2 * mode.motion[tip : tip + 2])
         decay.append(2.0 * zeta * omega)
     n = plan.joints
-    return StrokeNoise(np.array(joints).reshape(-1, n), np.array(acceleration).reshape(-1, 2), np.array(decay))
+    return StrokeNoise(np.array(joints).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay))
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

@@ -18,7 +18,13 @@ from ..errors import BoomTwinError
 # name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
 COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("check", "validate a scene and tell what its model consists of"),
+    "play": ("play", "publish the inputs of a recorded session over ROS 2"),
+    "record": ("record", "record the session topics from ROS 2"),
     "scene": ("scene", "print the default scene file"),
+    "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),
+    "simulate": ("simulate", "the boom's answer to a stroke history"),
+    "replay": ("replay", "a recorded session through the twin"),
+    "rig": ("rig", "make a synthetic session on the virtual rig (extra peers)"),
 }
 
 DESCRIPTION = "Digital twin of a concrete placing boom."

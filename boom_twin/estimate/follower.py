@@ -1,7 +1,7 @@
 """The boom follows smoothed strokes: an anchor behind, and a look ahead from it to now.
 
 Strokes estimated at the instant they are measured carry noise that the boom's lightly damped modes collect. The same strokes
-seen 60 ms later are three times quieter. So the boom that is remembered, the anchor, is stepped only as far as the smoother's
+seen 45 ms later are far quieter. So the boom that is remembered, the anchor, is stepped only as far as the smoother's
 window reaches back, with strokes that will not change much any more; for every new sample a copy of it runs through the
 window to now, in few long steps, and is the prediction. Nothing is delayed, and an error made in the window is forgotten with
 the copy.
@@ -24,7 +24,8 @@ from ..plan.compile import Plan
 from ..records import Array
 from .smoother import add_node, drive_between, measure, start_node
 
-TOLERANCE = 1e-5  # rad in the last pass of a step; what is left is about its square
+TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left is about its square
+LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
 REST_PASSES = np.int64(60)
@@ -129,7 +130,7 @@ def move_anchor(t, anchor, work, track, tuning):
     while count[0] > 2 and (track.times[0] - track.times[count[0] - 2] >= tuning.lag or count[0] == NODES):
         old, new = count[0] - 1, count[0] - 2
         span = track.times[new] - track.times[old]
-        status = glide(t, anchor, work, track, tuning, track.anchor, track.x[new], span, tuning.step)
+        status = glide(t, anchor, work, track, tuning, track.anchor, track.x[new], span, tuning.step, TOLERANCE)
         if status != OK:
             return status
         track.anchor[:] = track.x[new]
@@ -154,7 +155,7 @@ def settle_anchor(t, anchor, work, track):
 
 
 @kernel
-def glide(t, state, work, track, tuning, old, new, span, longest):
+def glide(t, state, work, track, tuning, old, new, span, longest, tolerance):
     """Follow the quintic between two nodes (n, 3), `span` s apart, in steps of at most `longest` s."""
     steps = max(1, math.ceil(span / longest - 1e-6))
     scheme = generalised_alpha(span / steps, tuning.rho)
@@ -162,7 +163,7 @@ def glide(t, state, work, track, tuning, old, new, span, longest):
         for i in range(track.drive.shape[0]):
             position, velocity = drive_between(old[i], new[i], span, (k + 1) / steps)
             track.drive[i], track.rate[i] = track.closed[i] + position, velocity
-        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, TOLERANCE, PASSES)
+        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, tolerance, PASSES)
         if status != OK:
             return status
     return OK
@@ -178,7 +179,7 @@ def look_ahead(t, live, work, track, tuning):
             new -= 1
         span = track.times[new] - track.times[old]
         start = track.anchor if old == track.count[0] - 1 else track.x[old]
-        status = glide(t, live, work, track, tuning, start, track.x[new], span, tuning.look_step)
+        status = glide(t, live, work, track, tuning, start, track.x[new], span, tuning.look_step, LOOK_TOLERANCE)
         if status != OK:
             return status
         old = new

@@ -24,6 +24,8 @@ Messages = list[tuple[Output, Any]]
 class Outlet:
     """Fills messages; the same reports in the same order give the same messages.
 
+    The messages are the outlet's own and filled anew at the next call: publish or write them before.
+
     Parameters
     ----------
     types : Types
@@ -32,6 +34,7 @@ class Outlet:
 
     def __init__(self, types: Types) -> None:
         self._types = types
+        self._made: dict[tuple[Output, int], Any] = {}
 
     def fill(self, report: Report) -> Messages:
         """The messages of one report, in the order of `Output`.
@@ -50,44 +53,47 @@ class Outlet:
                 (Output.TIP_ACCELERATION, self._acceleration(prediction)),
                 (Output.JOINT_STATES, self._joint_states(prediction)),
             ]
-        messages += [(Output.RESIDUALS, self._residuals(residuals)) for residuals in report.residuals]
+        for place, residuals in enumerate(report.residuals):
+            messages.append((Output.RESIDUALS, self._residuals(residuals, place)))
         if prediction is not None and prediction.shape is not None:
             messages.append((Output.SHAPE, self._shape(prediction.stamp, prediction.shape)))
         return messages
 
-    def _empty(self, key: Output, stamp: int) -> Any:
-        """A message for `key` with its header filled."""
-        msg = self._types.make(TYPES[key])
+    def _message(self, key: Output, stamp: int, place: int = 0) -> Any:
+        """The message number `place` of `key` in this report, with its header filled."""
+        msg = self._made.get((key, place))
+        if msg is None:
+            msg = self._made[key, place] = self._types.make(TYPES[key])
         fill_header(msg.header, stamp)
         return msg
 
     def _displacement(self, prediction: Prediction) -> Any:
-        msg = self._empty(Output.TIP_DISPLACEMENT, prediction.stamp)
+        msg = self._message(Output.TIP_DISPLACEMENT, prediction.stamp)
         _fill_xz(msg.vector, prediction.tip_displacement)
         return msg
 
     def _position(self, prediction: Prediction) -> Any:
-        msg = self._empty(Output.TIP_POSITION, prediction.stamp)
+        msg = self._message(Output.TIP_POSITION, prediction.stamp)
         _fill_xz(msg.point, prediction.tip_position)
         return msg
 
     def _acceleration(self, prediction: Prediction) -> Any:
-        msg = self._empty(Output.TIP_ACCELERATION, prediction.stamp)
+        msg = self._message(Output.TIP_ACCELERATION, prediction.stamp)
         _fill_xz(msg.accel.linear, prediction.tip_acceleration)
         msg.accel.angular.y = -float(prediction.tip_angular_acceleration)
         return msg
 
     def _joint_states(self, prediction: Prediction) -> Any:
         """Joints first, cylinders after them; a joint has no effort of its own."""
-        msg, count = self._empty(Output.JOINT_STATES, prediction.stamp), len(prediction.joints)
+        msg, count = self._message(Output.JOINT_STATES, prediction.stamp), len(prediction.joints)
         msg.name = list(_joint_state_names(count))
         msg.position = self._types.doubles(prediction.joints.tolist() + prediction.strokes.tolist())
         msg.effort = self._types.doubles([nan] * count + prediction.cylinder_forces.tolist())
         return msg
 
-    def _residuals(self, residuals: Residuals) -> Any:
+    def _residuals(self, residuals: Residuals, place: int) -> Any:
         """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
-        msg = self._empty(Output.RESIDUALS, residuals.stamp)
+        msg = self._message(Output.RESIDUALS, residuals.stamp, place)
         msg.name = list(residuals.names)
         msg.position = self._types.doubles(residuals.values)
         msg.velocity = self._types.doubles(residuals.normalised)

@@ -41,5 +41,5 @@ numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
 
 
 def kernel(function: Any) -> Any:
-    """Compile `function` (nopython, cached on disk, IEEE arithmetic, no exceptions for division)."""
-    return numba.njit(cache=True, error_model="numpy")(function)
+    """Compile `function` (nopython, cached on disk, without the interpreter's lock, no exceptions for division)."""
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)

@@ -1,0 +1,55 @@
+# make demo and make test need Python 3.11 or 3.12, make and PyPI; each sets up .venv by itself.
+PYTHON ?= $(shell command -v python3.12 >/dev/null 2>&1 && python3.12 -c '' >/dev/null 2>&1 && echo python3.12 || { command -v python3.11 >/dev/null 2>&1 && python3.11 -c '' >/dev/null 2>&1 && echo python3.11; } || echo python3)
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+export MPLBACKEND := Agg
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: help setup warm demo test lint test-extra session figures clean
+
+help:
+	@echo "make demo        play a recorded session through the live node, show what it predicted"
+	@echo "make test        linters and tests"
+	@echo "make test-extra  slow tests, and checks that need more than PyPI"
+	@echo "make session     make the bundled session anew on the virtual rig"
+	@echo "make figures     make the pictures of the documentation anew"
+
+setup: $(READY)
+
+$(READY): setup.py
+	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers]"
+	@touch $@
+
+# Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
+warm: $(READY)
+	@echo "compiling the kernels, up to a minute the first time .." >&2
+	@$(BIN)/python -c 'from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up()'
+
+demo: warm
+	$(BIN)/python -m boom_twin.ros.demo --out out/demo
+
+test: lint
+	$(BIN)/python -m pytest -m "not slow"
+
+lint: $(READY)
+	$(BIN)/ruff check boom_twin test setup.py
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test-extra: $(READY)
+	$(BIN)/python -m pytest -m slow
+	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
+
+session: $(READY)
+	rm -rf bags/arch_session
+	$(BIN)/boom_twin rig --out bags/arch_session
+
+figures: $(READY)
+	$(BIN)/python docs/figures.py
+
+clean:
+	rm -rf $(VENV) out build *.egg-info

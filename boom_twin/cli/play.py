@@ -1,0 +1,79 @@
+"""`boom_twin play`: publish the inputs of a recorded session over ROS 2."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+
+from tqdm import tqdm
+
+from ..errors import BoomTwinError
+from ..io.reader import scan
+from ..ros.require import require_rclpy
+
+BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session, and how it is played."""
+    parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory or .mcap file")
+    parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
+    parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
+    parser.add_argument("--duration", type=positive, metavar="S", help="seconds of the session to play (all)")
+    parser.add_argument("--clock", action="store_true", help="publish the log times on /clock too, at 40 Hz")
+    parser.add_argument(
+        "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
+    )
+
+
+def run(args: Namespace) -> int:
+    """Play, and tell on stderr what was sent."""
+    require_rclpy()
+    from ..ros.context import ros
+    from ..ros.player import Player
+
+    session = scan(args.bag)
+    with ros([]):
+        player = Player(session, args.clock)
+        lonely = player.wait(args.wait)
+        if lonely and args.wait > 0.0:
+            _complain(lonely, len(player.topics), args.wait)
+        total = (session.end - session.start) * 1e-9 - args.start
+        total = total if args.duration is None else min(args.duration, total)
+        with tqdm(total=round(total, 1), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
+            for elapsed in player.play(args.rate, args.start, args.duration):
+                bar.update(elapsed * 1e-9 - bar.n)
+        played = player.played
+        player.close()
+    sent = ", ".join(f"{name} {count}" for name, count in played.sent.items())
+    print(f"sent in {played.wall:.1f} s: {sent}; at worst {played.latest * 1e3:.1f} ms late", file=sys.stderr)
+    return 0
+
+
+def _complain(lonely: list[str], topics: int, wait: float) -> None:
+    """Refuse to play to nobody; warn of single topics that nobody listens to."""
+    if len(lonely) == topics:
+        raise BoomTwinError(
+            f"nobody listened within {wait:g} s. Start twin_node, check ROS_DOMAIN_ID, or play anyway with --wait 0."
+        )
+    print(f"warning: nobody listens to {', '.join(lonely)}", file=sys.stderr)
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    value = not_negative(text)
+    if value == 0.0:
+        raise ArgumentTypeError(f"{text}: must be > 0")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A finite number of at least 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"{text}: not a number") from None
+    if not 0.0 <= value < float("inf"):
+        raise ArgumentTypeError(f"{text}: must be >= 0 and finite")
+    return value

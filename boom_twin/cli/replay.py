@@ -1,0 +1,71 @@
+"""``boom_twin replay``: a recorded session through the twin."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from ..pictures import draw
+from ..replay import replay
+from ..settings import load_settings
+from .common import add_json, add_scene, open_scene, print_json
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
+    add_scene(parser, option=True)
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for summary.json, bag/ and pictures")
+    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Replay, draw, and say what came out."""
+    scene = open_scene(args.scene)
+    settings = load_settings(Path(args.params) if args.params else None)
+    print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
+    result = replay(args.bag, scene, args.out, settings, _progress)
+    pictures = [] if args.no_pictures else draw(result, scene, Path(args.out))
+    if args.json:
+        print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms")})
+        return 0
+    print("\n".join(as_text(result.summary)))
+    for path in [Path(args.out) / "summary.json", Path(args.out) / "bag", *pictures]:
+        print(path)
+    return 0
+
+
+def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
+    return iter(tqdm(messages, total=total, unit="msg", desc="replay", disable=None, mininterval=0.2))
+
+
+def as_text(summary: dict[str, Any]) -> list[str]:
+    """A short table."""
+    lines = [
+        f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
+        f"wall time          {summary['wall_s']:.2f} s, {summary['realtime_factor']:.1f} times real time",
+        f"left out           {summary['dropped']}",
+        f"tip acceleration   {summary['tip_acceleration_max_m_s2']:.2f} m/s^2 at most",
+    ]
+    for i, value in enumerate(summary["joint_residual_rms_rad"]):
+        if value is None:
+            lines.append(f"joint {i + 1} residual   not measured")
+            continue
+        spread = summary["joint_residual_normalised_std"][i]
+        lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {spread:.2f} of what is expected")
+    for name, count in summary["events"].items():
+        lines.append(f"{name:18s} {count}")
+    if "tip_error_rms_m" in summary:
+        lines += [
+            f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
+            f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
+        ]
+    alarms = len(summary["alarms"])
+    return [*lines, f"alarms             {alarms or 'none'}"]

@@ -1,0 +1,87 @@
+"""``boom_twin simulate``: the boom's answer to a stroke history."""
+
+from __future__ import annotations
+
+import csv
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.simulate import simulate
+from ..errors import UsageError
+from ..records import Array
+from ..scene import Scene
+from ..scene.kinematics import posture_angles, strokes_of_posture
+from .common import add_scene, open_scene
+
+FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_scene(parser)
+    parser.add_argument("--posture", required=True, metavar="NAME", help="the posture that the first row belongs to")
+    parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
+    parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
+    parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
+
+
+def run(args: Namespace) -> int:
+    """Read, simulate, write."""
+    scene = open_scene(args.scene)
+    times, strokes = read_drive(Path(args.drive), len(scene.joints))
+    angles = _angles_near(scene, args.posture, strokes[0])
+    result = simulate(scene, times, strokes, args.dt, angles)
+    columns = result.columns()
+    table = np.column_stack(list(columns.values()))
+    with Path(args.out).open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(columns) + "\n")
+        np.savetxt(file, table, fmt="%.12g", delimiter=",")
+    return 0
+
+
+def read_drive(path: Path, n: int) -> tuple[Array, Array]:
+    """Times (m,) in s and strokes (m, n) in m of a CSV file with the header t_s,stroke_1_m,.. .
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, has another header, no rows, or a value that is not a number; says where.
+    """
+    wanted = ["t_s", *(f"stroke_{i + 1}_m" for i in range(n))]
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}. Give a CSV file.") from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        raise UsageError(f"{path}: no column {', '.join(missing)} in its first line. It needs {','.join(wanted)}.")
+    if len(rows) < 2:
+        raise UsageError(f"{path}: no rows below the header. Give at least one.")
+    places = [header.index(name) for name in wanted]
+    table = np.array([[_number(path, line, row, header, place) for place in places] for line, row in enumerate(rows[1:], 2)])
+    return table[:, 0], table[:, 1:]
+
+
+def _number(path: Path, line: int, row: list[str], header: list[str], place: int) -> float:
+    try:
+        return float(row[place])
+    except (ValueError, IndexError):
+        value = row[place] if place < len(row) else ""
+        raise UsageError(f"{path}, line {line}: {header[place]} = {value!r} is not a number.") from None
+
+
+def _angles_near(scene: Scene, posture: str, first: Array) -> Array:
+    """Joint angles of the posture, if the first row has its strokes."""
+    expected = strokes_of_posture(scene, posture)
+    off = np.abs(expected - first)
+    if not np.max(off) <= FAR:
+        i = int(np.argmax(off))
+        raise UsageError(
+            f"stroke_{i + 1}_m = {first[i]:.6g} in the first row: posture {posture} has {expected[i]:.6g}, and they may "
+            f"differ by {FAR:g} m. Start the drive in the posture, or name another."
+        )
+    return posture_angles(scene, posture)

@@ -1,0 +1,67 @@
+"""``boom_twin statics``: equilibrium under gravity, and small vibrations about it."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+
+import numpy as np
+
+from ..analysis.statics import Equilibrium, statics
+from .common import add_json, add_scene, open_scene, print_json
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_scene(parser)
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
+    add_json(parser)
+
+
+def numbers(text: str) -> list[float]:
+    """Numbers between commas."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is not a list of numbers like 0.1,0.2") from None
+
+
+def run(args: Namespace) -> int:
+    """Solve and print."""
+    scene = open_scene(args.scene)
+    strokes = None if args.strokes is None else np.array(args.strokes)
+    found = statics(scene, strokes=strokes, posture=args.posture)
+    if args.json:
+        print_json(as_json(found))
+    else:
+        print("\n".join(as_text(found)))
+    return 0
+
+
+def as_json(found: Equilibrium) -> dict[str, object]:
+    """The contract's keys."""
+    return {
+        "stroke_m": found.strokes,
+        "tip_rigid_m": found.tip_rigid,
+        "tip_m": found.tip,
+        "joint_rad": found.joints,
+        "cylinder_force_N": found.cylinder_forces,
+        "frequencies_Hz": found.frequencies,
+    }
+
+
+def as_text(found: Equilibrium) -> list[str]:
+    """A short table, one joint a line."""
+    (x, y), (dx, dy) = found.tip, found.tip - found.tip_rigid
+    lines = [
+        f"tip            x {x:.4f} m, y {y:.4f} m",
+        f"deflection     x {1e3 * dx:+.1f} mm, y {1e3 * dy:+.1f} mm against rigid sections and cylinders",
+        "",
+        "joint   stroke m   angle deg   cylinder force kN",
+    ]
+    for i in range(len(found.strokes)):
+        angle, force = np.degrees(found.joints[i]), 1e-3 * found.cylinder_forces[i]
+        lines.append(f"{i + 1:5d} {found.strokes[i]:10.4f} {angle:11.3f} {force:+19.3f}")
+    frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies) or "none: nothing in this model can vibrate"
+    return [*lines, "", f"natural frequencies Hz   {frequencies}"]

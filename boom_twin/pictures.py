@@ -1,0 +1,96 @@
+"""From a replay to the arrays that its pictures are drawn from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .records import Array, Residuals, Stream
+from .replay import Recording, Replay
+from .scene.parts import Scene
+from .truth import TipTruth
+from .view import History, ImuTrace, Truth, replay_pictures
+
+NANO = 1e-9
+
+
+def draw(result: Replay, scene: Scene, out: Path) -> list[Path]:
+    """Draw the pictures of a replay into `out`; returns their paths."""
+    history = history_of(result.recording, scene)
+    notes = result.session.notes
+    note = notes.get("origin", "")
+    truth = _truth(result.truth, history)
+    return replay_pictures(out, history, truth, session=result.session.path.resolve().name, note=note)
+
+
+def history_of(recording: Recording, scene: Scene) -> History:
+    """Everything a replay predicted, as arrays; times from the first prediction."""
+    predictions = recording.predictions
+    first = predictions[0].stamp
+    angles = [residuals for residuals in recording.residuals if residuals.stream is Stream.ANGLES]
+    force = [residuals for residuals in recording.residuals if residuals.stream is Stream.IMU]
+    stamps = _seconds([prediction.stamp for prediction in predictions], first)
+    acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
+    turns = np.array([prediction.tip_angle for prediction in predictions])
+    names, times, values, sigmas = _channels([angles, force], first)
+    return History(
+        stamps_s=stamps,
+        tip_displacement=np.array([prediction.tip_displacement for prediction in predictions]),
+        tip_position=np.array([prediction.tip_position for prediction in predictions]),
+        tip_acceleration=acceleration,
+        joints=np.array([prediction.joints for prediction in predictions]),
+        cylinder_forces=np.array([prediction.cylinder_forces for prediction in predictions]),
+        strokes=np.array([prediction.strokes for prediction in predictions]),
+        residual_stamps_s=times,
+        residual_names=names,
+        residual_values=values,
+        residual_sigmas=sigmas,
+        imu=_imu(force, stamps, _specific_force(scene, acceleration, turns), first),
+        shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
+        gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
+    )
+
+
+def _seconds(stamps: list[int], first: int) -> Array:
+    return np.array([(stamp - first) * NANO for stamp in stamps])
+
+
+def _channels(groups: list[list[Residuals]], first: int) -> tuple[tuple[str, ...], Array, Array, Array]:
+    """Residuals of several streams in one table, a row per stamp and stream; NaN where a stream has no say."""
+    groups = [group for group in groups if group]
+    names = tuple(name for group in groups for name in group[0].names)
+    rows = sum(len(group) for group in groups)
+    times, values, sigmas = np.empty(rows), np.full((rows, len(names)), np.nan), np.full((rows, len(names)), np.nan)
+    row, column = 0, 0
+    for group in groups:
+        block = (slice(row, row + len(group)), slice(column, column + len(group[0].names)))
+        times[block[0]] = _seconds([residuals.stamp for residuals in group], first)
+        values[block] = [residuals.values for residuals in group]
+        sigmas[block] = [residuals.sigmas for residuals in group]
+        row, column = row + len(group), column + len(group[0].names)
+    return names, times, values, sigmas
+
+
+def _specific_force(scene: Scene, acceleration: Array, turns: Array) -> Array:
+    """Along the axes of the tip, shape (m, 2)."""
+    c, s = np.cos(scene.base.inclination), np.sin(scene.base.inclination)
+    gx, gy = scene.gravity
+    felt = acceleration - np.array([c * gx + s * gy, c * gy - s * gx])
+    c, s = np.cos(turns), np.sin(turns)
+    return np.column_stack([c * felt[:, 0] + s * felt[:, 1], c * felt[:, 1] - s * felt[:, 0]])
+
+
+def _imu(force: list[Residuals], stamps: Array, felt: Array, first: int) -> ImuTrace | None:
+    if not force:
+        return None
+    times = _seconds([residuals.stamp for residuals in force], first)
+    predicted = np.column_stack([np.interp(times, stamps, felt[:, i]) for i in range(2)])
+    return ImuTrace(times, predicted + np.array([residuals.values for residuals in force]), predicted)
+
+
+def _truth(truth: TipTruth | None, history: History) -> Truth | None:
+    """The truth on the time of the history: both begin with the first stroke sample."""
+    if truth is None:
+        return None
+    return Truth(truth.times - truth.times[0] + history.stamps_s[0], truth.position, truth.acceleration)

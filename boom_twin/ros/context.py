@@ -1,0 +1,63 @@
+"""The life of rclpy in a process: started, stopped by a signal, shut down."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+import rclpy
+from rclpy.exceptions import ROSInterruptException
+from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions
+
+from ..errors import UsageError
+
+STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
+"""What ends a spinning process in order."""
+
+
+@contextmanager
+def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
+    """rclpy, started with the process's or the given ROS arguments, and shut down at the end.
+
+    rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
+    is going. What a signal does is up to Python, see `on_stop_signal`.
+
+    Raises
+    ------
+    UsageError
+        The arguments after ``--ros-args`` cannot be used.
+    """
+    try:
+        rclpy.init(args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy raises types of its C++ part here
+        raise UsageError(f"ROS arguments: {one_line(error)}. Check what follows --ros-args.") from error
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+def on_stop_signal(act: Callable[[], None]) -> None:
+    """From now on the first SIGINT or SIGTERM calls `act`, and further ones do nothing."""
+    known = (signal.SIGINT, signal.SIGTERM)
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        for each in known:
+            signal.signal(each, signal.SIG_IGN)
+        act()
+
+    for each in known:
+        signal.signal(each, stop)
+
+
+def interrupt() -> None:
+    """Raise KeyboardInterrupt."""
+    raise KeyboardInterrupt
+
+
+def one_line(error: BaseException) -> str:
+    """The text of an error of rclpy without line breaks and what its C parts append."""
+    return " ".join(str(error).split(", at ./")[0].split()).rstrip(".") or type(error).__name__

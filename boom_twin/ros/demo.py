@@ -1,0 +1,171 @@
+"""The demonstration: a recorded session played over DDS into the live node, its outputs recorded and judged.
+
+Three processes: ``twin_node``, ``boom_twin record``, and this one, which plays. Run by ``make demo``. The bundled
+session is synthetic (virtual rig, surrogate parameters).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tqdm import tqdm
+
+from ..errors import BoomTwinError
+from ..io.reader import Session, scan
+from ..records import Stream
+from .require import require_rclpy
+from .scorecard import Scorecard, Truth, read_truth, score
+
+PATIENCE = 300.0
+"""Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
+PARTING = 10.0
+"""Seconds that a process may take to end."""
+SETTLE = 1.0
+"""Seconds for the recorder to match the node's outputs, and for the last messages to arrive."""
+BAR = "playing {l_bar}{bar}| {n:.1f}/{total:.1f} s"
+
+NODE = ["-m", "boom_twin.ros.main"]
+RECORDER = ["-m", "boom_twin.cli.main", "record"]
+
+
+def main() -> int:
+    """Run the demonstration; returns the exit code, 1 if no output arrived."""
+    args = _arguments()
+    try:
+        require_rclpy()
+        _isolate()
+        session = scan(args.bag)
+        truth_file = args.bag.with_name(args.bag.name + "_truth.csv.gz")
+        truth = read_truth(truth_file, session) if truth_file.is_file() else None
+        recorded = args.out / "recorded"
+        _make_room(args.out, recorded)
+        sent = _run(session, args, recorded)
+        _print_table(session, sent, score(recorded, truth))
+        for path in [recorded, *_pictures(recorded, truth, args.out)]:
+            print(path)
+        return 0
+    except BoomTwinError as error:
+        print(f"demo: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("demo: stopped", file=sys.stderr)
+    return 1
+
+
+def _arguments() -> Namespace:
+    parser = ArgumentParser(prog="python -m boom_twin.ros.demo", description="Play a session into the live twin.")
+    parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
+    parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
+    return parser.parse_args()
+
+
+def _isolate() -> None:
+    """Keep this process and its children out of any other ROS 2 traffic."""
+    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+
+def _make_room(out: Path, recorded: Path) -> None:
+    """The folder of the results, without the recording of an earlier run."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if recorded.is_dir():
+            shutil.rmtree(recorded)
+    except OSError as error:
+        raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
+
+
+def _run(session: Session, args: Namespace, recorded: Path) -> dict[str, int]:
+    """Play with node and recorder running; gives the messages sent by topic."""
+    note = "; ".join(["recorded live by the demonstration", *session.notes.values()])
+    recorder = [*RECORDER, "--out", str(recorded), "--note", note]
+    with (
+        _child(NODE, args.out / "node.log", signal.SIGTERM) as node_runs,
+        _child(recorder, args.out / "recorder.log", signal.SIGINT) as recorder_runs,
+    ):
+
+        def check() -> None:
+            node_runs()
+            recorder_runs()
+
+        return _play(session, args.duration, check)
+
+
+def _play(session: Session, duration: float, check: Callable[[], None]) -> dict[str, int]:
+    """Wait for node and recorder, then play; `check` raises when one of them has ended."""
+    from .context import ros
+    from .player import Player
+
+    with ros([]):
+        player = Player(session)
+        print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
+        if lonely := player.wait(PATIENCE, 2, check):
+            raise BoomTwinError(f"node and recorder did not both listen to {', '.join(lonely)} in {PATIENCE:g} s.")
+        time.sleep(SETTLE)
+        duration = min(duration, (session.end - session.start) * 1e-9)
+        with tqdm(total=duration, ncols=80, mininterval=0.5, bar_format=BAR) as bar:
+            for elapsed in player.play(duration=duration):
+                bar.update(elapsed * 1e-9 - bar.n)
+        check()
+        time.sleep(SETTLE)
+        player.close()
+    return player.played.sent
+
+
+@contextmanager
+def _child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator[Callable[[], None]]:
+    """A Python process with its stderr in `log`; gives a function that raises when it has ended."""
+    with log.open("w", encoding="utf-8") as file:
+        process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
+
+    def check() -> None:
+        if process.poll() is not None:
+            last = (log.read_text(encoding="utf-8").strip().splitlines() or ["nothing was said"])[-1]
+            raise BoomTwinError(f"{' '.join(arguments[:3])} ended with {process.returncode}: {last} (see {log})")
+
+    try:
+        yield check
+    finally:
+        process.send_signal(parting)
+        try:
+            process.wait(PARTING)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _print_table(session: Session, sent: dict[str, int], card: Scorecard) -> None:
+    strokes = sent[Stream.STROKES.value]
+    rows = [
+        ("session", f"{session.path.name} ({'; '.join(session.notes.values()) or 'no notes'})"),
+        ("stroke samples sent", f"{strokes}"),
+        ("predictions received", f"{card.predictions}"),
+        ("lost", f"{strokes - card.predictions}"),
+        ("residual sets", f"{card.residual_sets}"),
+        ("latency, median / 99 %", f"{card.latency_ms[0]:.1f} / {card.latency_ms[1]:.1f} ms"),
+    ]
+    if card.tip_error_rms is not None:
+        rows.append(("tip position error", f"{card.tip_error_rms * 1e3:.2f} mm rms against the rig's truth"))
+    for name, value in card.residual_rms.items():
+        amount = f"{value * 1e3:.3f} mrad rms" if name.startswith("joint") else f"{value:.3f} m/s^2 rms"
+        rows.append((f"residual {name}", amount))
+    width = max(len(name) for name, _ in rows)
+    print("\n".join(f"{name:{width}s}  {value}" for name, value in rows))
+
+
+def _pictures(recorded: Path, truth: Truth | None, out: Path) -> list[Path]:
+    """Pictures of the recorded run."""
+    return []
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""The executable ``twin_node``.
+
+Exit codes: 0 stopped by SIGINT, SIGTERM or a shutdown transition; 1 the node could not start (the reason is on stderr);
+2 usage.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import BoomTwinError
+from .require import require_rclpy
+
+if TYPE_CHECKING:
+    from .node import TwinNode
+
+WAKE = 0.2
+"""Longest wait (s) for work: a signal is noticed between two waits."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped; returns the exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program's name; by default those of the process.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        require_rclpy()
+        return _run(arguments)
+    except BoomTwinError as error:
+        print(f"twin_node: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    from rclpy.utilities import remove_ros_args
+
+    from .context import interrupt, on_stop_signal, ros
+
+    on_stop_signal(interrupt)
+    parser = ArgumentParser(prog="twin_node", description="The live boom twin, a ROS 2 lifecycle node.")
+    parser.epilog = "Parameters: --ros-args -p scene:=PATH --params-file msg_config/twin.yaml"
+    parser.parse_args(remove_ros_args(["twin_node", *arguments])[1:])
+    with ros(["twin_node", *arguments]):
+        from .node import TwinNode
+
+        node = TwinNode()
+        try:
+            return _live(node)
+        finally:
+            node.destroy_node()
+
+
+def _live(node: TwinNode) -> int:
+    """Start, spin, stop in order."""
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.lifecycle import TransitionCallbackReturn as Outcome
+
+    from .context import STOPPED
+
+    try:
+        if node.autostart and not (
+            node.trigger_configure() == Outcome.SUCCESS and node.trigger_activate() == Outcome.SUCCESS
+        ):
+            return 1
+        # One thread: samples are taken in the order of their arrival, and nothing needs a lock. EventsExecutor costs
+        # less, but it is experimental and its spin() does not return.
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while not node.finished:
+            executor.spin_once(timeout_sec=WAKE)
+    except STOPPED:
+        node.get_logger().info("stopping")
+        node.leave()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

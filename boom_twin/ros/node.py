@@ -1,0 +1,163 @@
+"""The live twin: a lifecycle node that is three calls around `boom_twin.twin.Twin`."""
+
+from __future__ import annotations
+
+import gc
+import traceback
+from functools import partial
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
+from rclpy.subscription import Subscription
+
+from ..errors import BoomTwinError
+from ..io.intake import Intake, stamp_of
+from ..io.outlet import Outlet
+from ..io.topics import NODE, Output, load_topics
+from ..records import Stream
+from ..scene.load import DEFAULT_NAME, examine
+from ..twin import Twin
+from .diagnostics import Diagnostics
+from .parameters import declare, refuse_while, scene_path, settings_of
+from .qos import qos_profile
+from .types import RclpyTypes, message_class
+
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+
+class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not typed
+    """Node ``boom_twin``: strokes, joint angles and tip IMU in, predictions and residuals out.
+
+    It listens only while it is active, so a publisher that has matched its subscriptions is heard. The model advances
+    by the stamps of the samples; no timer and no clock has a part in what is published, except on ``/diagnostics``.
+
+    Raises
+    ------
+    UsageError
+        A parameter given at start cannot be used.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(NODE)
+        self.finished = False  # after the transition to shut down
+        self._twin: Twin | None = None
+        self._topics = load_topics()
+        self._outlet = Outlet(RclpyTypes())
+        self._outputs: dict[Output, LifecyclePublisher] = {}
+        self._subscriptions_in: list[Subscription[Any]] = []
+        declare(self)
+        refuse_while(self, frozen=lambda: self._twin is not None)
+        self._diagnostics = Diagnostics(self, self._topics)
+
+    @property
+    def autostart(self) -> bool:
+        """Whether the node is to configure and activate itself."""
+        return bool(self.get_parameter("autostart").value)
+
+    # -- transitions --------------------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the scene, compile its model, offer the outputs; FAILURE, with the reason logged, if that cannot be."""
+        try:
+            self._build()
+        except BoomTwinError as error:
+            self.get_logger().fatal(str(error))
+            return FAILURE
+        except Exception:  # rclpy would swallow it
+            self.get_logger().fatal(traceback.format_exc())
+            raise
+        for key, topic in self._topics.outputs.items():
+            if key is not Output.DIAGNOSTICS:
+                kind = message_class(topic.type)
+                self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start from the next full stroke sample, and listen."""
+        assert self._twin is not None
+        self._twin.reset()
+        self._diagnostics.start()
+        gc.collect()
+        gc.freeze()  # what lives from here on as long as the node is not searched again
+        outcome = super().on_activate(state)
+        for stream, topic in self._topics.inputs.items():
+            receive = partial(self._receive, stream)
+            kind, qos = message_class(topic.type), qos_profile(topic.qos)
+            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos))
+        heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
+        self.get_logger().info(f"active; listening to {heard}")
+        return outcome
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Listen no more."""
+        self._go_quiet()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give up the model and the outputs; parameters can be changed again."""
+        self._discard()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of everything, from whatever state."""
+        self._go_quiet()
+        self._discard()
+        self.finished = True
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of everything; the node can be configured anew."""
+        self._go_quiet()
+        self._discard()
+        return super().on_error(state)
+
+    def leave(self) -> None:
+        """Shut down from whatever state; a transition that was interrupted is left as it is."""
+        if self._state_machine.current_state[1] in ("unconfigured", "inactive", "active"):
+            self.trigger_shutdown()
+
+    def _build(self) -> None:
+        """Scene and settings to a compiled twin."""
+        path = scene_path(self)
+        scene, oddities = examine(path)
+        for oddity in oddities:
+            self.get_logger().warning(str(oddity))
+        twin = Twin(scene, settings_of(self))
+        name = str(path or DEFAULT_NAME)
+        self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
+        twin.warm_up()
+        self._twin, self._intake = twin, Intake(twin.plan.joints)
+        self._diagnostics.watch(twin, self._intake, name)
+        self.get_logger().info("model ready")
+
+    def _go_quiet(self) -> None:
+        self._diagnostics.stop()
+        while self._subscriptions_in:
+            self.destroy_subscription(self._subscriptions_in.pop())
+        gc.unfreeze()
+
+    def _discard(self) -> None:
+        for publisher in self._outputs.values():
+            self.destroy_lifecycle_publisher(publisher)
+        self._outputs.clear()
+        self._twin = None
+
+    # -- one message --------------------------------------------------------------------------------------------------
+
+    def _receive(self, stream: Stream, msg: Any) -> None:
+        """Take one message; whatever it holds, the node lives on."""
+        try:
+            self._take(stream, stamp_of(msg), msg)
+        except Exception as error:  # the last resort, such as a stamp that no message can carry back
+            self._diagnostics.broken(stream, error)
+
+    def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
+        assert self._twin is not None
+        self._diagnostics.seen(stream, stamp)
+        sample = self._intake.put(stream, stamp, msg)
+        if sample is None:
+            return
+        report = self._twin.update(sample)
+        self._diagnostics.reported(report)
+        for key, filled in self._outlet.fill(report):
+            self._outputs[key].publish(filled)

@@ -1,0 +1,65 @@
+"""What the virtual rig knows of a synthetic session beyond its sensors: the true motion of the tip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import BagError
+from .records import Array, Prediction
+
+FILE_NAME = "truth.csv.gz"
+COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
+
+
+@dataclass(frozen=True)
+class TipTruth:
+    """True motion of the tip at the stroke stamps of a session, m of them.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        s after the start of the session.
+    position, acceleration : ndarray, shape (m, 2)
+        m, m/s^2; x forward, y up.
+    """
+
+    times: Array
+    position: Array
+    acceleration: Array
+
+    def errors(self, predictions: list[Prediction]) -> dict[str, float]:
+        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), both as vectors."""
+        times = np.array([prediction.stamp - predictions[0].stamp for prediction in predictions]) * 1e-9 + self.times[0]
+        position = np.array([prediction.tip_position for prediction in predictions])
+        acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
+        return {
+            "tip_error_rms_m": _rms(position - self._at(times, self.position)),
+            "tip_acceleration_error_rms_m_s2": _rms(acceleration - self._at(times, self.acceleration)),
+        }
+
+    def _at(self, times: Array, values: Array) -> Array:
+        return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])
+
+
+def _rms(vectors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+
+
+def load_truth(folder: Path) -> TipTruth | None:
+    """The truth beside a session, or None if there is none; `folder` is the session's own."""
+    path = folder / FILE_NAME
+    if not path.is_file():
+        return None
+    try:
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        values = {name: table[name] for name in COLUMNS}
+    except (OSError, ValueError, EOFError) as error:
+        raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None
+    return TipTruth(
+        values["t_s"],
+        np.column_stack([values["tip_x_m"], values["tip_y_m"]]),
+        np.column_stack([values["tip_ax_m_s2"], values["tip_ay_m_s2"]]),
+    )

@@ -1,0 +1,158 @@
+"""Side view of a boom in equilibrium, with its pins true to geometry and its numbers beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..analysis.posture import set_undeformed
+from ..analysis.statics import Equilibrium, outline
+from ..chain.place import place
+from ..plan.compile import compile_scene
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.parts import Scene
+from .drawing import draw_base, draw_cylinder, draw_link, draw_pin, draw_section
+from .skeleton import Skeleton, skeleton
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+EXAGGERATION = 10.0
+DEEP = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
+
+
+def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str = "Boom at rest", note: str = "") -> Path:
+    """Draw a boom as `statics` found it.
+
+    Parameters
+    ----------
+    scene : Scene
+    equilibrium : Equilibrium
+        Of the same scene.
+    path : Path
+        PNG file to write.
+    title, note : str
+        Headline, and small print on its right.
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    angles = joint_angles_of_strokes(scene, equilibrium.strokes, near=equilibrium.joints)
+    bones, straight = skeleton(scene, angles), undeformed_outline(scene, angles)
+    with picture(path, title, note) as figure:
+        grid = figure.add_gridspec(2, 2, width_ratios=[3.0, 1.0], height_ratios=[1.35, 1.0])
+        axes, side, close = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+        axes.set_aspect("equal", adjustable="datalim")
+        draw_boom(axes, scene, bones)
+        _deflected(axes, straight, equilibrium)
+        _lengths(axes, scene, bones)
+        axes.margins(0.05)
+        axes.set_xlabel("x forward, m")
+        axes.set_ylabel("y up, m")
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.0))
+        _numbers(side, equilibrium)
+        _detail(close, scene, bones)
+    return path
+
+
+def undeformed_outline(scene: Scene, angles: Array) -> Array:
+    """Points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    set_undeformed(plan, state, angles)
+    place(plan.tables, state, work)
+    return outline(plan, state, work.position)
+
+
+def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
+    """Base, sections, cylinders, links and pins of an undeformed boom."""
+    size = 0.035 * float(sum(section.length for section in scene.sections))
+    for i in range(len(scene.sections)):
+        draw_section(axes, section_parts(scene, bones, i), depth(scene, i), alpha)
+    for joint, part in zip(bones.joints, scene.joints, strict=True):
+        draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
+        for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
+            draw_link(axes, corners, colour, 3.0)
+        for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q):
+            if pin is not None:
+                draw_pin(axes, pin, 4.0)
+    draw_base(axes, bones.pivots[0], size)
+    draw_base(axes, bones.joints[0].barrel_pin, 0.5 * size)
+
+
+def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Array, bool]]:
+    """Root, beam and head of section `i` (0-based) from point to point, and whether they bend."""
+    section = scene.sections[i]
+    if section.beam is None:
+        return [(bones.pivots[i], bones.pivots[i + 1], False)]
+    x0, x1 = section.beam
+    stops = [bones.point(i, x) for x in (0.0, x0, x1, section.length)]
+    return [(stops[k], stops[k + 1], k == 1 and scene.is_flexible(i)) for k in range(3)]
+
+
+def depth(scene: Scene, i: int) -> float:
+    """Depth (m) to draw section `i` (0-based) with: that of a box with its A and I, else a share of its length."""
+    section = scene.sections[i]
+    if section.A is None or section.I is None:
+        return 0.05 * section.length
+    return DEEP * float(np.sqrt(section.I / section.A))
+
+
+def _deflected(axes: Axes, straight: Array, equilibrium: Equilibrium) -> None:
+    bent = equilibrium.outline
+    large = straight + EXAGGERATION * (bent - straight)
+    axes.plot(straight[:, 0], straight[:, 1], color=GREY, linestyle=(0, (5, 3)), label="undeformed", zorder=9)
+    axes.plot(bent[:, 0], bent[:, 1], color=BLUE, linewidth=2.6, label="deflected, true to scale", zorder=9)
+    label = f"deflected, displacements × {EXAGGERATION:g}"
+    axes.plot(large[:, 0], large[:, 1], color=ORANGE, linewidth=1.6, label=label, zorder=9)
+    axes.plot(*bent[-1], "o", color=BLUE, markersize=7, zorder=10)
+
+
+def _lengths(axes: Axes, scene: Scene, bones: Skeleton) -> None:
+    """Number and length of every section, beside its middle."""
+    for i, section in enumerate(scene.sections):
+        lift = depth(scene, i) + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
+        where = bones.point(i, 0.5 * section.length, lift)
+        degrees = float(np.degrees(bones.headings[i]))
+        axes.text(
+            *where, f"{i + 1}: {section.length:.2f} m", rotation=degrees, rotation_mode="anchor", ha="center", va="bottom",
+            fontsize=12, color=INK, zorder=11,
+        )  # fmt: skip
+
+
+def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
+    """The joint in the middle of the boom, enlarged."""
+    i = len(bones.joints) // 2
+    joint = bones.joints[i]
+    draw_boom(axes, scene, bones)
+    pins = [pin for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q) if pin is not None]
+    low, high = np.min(pins, axis=0), np.max(pins, axis=0)
+    middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + depth(scene, i)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - 0.8 * reach, middle[1] + 0.8 * reach)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(True)
+    axes.set_title(f"joint {i + 1}, kind {joint.kind}, enlarged")
+
+
+def _numbers(side: Axes, equilibrium: Equilibrium) -> None:
+    """Two small tables: per cylinder, and natural frequencies."""
+    side.axis("off")
+    sag = 1e3 * (equilibrium.tip - equilibrium.tip_rigid)
+    lines = [f"tip deflection   x {sag[0]:+.0f} mm", f"                 y {sag[1]:+.0f} mm", ""]
+    lines += ["joint   angle   stroke    force", "          deg        m       kN"]
+    for i, (angle, stroke, force) in enumerate(
+        zip(np.degrees(equilibrium.joints), equilibrium.strokes, equilibrium.cylinder_forces / 1e3, strict=True)
+    ):
+        lines.append(f"  {i + 1}   {angle:+8.2f}  {stroke:7.3f}  {force:+7.1f}")
+    lines += ["force: tension positive", "", "natural frequencies, Hz, undamped"]
+    lines += [f"  {k + 1}   {frequency:9.3f}" for k, frequency in enumerate(equilibrium.frequencies)]
+    side.text(0.0, 0.98, "\n".join(lines), transform=side.transAxes, va="top", fontsize=12.5, family="monospace", color=INK)

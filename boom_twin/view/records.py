@@ -1,0 +1,78 @@
+"""What a replay leaves behind for pictures: frozen arrays, times in seconds since the first sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..records import Array
+
+
+@dataclass(frozen=True)
+class ImuTrace:
+    """Specific force at the tip, along x and z of the tip frame.
+
+    Attributes
+    ----------
+    stamps_s : ndarray, shape (j,)
+    measured, predicted : ndarray, shape (j, 2)
+        m/s^2, gravity included; NaN where there is none.
+    """
+
+    stamps_s: Array
+    measured: Array
+    predicted: Array
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the rig that made a synthetic session really did (model frame: x forward, y up).
+
+    Attributes
+    ----------
+    stamps_s : ndarray, shape (t,)
+    tip_position, tip_acceleration : ndarray, shape (t, 2)
+        m, m/s^2.
+    """
+
+    stamps_s: Array
+    tip_position: Array
+    tip_acceleration: Array
+
+
+@dataclass(frozen=True)
+class History:
+    """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
+
+    Attributes
+    ----------
+    stamps_s : ndarray, shape (m,)
+    tip_displacement, tip_position, tip_acceleration : ndarray, shape (m, 2)
+        m, m, m/s^2; x forward, y up.
+    joints, cylinder_forces, strokes : ndarray, shape (m, n)
+        rad; N, positive in tension; m.
+    residual_stamps_s : ndarray, shape (k,)
+    residual_names : tuple of str
+        ``joint_<i>`` (rad) or ``tip_imu_x``, ``tip_imu_z`` (m/s^2).
+    residual_values, residual_sigmas : ndarray, shape (k, c)
+        Measured minus predicted, and the deviation expected of it; NaN where a channel has no sample at that stamp.
+    imu : ImuTrace or None
+    shapes : list of (float, ndarray of shape (p, 2))
+        Deflected centre lines from the base pivot to the tip, m, and when.
+    gaps : list of (float, float)
+        From and to, s, where strokes were missing.
+    """
+
+    stamps_s: Array
+    tip_displacement: Array
+    tip_position: Array
+    tip_acceleration: Array
+    joints: Array
+    cylinder_forces: Array
+    strokes: Array
+    residual_stamps_s: Array
+    residual_names: tuple[str, ...]
+    residual_values: Array
+    residual_sigmas: Array
+    imu: ImuTrace | None = None
+    shapes: list[tuple[float, Array]] = field(default_factory=list)
+    gaps: list[tuple[float, float]] = field(default_factory=list)

@@ -1,0 +1,83 @@
+"""Picture of the residuals: every channel with its expected bands, and its distribution beside the unit normal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..records import Array
+from .records import History
+from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_gaps
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MEAN_OVER = 1.0  # s of the running mean
+EDGES = np.linspace(-5.0, 5.0, 51)
+
+
+def residual_picture(path: Path, session: str, history: History, note: str) -> None:
+    """Write ``residuals.png``."""
+    channels = len(history.residual_names)
+    height = max(9.0, 1.2 + 1.5 * channels)
+    with picture(path, f"{session}: residuals, measured minus predicted", note, (16.0, height)) as figure:
+        panels = figure.subplots(channels, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [5.0, 1.0]})
+        for channel, (over_time, spread) in enumerate(panels):
+            _channel(over_time, history, channel)
+            _distribution(spread, history.residual_values[:, channel] / history.residual_sigmas[:, channel])
+        panels[-1, 0].set_xlabel("time since first sample, s")
+        panels[-1, 1].set_xlabel("residual / σ")
+        panels[0, 1].set_title("against the unit normal")
+        panels[0, 0].legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.4, markerscale=4
+        )
+
+
+def unit_of(name: str) -> tuple[float, str]:
+    """Factor from SI, and the unit that a residual channel is shown in."""
+    return (1e3, "mrad") if name.startswith("joint_") else (1.0, "m/s²")
+
+
+def _channel(axes: Axes, history: History, channel: int) -> None:
+    name = history.residual_names[channel]
+    factor, unit = unit_of(name)
+    measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
+    stamps = history.residual_stamps_s[measured]
+    values = factor * history.residual_values[measured, channel]
+    sigma = factor * history.residual_sigmas[measured, channel]
+    shade_gaps(axes, history.gaps)
+    axes.set_ylabel(f"{name}\n{unit}")
+    if not stamps.size:
+        axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)
+        return
+    axes.fill_between(stamps, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label="±3 σ expected")
+    axes.plot(stamps, values, ".", color=BLUE, markersize=2.6, alpha=0.55, markeredgewidth=0, label="residual")
+    axes.plot(stamps, sigma, color=INK, linewidth=1.0, label="±1 σ")
+    axes.plot(stamps, -sigma, color=INK, linewidth=1.0)
+    axes.plot(stamps, running_mean(stamps, values), color=ORANGE, linewidth=1.6, label="mean over 1 s")
+    reach = max(4.2 * float(np.median(sigma)), 1.1 * float(np.quantile(np.abs(values), 0.9995)))
+    axes.set_ylim(-reach, reach)
+    axes.set_xlim(float(stamps[0]), float(max(stamps[-1], stamps[0] + 1e-3)))
+
+
+def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array:
+    """Mean of all samples within half of `over` (s) of each one; `stamps` ascending, no NaN, both shape (k,)."""
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    first = np.searchsorted(stamps, stamps - 0.5 * over)
+    last = np.searchsorted(stamps, stamps + 0.5 * over, side="right")
+    return np.asarray((total[last] - total[first]) / (last - first))
+
+
+def _distribution(axes: Axes, normalised: Array) -> None:
+    values = normalised[np.isfinite(normalised)]
+    axes.plot(EDGES, np.exp(-0.5 * EDGES**2) / np.sqrt(2.0 * np.pi), color=INK, linewidth=1.2)
+    axes.set_xlim(EDGES[0], EDGES[-1])
+    axes.set_xticks([-3, 0, 3])
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+    if values.size:
+        axes.hist(np.clip(values, EDGES[0], EDGES[-1]), EDGES, density=True, color=SKY, alpha=0.8, linewidth=0)
+        text = f"mean {np.mean(values):+.2f}\nsd {np.std(values):.2f}"
+        axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)

@@ -1,0 +1,93 @@
+"""One look for all pictures: canvas, colours, titles, files. No display is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..records import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito: told apart by every kind of colour vision
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
+INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
+DPI = 100
+
+LOOK = {
+    "font.size": 13,
+    "axes.titlesize": 13,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 13,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E8E8E8",
+    "grid.linewidth": 0.8,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 12,
+    "ytick.labelsize": 12,
+    "legend.frameon": False,
+    "legend.fontsize": 12,
+    "lines.linewidth": 1.3,
+    "agg.path.chunksize": 20000,
+}
+
+
+@contextmanager
+def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
+    """A figure of `size` (hundreds of pixels), titled, written to `path` as PNG when the block is left.
+
+    The same arrays give the same bytes: the file holds no time and no version.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK}):
+        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        top = 1.0 - 0.52 / size[1]
+        figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)  # type: ignore[union-attr, call-arg]
+        figure.text(0.012, 1.0 - 0.14 / size[1], title, fontsize=17, color=INK, va="top", ha="left", weight="bold")
+        if note:
+            figure.text(0.988, 1.0 - 0.16 / size[1], note, fontsize=13, color=GREY, va="top", ha="right", style="italic")
+        yield figure
+        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
+    """Grey bands where strokes were missing; the first one is labelled for a legend."""
+    for number, (start, stop) in enumerate(gaps):
+        axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
+
+
+def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tuple[Array, Array]:
+    """`stamps` (m,) and `values` (m, c) with a NaN in the middle of every gap, so that no line is drawn across it."""
+    middles = np.array([0.5 * (start + stop) for start, stop in gaps])
+    places = np.searchsorted(stamps, middles)
+    return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
+
+
+def limits(*arrays: Array, around: float | None = None, share: float = 0.08) -> tuple[float, float]:
+    """Limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
+    values = np.concatenate([np.ravel(array) for array in arrays])
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    if around is not None:
+        reach = max(high - around, around - low)
+        low, high = around - reach, around + reach
+    margin = share * (high - low) or 1.0
+    return low - margin, high + margin

@@ -1,0 +1,154 @@
+"""Picture of the tip over time: displacement, acceleration, and the IMU beside its prediction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..records import Array
+from .records import History, ImuTrace, Truth
+from .style import BLUE, GREY, INK, ORANGE, PALE, broken, limits, picture, shade_gaps
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WINDOW = 6.0  # s shown enlarged
+TRUTH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 4))}
+AXES = (("x (forward)", BLUE), ("y (up)", ORANGE))
+
+
+def tip_picture(path: Path, session: str, history: History, truth: Truth | None, note: str) -> None:
+    """Write ``tip.png``."""
+    window = liveliest(history.stamps_s, history.tip_acceleration)
+    with picture(path, f"{session}: tip motion", note) as figure:
+        grid = figure.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.1])
+        upper = figure.add_subplot(grid[0, :])
+        middle = figure.add_subplot(grid[1, :], sharex=upper)
+        lower = [figure.add_subplot(grid[2, i]) for i in range(2)]
+        _displacement(upper, history, truth)
+        _acceleration(middle, history, truth)
+        _mark(middle, window)
+        upper.tick_params(labelbottom=False)
+        middle.set_xlabel("time since first sample, s")
+        if history.imu is not None:
+            _imu(lower, history.imu, history, window)
+        else:
+            _enlarged(lower, history, truth, window)
+
+
+def liveliest(stamps: Array, acceleration: Array) -> tuple[float, float]:
+    """Window of `WINDOW` s about the largest acceleration (m, 2), inside the session; all of it if that is shorter."""
+    size = np.hypot(acceleration[:, 0], acceleration[:, 1])
+    if not np.isfinite(size).any():
+        return 0.0, WINDOW
+    first, last = float(stamps[0]), float(stamps[-1])
+    start = float(stamps[np.nanargmax(size)]) - 0.35 * WINDOW
+    start = max(first, min(start, last - WINDOW))
+    return start, min(start + WINDOW, max(last, first + 1e-3))
+
+
+def rms_difference(history: History, values: Array, stamps: Array, other: Array) -> float:
+    """Root mean square of the distance between `values` (m, 2) and `other` (t, 2), interpolated to the history's stamps."""
+    gap = values - _at(history.stamps_s, stamps, other)
+    return float(np.sqrt(np.nanmean(np.sum(gap**2, axis=1)))) if np.isfinite(gap).any() else float("nan")
+
+
+def _at(stamps: Array, at: Array, values: Array) -> Array:
+    """`values` (t, 2) known at `at`, linearly at `stamps`; NaN outside."""
+    return np.stack([np.interp(stamps, at, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
+
+
+def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
+    shown = 1e3 * history.tip_displacement
+    _lines(axes, history, shown, "predicted ")
+    arrays = [shown]
+    if truth is not None:
+        rigid = history.tip_position - history.tip_displacement
+        real = 1e3 * (_at(history.stamps_s, truth.stamps_s, truth.tip_position) - rigid)
+        error = 1e3 * rms_difference(history, history.tip_position, truth.stamps_s, truth.tip_position)
+        _truth_lines(axes, history.stamps_s, real, f"truth (tip apart by {error:.2g} mm rms)")
+        arrays.append(real)
+    axes.set_ylim(*limits(*arrays))
+    axes.set_ylabel("displacement, mm")
+    axes.set_title("Tip displacement against a rigid boom on the same strokes")
+    _finish(axes, history)
+
+
+def _acceleration(axes: Axes, history: History, truth: Truth | None) -> None:
+    _lines(axes, history, history.tip_acceleration, "predicted ")
+    arrays = [history.tip_acceleration]
+    if truth is not None:
+        error = rms_difference(history, history.tip_acceleration, truth.stamps_s, truth.tip_acceleration)
+        _truth_lines(axes, truth.stamps_s, truth.tip_acceleration, f"truth (apart by {error:.2g} m/s² rms)")
+        arrays.append(truth.tip_acceleration)
+    axes.set_ylim(*limits(*arrays, around=0.0))
+    axes.set_ylabel("acceleration, m/s²")
+    axes.set_title("Tip acceleration (of the point, without gravity)")
+    _finish(axes, history)
+
+
+def _lines(axes: Axes, history: History, values: Array, prefix: str) -> None:
+    stamps, drawn = broken(history.stamps_s, values, history.gaps)
+    for i, (name, colour) in enumerate(AXES):
+        axes.plot(stamps, drawn[:, i], color=colour, label=prefix + name)
+
+
+def _truth_lines(axes: Axes, stamps: Array, values: Array, label: str) -> None:
+    for i in range(2):
+        axes.plot(stamps, values[:, i], color=INK, **TRUTH, label="" if i else label)
+
+
+def _finish(axes: Axes, history: History) -> None:
+    shade_gaps(axes, history.gaps)
+    axes.set_xlim(history.stamps_s[0], max(history.stamps_s[-1], history.stamps_s[0] + 1e-3))
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=5, borderaxespad=0.1, handlelength=1.6)
+
+
+def _mark(axes: Axes, window: tuple[float, float]) -> None:
+    """Shade the part of the session that is shown enlarged."""
+    axes.axvspan(*window, color=PALE, alpha=0.6, linewidth=0, zorder=0.4)
+    left, right = axes.get_xlim()
+    late = sum(window) > left + right
+    place, side = (window[0], "right") if late else (window[1], "left")
+    text = "enlarged below"
+    frame = axes.get_xaxis_transform()
+    axes.annotate(
+        text, (place, 0.04), xycoords=frame, xytext=(-4 if late else 4, 0), textcoords="offset points", ha=side, fontsize=11,
+        color=GREY,
+    )  # fmt: skip
+
+
+def _imu(panels: list[Axes], imu: ImuTrace, history: History, window: tuple[float, float]) -> None:
+    inside = (imu.stamps_s >= window[0]) & (imu.stamps_s <= window[1])
+    for i, (axes, name) in enumerate(zip(panels, ("x, along the tip", "z, across it"), strict=True)):
+        measured, predicted = imu.measured[inside, i], imu.predicted[inside, i]
+        axes.plot(imu.stamps_s[inside], measured, color=GREY, linewidth=0.9, label="measured")
+        axes.plot(imu.stamps_s[inside], predicted, color=AXES[i][1], linewidth=1.6, label="predicted")
+        axes.set_ylim(*limits(measured, predicted))
+        axes.set_title(f"Specific force {name}")
+        axes.set_ylabel("specific force, m/s²")
+        _window(axes, history, window)
+
+
+def _enlarged(panels: list[Axes], history: History, truth: Truth | None, window: tuple[float, float]) -> None:
+    inside = (history.stamps_s >= window[0]) & (history.stamps_s <= window[1])
+    for i, (axes, (name, colour)) in enumerate(zip(panels, AXES, strict=True)):
+        shown = [history.tip_acceleration[inside, i]]
+        axes.plot(history.stamps_s[inside], shown[0], color=colour, label="predicted")
+        if truth is not None:
+            there = (truth.stamps_s >= window[0]) & (truth.stamps_s <= window[1])
+            shown.append(truth.tip_acceleration[there, i])
+            axes.plot(truth.stamps_s[there], shown[1], color=INK, **TRUTH, label="truth")
+        axes.set_ylim(*limits(*shown))
+        axes.set_title(f"Tip acceleration {name}")
+        axes.set_ylabel("acceleration, m/s²")
+        _window(axes, history, window)
+
+
+def _window(axes: Axes, history: History, window: tuple[float, float]) -> None:
+    shade_gaps(axes, history.gaps)
+    axes.set_xlim(*window)
+    axes.set_xlabel("time since first sample, s")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderaxespad=0.1, handlelength=1.6)

@@ -1,0 +1,209 @@
+"""Draws the pictures of the guide from the geometry of the default scene: `python docs/figures.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boom_twin.analysis.statics import statics
+from boom_twin.scene import Scene, load_scene
+from boom_twin.scene.kinematics import stroke_curve
+from boom_twin.scene.parts import Joint
+from boom_twin.view.boom import boom_picture, depth, section_parts
+from boom_twin.view.dimensions import angle, dimension, frame, leader, mass_centre, name, span
+from boom_twin.view.drawing import draw_base, draw_cylinder, draw_link, draw_pin, draw_section
+from boom_twin.view.skeleton import JointPins, Skeleton, skeleton
+from boom_twin.view.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+
+HERE = Path(__file__).parent
+SURROGATE = "drawn from the default scene (surrogate parameters)"
+
+
+Range = tuple[float, float]
+
+
+@contextmanager
+def sheet(path: Path, title: str, panels: list[tuple[Range, Range]], height: float) -> Iterator[list[Any]]:
+    """Equal axes without ticks side by side, for the ranges (m) of x and y in `panels`; all `height` hundreds of pixels high."""
+    widths = [height * (x[1] - x[0]) / (y[1] - y[0]) for x, y in panels]
+    with picture(path, title, SURROGATE, (sum(widths) + 0.3, height + 0.75)) as figure:
+        found = np.ravel(figure.subplots(1, len(panels), squeeze=False, gridspec_kw={"width_ratios": widths}))
+        for axes, (x, y) in zip(found, panels, strict=True):
+            axes.set_aspect("equal")
+            axes.set_xlim(*x)
+            axes.set_ylim(*y)
+            axes.axis("off")
+        yield list(found)
+
+
+def draw_pins(axes: Any, joint: JointPins) -> None:
+    """All pins of a joint."""
+    for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q):
+        if pin is not None:
+            draw_pin(axes, pin, 9.0)
+
+
+def stroke_lines(axes: Any, joint: JointPins, closed: float, shift: float, at: float = 0.5) -> None:
+    """Closed length and stroke along a cylinder, beside it."""
+    whole = joint.rod_pin - joint.barrel_pin
+    end = joint.barrel_pin + closed * whole / np.hypot(*whole)
+    dimension(axes, joint.barrel_pin, end, "closed_length", shift)
+    dimension(axes, end, joint.rod_pin, "stroke (+)", shift, ORANGE, at)
+
+
+def section_figure(scene: Scene, path: Path) -> None:
+    """Section 1 in its own frame."""
+    bones, section = skeleton(scene, np.zeros(len(scene.sections))), scene.sections[0]
+    assert section.beam and section.root and section.head and section.rod_pin
+    title = "A section: everything is measured from its inboard pivot"
+    with sheet(path, title, [((-0.5, 4.35), (-0.58, 0.78))], 4.4) as (axes,):
+        draw_section(axes, section_parts(scene, bones, 0), depth(scene, 0))
+        inboard, outboard, (x0, x1) = bones.point(0, 0), bones.point(0, section.length), section.beam
+        rod, root, head = (bones.point(0, *p) for p in (section.rod_pin, section.root.com, section.head.com))
+        axes.plot(*np.array([inboard, outboard]).T, color=GREY, linestyle=(0, (9, 3, 2, 3)), linewidth=1.0, zorder=3)
+        frame(axes, inboard, 0.0, 0.42, ("x", "y"), BLUE)
+        for pin in (inboard, outboard, rod):
+            draw_pin(axes, pin, 10.0)
+        mass_centre(axes, root)
+        mass_centre(axes, head)
+        name(axes, inboard, "inboard\npivot", (-14, 0))
+        name(axes, outboard, "outboard\npivot", (14, 0))
+        leader(axes, root, "root: mass, com, inertia (rigid)", (-62, -112))
+        leader(axes, head, "head: mass, com, inertia (rigid)", (-8, -112))
+        leader(axes, rod, "rod_pin, on section 1 only", (96, -66))
+        name(axes, bones.point(0, 2.1), "beam bends: A, I, rho_A, rho_I, beta, modes", (0, 0), weight="normal")
+        span(axes, inboard, bones.point(0, x0), "beam[0]", 0.24)
+        span(axes, inboard, bones.point(0, x1), "beam[1]", 0.38)
+        span(axes, inboard, outboard, "length", 0.64)
+        span(axes, inboard, rod, "rod_pin[0]", -0.28)
+        span(axes, bones.point(0, section.rod_pin[0]), rod, "rod_pin[1] (−)", 0.85, across=True, at=1.42)
+
+
+def joint_a_figure(scene: Scene, path: Path) -> None:
+    """Joint 1 with its cylinder."""
+    phi = np.radians(38.0)
+    bones = skeleton(scene, np.concatenate([[phi], np.zeros(len(scene.sections) - 1)]))
+    joint = bones.joints[0]
+    title = "Joint 1, kind A"
+    with sheet(path, title, [((-1.45, 2.0), (-1.6, 0.98))], 8.0) as (axes,):
+        draw_section(axes, section_parts(scene, bones, 0), depth(scene, 0))
+        draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[0].cylinder.closed_length, 0.1)
+        draw_base(axes, joint.pivot, 0.24)
+        draw_base(axes, joint.barrel_pin, 0.18)
+        frame(axes, joint.pivot, 0.0, 0.62, ("x", "y"), BLUE)
+        draw_pins(axes, joint)
+        axes.plot([0.7, 1.35], [0.0, 0.0], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+        angle(axes, joint.pivot, 0.0, phi, 1.2, "joint_1 (+)", ORANGE)
+        leader(axes, joint.pivot, "base.pivot", (-95, 34))
+        leader(axes, joint.barrel_pin, "base.cylinder_pin", (150, -26))
+        leader(axes, joint.rod_pin, "rod_pin", (-46, 80))
+        stroke_lines(axes, joint, scene.joints[0].cylinder.closed_length, -0.3)
+        span(axes, joint.pivot, joint.barrel_pin, "cylinder_pin[0] − pivot[0]", -1.54, at=-0.95)
+        span(axes, joint.pivot, joint.barrel_pin, "cylinder_pin[1] − pivot[1]", -0.9, across=True)
+        name(axes, bones.point(0, 1.45), "section 1", (0, 0), weight="normal")
+
+
+def six_bar_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
+    """Joint `i` (0-based) at angle `phi` (rad) on a level section: the whole, and the links enlarged."""
+    angles = np.zeros(len(scene.sections))
+    angles[i] = phi
+    bones = skeleton(scene, angles)
+    joint, kind = bones.joints[i], scene.joints[i].kind
+    x, y = joint.pivot
+    told = {"B1": "the rod pin is Q", "B2": "the rod pin is on link L", "B3": "the rod pin is on link R"}[kind]
+    panels = [((x - 1.5, x + 0.62), (y - 0.46, y + 0.52)), ((x - 0.34, x + 0.42), (y - 0.34, y + 0.48))]
+    with sheet(path, f"Joint {i + 1}, kind {kind}: {told}", panels, 5.3) as (whole, close):
+        for axes in (whole, close):
+            _linkage(axes, scene, bones, i)
+        _whole(whole, scene, bones, i)
+        _links(close, joint, phi)
+        _rod_pin(close, joint)
+
+
+def _linkage(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
+    joint = bones.joints[i]
+    for k in (i - 1, i):
+        draw_section(axes, section_parts(scene, bones, k), 0.75 * depth(scene, k), 0.6)
+    draw_link(axes, joint.links[0], GREEN, 7.0)
+    draw_link(axes, joint.links[1], PURPLE, 7.0)
+    draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[i].cylinder.closed_length, 0.07)
+    draw_pins(axes, joint)
+
+
+def _stroke(joint: JointPins, part: Joint) -> float:
+    return float(np.hypot(*(joint.rod_pin - joint.barrel_pin))) - part.cylinder.closed_length
+
+
+def _whole(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
+    """Sections, cylinder, and the angle."""
+    joint, part = bones.joints[i], scene.joints[i]
+    x, y = joint.pivot
+    stroke_lines(axes, joint, part.cylinder.closed_length, 0.12, 1.0 + 0.1 / _stroke(joint, part))
+    frame(axes, joint.pivot, 0.0, 0.26, ("x", "y"), BLUE)
+    axes.plot([x + 0.3, x + 0.48], [y, y], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+    angle(axes, joint.pivot, 0.0, float(bones.headings[i]), 0.42, f"joint_{i + 1} (−)", ORANGE)
+    name(axes, np.array([x - 0.62, y]), f"section {i}", (0, 0), weight="normal")
+    name(axes, bones.point(i, 0.56), f"section {i + 1}", (0, 0), weight="normal")
+    name(axes, joint.barrel_pin, "C", (12, 20))
+    name(axes, joint.pivot, "pivot", (-8, -24))
+    span(axes, joint.barrel_pin, joint.pivot, "C[0] (−)", y - 0.34)
+    span(axes, joint.pivot, joint.barrel_pin, "C[1]", joint.barrel_pin[0] - 0.12, across=True)
+
+
+def _links(axes: Any, joint: JointPins, phi: float) -> None:
+    """Pins D, E, Q and the lengths of the links."""
+    assert joint.d is not None and joint.e is not None and joint.q is not None
+    x, y = joint.pivot
+    frame(axes, joint.pivot, 0.0, 0.3, ("x", ""), BLUE)
+    frame(axes, joint.pivot, phi, 0.3, ("x'", "y'"), INK)
+    across = np.array([-np.sin(phi), np.cos(phi)])
+    foot = joint.e - across * float((joint.e - joint.pivot) @ across)
+    dimension(axes, joint.pivot, foot, "E[0]", -0.12)
+    dimension(axes, foot, joint.e, "E[1]", -0.115, at=1.62)
+    span(axes, joint.d, joint.pivot, "D[0] (−)", y - 0.24, at=-0.62)
+    span(axes, joint.pivot, joint.d, "D[1] (−)", joint.d[0] - 0.06, across=True, at=2.1)
+    name(axes, joint.d, "D", (11, -10))
+    name(axes, joint.e, "E", (14, 8))
+    name(axes, joint.q, "Q = rod pin" if joint.kind == "B1" else "Q", (14, 12) if joint.kind != "B3" else (16, -2))
+    name(axes, 0.55 * joint.d + 0.45 * joint.q, "lL", (0, 0), GREEN)
+    name(axes, 0.5 * (joint.e + joint.q), "lR", (0, 0), PURPLE)
+
+
+def _rod_pin(axes: Any, joint: JointPins) -> None:
+    """How R is measured: along its link, then to the left of it."""
+    if joint.kind == "B1":
+        return
+    assert joint.d is not None and joint.e is not None and joint.q is not None
+    start, stop = (joint.d, joint.q) if joint.kind == "B2" else (joint.q, joint.e)
+    along = (stop - start) / np.hypot(*(stop - start))
+    foot = start + along * float((joint.rod_pin - start) @ along)
+    axes.plot(*np.array([foot, joint.rod_pin]).T, color=INK, linewidth=1.3, linestyle=(0, (4, 3)), zorder=9)
+    middle = 0.5 * (foot + joint.rod_pin)
+    if joint.kind == "B2":
+        dimension(axes, start, foot, "R[0]", -0.07)
+        name(axes, joint.rod_pin, "R", (-14, 14))
+        leader(axes, middle, "R[1], left of D→Q", (10, 62))
+    else:
+        name(axes, joint.rod_pin, "R", (-14, 16))
+        leader(axes, 0.5 * (start + foot), "R[0], from Q along Q→E", (52, 62))
+        leader(axes, middle, "R[1], left of Q→E (here −)", (-70, 92))
+
+
+def main() -> None:
+    """Write every picture beside this script."""
+    scene = load_scene()
+    title = "Default boom, posture arch: at rest under gravity"
+    boom_picture(scene, statics(scene, posture="arch"), HERE / "boom.png", title, "surrogate parameters")
+    section_figure(scene, HERE / "symbols_section.png")
+    joint_a_figure(scene, HERE / "symbols_joint_a.png")
+    for i, degrees in ((1, -42.0), (2, -42.0), (3, -42.0)):
+        assert np.isfinite(stroke_curve(scene, i, np.radians([degrees]))).all()
+        six_bar_figure(scene, i, float(np.radians(degrees)), HERE / f"symbols_b{i}.png")
+
+
+if __name__ == "__main__":
+    main()

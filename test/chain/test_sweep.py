@@ -1,0 +1,128 @@
+"""The Riccati sweeps against the same equations written out at once, and Newton's method by its quadratic convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from boom_twin.analysis.posture import set_undeformed
+from boom_twin.analysis.statics import settle
+from boom_twin.chain.newton import NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, newton
+from boom_twin.chain.place import place
+from boom_twin.chain.program import Motion
+from boom_twin.chain.step import advance, motion_at_rest, rest
+from boom_twin.chain.sweep import sweep_in, sweep_out
+from boom_twin.physics.integrators import generalised_alpha
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from oracle import booms
+from oracle.dense import Dense
+
+SEEDS = [2, 3, 4, 8, 14, 18, 25]
+
+
+def boom_beside_equilibrium(scene, posture, seed=0):
+    """Plan, state and work with every unknown a little off."""
+    rng, plan = np.random.default_rng(seed), compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes_of_posture(scene, posture), posture_angles(scene, posture))
+    moving = plan.tables.moving > 0
+    state.z[moving] += rng.normal(size=moving.sum()) * 2e-3
+    state.z[~moving] += rng.normal(size=(~moving).sum()) * 2e3
+    place(plan.tables, state, work)
+    return plan, state, work, rng
+
+
+SCENES = [pytest.param(load_scene(), "arch", id="default")]
+SCENES += [pytest.param(booms.random_boom(seed), "test", id=f"boom {seed}") for seed in SEEDS]
+
+
+@pytest.mark.parametrize("scene, posture", SCENES)
+@pytest.mark.parametrize("still", [True, False], ids=["statics", "step"])
+def test_increments_solve_the_equations_of_all_unknowns_at_once(scene, posture, still):
+    plan, state, work, rng = boom_beside_equilibrium(scene, posture)
+    drive = plan.closed_lengths + strokes_of_posture(scene, posture)
+    histories = len(plan.masses)
+    motion = motion_at_rest(histories)
+    if not still:
+        hat = work.position + rng.normal(size=histories) * 1e-6
+        motion = Motion(1.5e6, 2e3, hat, -2e3 * work.position + rng.normal(size=histories))
+    rates = rng.normal(size=plan.joints)
+    z = state.z.copy()
+    sweep_in(plan.tables, state, work, motion, drive, rates)
+    sweep_out(plan.tables, state, work)
+    left, before = Dense(plan, motion, drive, rates).left_by(z, work.dz)
+    moving = plan.tables.moving > 0
+    for rows in (moving, ~moving):
+        assert np.abs(left[rows]).max() < 1e-5 * np.abs(before[rows]).max()
+
+
+@pytest.mark.parametrize("scene, posture", SCENES)
+def test_newton_converges_quadratically(scene, posture):
+    """A tangent with any term missing or wrong in sign converges linearly at best."""
+    plan, state, work, _ = boom_beside_equilibrium(scene, posture, seed=3)
+    drive, still = plan.closed_lengths + strokes_of_posture(scene, posture), np.zeros(plan.joints)
+    motion, sizes = motion_at_rest(len(plan.masses)), []
+    for _ in range(6):
+        _, _, size = newton(plan.tables, state, work, motion, drive, still, 0.0, 1, 10.0)
+        sizes.append(size)
+    factors = [b / a**2 for a, b in zip(sizes, sizes[1:], strict=False) if b > 1e-11]
+    assert sizes[-1] < 1e-12 and len(factors) >= 1
+    assert max(factors) < 100.0
+
+
+@pytest.mark.parametrize("scene, posture", SCENES)
+def test_condensed_tangent_is_symmetric(scene, posture):
+    plan, state, work, rng = boom_beside_equilibrium(scene, posture)
+    histories = len(plan.masses)
+    motion = Motion(1e5, 500.0, work.position + rng.normal(size=histories) * 1e-5, np.zeros(histories))
+    sweep_in(plan.tables, state, work, motion, plan.closed_lengths, np.zeros(plan.joints))
+    for index in range(plan.joints):
+        block = work.blocks[index]
+        assert block == pytest.approx(block.T, rel=1e-9, abs=1e-9 * np.abs(block).max())
+
+
+def rested():
+    scene = load_scene()
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes_of_posture(scene, "arch"), posture_angles(scene, "arch"))
+    rest(state, work)
+    return plan, state, work, plan.closed_lengths + strokes_of_posture(scene, "arch")
+
+
+def test_equilibrium_stays_where_it_is():
+    plan, state, work, drive = rested()
+    before, scheme = state.history[:, 0].copy(), generalised_alpha(1e-3, 0.8)
+    for _ in range(200):
+        advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(20))
+    moving = np.append(plan.tables.moving > 0, np.ones(len(before) - len(plan.names), bool))
+    assert state.history[moving, 0] == pytest.approx(before[moving], abs=1e-11)
+    assert np.abs(state.history[len(plan.names) :, 2]).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "drive, passes, expected",
+    [(np.array([np.nan, 1.0, 1.0, 1.0]), 20, NOT_FINITE), (np.array([9.0, 9.0, 9.0, 9.0]), 2, NOT_CONVERGED)],
+)
+def test_failed_step_says_so_and_leaves_the_histories(drive, passes, expected):
+    plan, state, work, _ = rested()
+    before, scheme = state.history.copy(), generalised_alpha(1e-3, 0.8)
+    status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(passes))
+    assert status == expected
+    assert np.array_equal(state.history, before)
+
+
+def test_massless_boom_without_stiffness_is_singular():
+    """A single massless section whose cylinder stands along its arm: nothing resists turning."""
+    spec = booms.document()
+    spec |= {"sections": [{"length": 2.0, "rod_pin": [0.0, -1.0]}], "joints": [spec["joints"][0]], "modes": 0}
+    spec["base"] = {"pivot": [0.0, 0.0], "cylinder_pin": [0.0, -2.2]}
+    del spec["joints"][0]["cylinder"]["barrel"], spec["joints"][0]["cylinder"]["rod"]
+    plan = compile_scene(booms.scene_of(spec))
+    state, work = plan.state(), plan.work()
+    set_undeformed(plan, state, np.zeros(1))
+    drive, motion = np.array([1.2]), motion_at_rest(len(plan.masses))
+    status, _, _ = newton(plan.tables, state, work, motion, drive, np.zeros(1), 1e-9, np.int64(20), 0.1)
+    assert status in (SINGULAR, NOT_FINITE)
+    assert status != OK

@@ -1,0 +1,8 @@
+"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,134 @@
+"""Seeded booms unlike the default scene: 1 to 5 sections, any joints, pins anywhere, parts missing. All values are made up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from boom_twin.scene.load import default_text
+from boom_twin.scene.parts import Scene
+from ruamel.yaml import YAML
+
+from .segments import Segments, link_headings
+
+LEAST_LEVER = 0.08  # m/rad, of every cylinder at the posture
+BARREL_PINS = ("root", "beam", "head", "given")
+
+
+def document():
+    """The default scene as plain dicts."""
+    return YAML(typ="safe").load(default_text())
+
+
+def scene_of(spec):
+    """A `Scene` from plain dicts."""
+    return Scene.model_validate(spec)
+
+
+def random_boom(seed):
+    """Scene with a posture "test"; what it holds follows from the seed."""
+    rng = np.random.default_rng(seed)
+    spec = document()
+    count = 1 + seed % 5
+    sections = [_section(spec["sections"][i], rng) for i in rng.integers(0, 4, count)]
+    for section in sections:
+        section.pop("rod_pin", None)
+    sections[0]["rod_pin"] = [[0.5, -0.12], [1.1, -0.2], [0.6, -0.12]][rng.integers(3)]
+    joints = [_joint(spec["joints"][0], rng)]
+    joints += [_joint(spec["joints"][i], rng) for i in rng.integers(1, 4, count - 1)]
+    for joint, before in zip(joints[1:], sections, strict=False):
+        _place_barrel_pin(joint, before, rng)
+    spec |= {"sections": sections, "joints": joints}
+    spec["base"] |= {"pivot": [0.3, 0.8], "cylinder_pin": [0.75, -0.45], "inclination": float(rng.uniform(-0.2, 0.2))}
+    spec["modes"] = int(rng.integers(2, 5))
+    if rng.random() < 0.5:
+        spec["tip"] = {"payload": float(rng.uniform(10.0, 80.0))}
+    if rng.random() < 0.5:
+        spec["line_fill"] = float(rng.uniform(3.0, 15.0))
+    return _with_posture(spec, rng)
+
+
+def _section(section, rng):
+    section = dict(section)
+    section["I"] *= float(rng.uniform(0.5, 2.0))
+    section["rho_A"] *= float(rng.uniform(0.5, 2.0))
+    for part in ("root", "head", "rho_I", "beta"):
+        if rng.random() < 0.25:
+            del section[part]
+    kind = rng.random()
+    if kind < 0.15:
+        section["modes"] = 0
+    elif kind < 0.3:
+        for part in ("beam", "head", "A", "I", "rho_A", "rho_I", "beta"):
+            section.pop(part, None)
+        section["root"] = {"mass": 140.0, "com": [1.5, 0.05], "inertia": 110.0}
+    return section
+
+
+def _joint(joint, rng):
+    joint = dict(joint, cylinder=dict(joint["cylinder"]))
+    joint["cylinder"]["k"] *= float(rng.uniform(0.5, 2.0))
+    for part in ("barrel", "rod", "d"):
+        if rng.random() < 0.25:
+            del joint["cylinder"][part]
+    if rng.random() < 0.2:
+        joint["cylinder"].pop("k")
+        joint["cylinder"].pop("d", None)
+    for part in ("mL", "mR"):
+        if rng.random() < 0.3:
+            joint.pop(part, None)
+    return joint
+
+
+def _place_barrel_pin(joint, before, rng):
+    """Put C on the rigid root, the flexible part or the rigid head of the section before."""
+    place = BARREL_PINS[rng.integers(4)]
+    if place == "root":
+        joint["C"] = [0.1 - before["length"], 0.2]
+    elif place == "beam":
+        joint["C"] = [-float(rng.uniform(0.4, 0.9)) * before["length"], 0.15]
+    elif place == "head":
+        joint["C"] = [-0.22, 0.55]
+
+
+def _with_posture(spec, rng):
+    """Choose joint angles well away from dead centres, and cylinders that reach them."""
+    relative = []
+    for i, joint in enumerate(spec["joints"]):
+        low, high = np.radians(joint["range_deg"])
+        for _ in range(200):
+            angle = rng.uniform(low + 0.1, high - 0.1)
+            if lever(spec, i, angle) > LEAST_LEVER:
+                break
+        relative.append(angle)
+    headings = np.degrees(np.cumsum(relative))
+    spec["postures"] = {"test": [float(a) for a in headings]}
+    model = Segments(scene_of(spec), 0)
+    for joint, length in zip(spec["joints"], model.lengths(np.array(relative)), strict=True):
+        joint["cylinder"] |= {"closed_length": float(length) - 0.15, "max_stroke": 0.3}
+    return scene_of(spec)
+
+
+def lever(spec, index, angle, size=1e-5):
+    """Size of the derivative of a cylinder's length by its joint's angle, m/rad; 0 where the links do not close."""
+    joint = spec["joints"][index]
+    if joint["kind"] == "A":
+        pin = complex(*np.subtract(spec["base"]["cylinder_pin"], spec["base"]["pivot"]))
+        rod = complex(*spec["sections"][0]["rod_pin"])
+        return abs(np.diff([abs(rod * np.exp(1j * a) - pin) for a in (angle - size, angle + size)])[0]) / (2 * size)
+    part = scene_of(spec).joints[index]
+    try:
+        return abs(np.diff([_six_bar_length(part, a) for a in (angle - size, angle + size)])[0]) / (2 * size)
+    except ValueError:
+        return 0.0
+
+
+def _six_bar_length(joint, angle):
+    left, right = link_headings(joint, angle)
+    d = complex(*joint.D)
+    q = d + joint.lL * np.exp(1j * left)
+    rod = q
+    if joint.kind == "B2":
+        rod = d + complex(*joint.R) * np.exp(1j * left)
+    elif joint.kind == "B3":
+        rod = q - complex(*joint.R) * np.exp(1j * right)
+    return abs(rod - complex(*joint.C))

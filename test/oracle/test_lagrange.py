@@ -1,0 +1,81 @@
+"""The model's motion against Lagrange's equations of the same rigid bodies, integrated to 1e-11: second order to a small error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import booms, lagrange, motions, segments
+
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+DURATION, SAMPLES = 0.32, 8
+
+
+def two_sections(kind, incompressible):
+    """Rigid sections 1 and 2 of the default scene, joined by `kind`; cylinders and links have mass."""
+    spec = booms.document()
+    spec["sections"] = [section | {"modes": 0} for section in spec["sections"][:2]]
+    spec["joints"] = [spec["joints"][0], next(joint for joint in spec["joints"] if joint["kind"] == kind)]
+    if incompressible:
+        for joint in spec["joints"]:
+            del joint["cylinder"]["k"], joint["cylinder"]["d"]
+    return booms.scene_of(spec)
+
+
+def three_sections():
+    """B3 after B2; massless barrel, rod and link, one undamped and one incompressible cylinder, load, inclined base."""
+    spec = booms.document()
+    spec["sections"] = [section | {"modes": 0} for section in spec["sections"][:3]]
+    spec["joints"] = [spec["joints"][i] for i in (0, 2, 3)]
+    del spec["joints"][0]["cylinder"]["d"], spec["joints"][0]["cylinder"]["barrel"], spec["joints"][1]["mR"]
+    del spec["joints"][1]["cylinder"]["k"], spec["joints"][1]["cylinder"]["d"], spec["joints"][2]["cylinder"]["rod"]
+    spec |= {"tip": {"payload": 50.0}, "line_fill": 9.0}
+    spec["base"] |= {"inclination": -0.15}
+    return booms.scene_of(spec)
+
+
+def errors(scene, angles, travel, steps):
+    """Errors (len(steps), 4) of joints, forces (relative), tip, tip acceleration, and the sizes of the last."""
+    start = segments.Segments(scene, 0).lengths(angles)
+    drive = motions.smooth_drive(start, travel, 0.3)
+    expected = lagrange.Lagrange(scene, drive).solve(np.linspace(0.0, DURATION, SAMPLES + 1), angles)
+    n = len(angles)
+    joints, forces, tip, acceleration = np.split(expected, [n, 2 * n, 2 * n + 3], axis=1)
+    table = []
+    for step in steps:
+        count = round(DURATION / step)
+        rows = motions.follow(scene, drive, angles, step, count, count // SAMPLES)
+        table.append(
+            [
+                np.abs(rows[:, :n] - joints).max(),
+                np.max(np.abs(rows[:, n : 2 * n] - forces).max(axis=0) / np.abs(forces).max(axis=0)),
+                np.abs(rows[:, 2 * n : 2 * n + 3] - tip).max(),
+                np.abs(rows[:, 2 * n + 6 :] - acceleration).max(),
+            ]
+        )
+    return np.array(table), np.abs(acceleration).max()
+
+
+def slopes(table):
+    return np.log2(table[:-1] / table[1:])
+
+
+@pytest.mark.parametrize("kind", ["B1", "B2", "B3"])
+def test_oil_springs(kind):
+    table, size = errors(two_sections(kind, False), np.array([0.6, -0.9]), [0.03, -0.02], STEPS)
+    assert np.all(np.abs(slopes(table) - 2.0) < 0.1)
+    assert np.all(table[-1] < [5e-6, 2e-4, 2e-5, 2e-4 * size])
+
+
+@pytest.mark.parametrize("kind", ["B1", "B2", "B3"])
+def test_incompressible_cylinders(kind):
+    """Kinematics are then exact at any step; forces and accelerations have the order of the integrator."""
+    table, size = errors(two_sections(kind, True), np.array([0.6, -0.9]), [0.03, -0.02], STEPS)
+    assert np.all(table[:, [0, 2]] < 1e-11)
+    assert np.all(np.abs(slopes(table[:, [1, 3]]) - 2.0) < 0.2)
+    assert np.all(table[-1, [1, 3]] < [5e-5, 5e-5 * size])
+
+
+def test_mixed_boom():
+    table, size = errors(three_sections(), np.array([0.8, -0.7, -0.5]), [0.02, -0.02, 0.03], STEPS[1:])
+    assert np.all(np.abs(slopes(table) - 2.0) < 0.2)
+    assert np.all(table[-1] < [2e-5, 2e-3, 1e-4, 1e-3 * size])

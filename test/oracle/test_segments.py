@@ -1,0 +1,119 @@
+"""Statics and natural frequencies of the model against the finite-segment energy oracle, on many booms."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from boom_twin.analysis.statics import statics
+from boom_twin.scene import load_scene
+from oracle import booms, segments
+
+REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "statics.json"
+
+
+def _angles(scene, posture):
+    return np.diff(np.radians(scene.postures[posture]), prepend=0.0)
+
+
+def _closed(scene):
+    return np.array([joint.cylinder.closed_length for joint in scene.joints])
+
+
+def _witness(scene, posture, coarse=2):
+    """Tip, joints, forces, frequencies from the oracle, at the strokes of its own geometry."""
+    angles = _angles(scene, posture)
+    drive = segments.Segments(scene, 0).lengths(angles)
+    row = segments.extrapolated(scene, drive, angles, coarse)
+    n = len(angles)
+    return drive - _closed(scene), np.split(row, [2, 2 + n, 2 + 2 * n])
+
+
+def _compare(scene, posture, sag=2e-5, frequency=None):
+    strokes, (tip, joints, forces, frequencies) = _witness(scene, posture)
+    found = statics(scene, posture=posture)
+    assert found.strokes == pytest.approx(strokes, abs=1e-12)
+    assert np.linalg.norm(found.tip - tip) < sag * np.linalg.norm(tip - found.tip_rigid)
+    assert found.joints == pytest.approx(joints, abs=2e-6)
+    assert found.cylinder_forces == pytest.approx(forces, rel=2e-5, abs=0.05)
+    for k, bound in enumerate(frequency or ()):
+        if k < len(frequencies):
+            assert found.frequencies[k] == pytest.approx(frequencies[k], rel=bound), f"mode {k + 1}"
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch"])
+def test_oracle_meets_the_reference(posture):
+    expected = json.loads(REFERENCE.read_text())[posture]
+    strokes, (tip, joints, forces, frequencies) = _witness(load_scene(), posture)
+    assert strokes == pytest.approx(expected["stroke_m"], abs=1e-9)
+    assert tip == pytest.approx(expected["tip_m"], abs=2e-6)
+    assert joints == pytest.approx(expected["joint_rad"], abs=1e-6)
+    assert forces == pytest.approx(expected["cylinder_force_N"], rel=1e-5)
+    assert frequencies == pytest.approx(expected["frequencies_Hz"], rel=2e-5)
+
+
+def test_oracle_converges_with_the_square_of_the_pieces():
+    scene, angles = load_scene(), _angles(load_scene(), "arch")
+    drive = segments.Segments(scene, 0).lengths(angles)
+    a, b, c = (segments.statics(scene, fineness, drive, angles)[:2] for fineness in (1, 2, 4))
+    assert np.log2(np.linalg.norm(a - b) / np.linalg.norm(b - c)) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch", "high", "low"])
+def test_default_scene(posture):
+    _compare(load_scene(), posture, frequency=(5e-5, 1e-4, 2e-4, 5e-4, 5e-3, 5e-3))
+
+
+VARIANTS = {
+    "payload": {"tip": {"payload": 60.0}},
+    "line_fill": {"line_fill": 12.0},
+    "uphill": {"base": {"pivot": [0.1, 0.2], "cylinder_pin": [0.55, -1.05], "inclination": 0.3}},
+    "sideways gravity": {"gravity": [3.0, -9.0]},
+    "more modes": {"modes": 6},
+    "cylinder 1 in front": {"base": {"pivot": [0.0, 0.0], "cylinder_pin": [0.9, -1.1]}},
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_variants_of_the_default_scene(name):
+    spec = booms.document() | VARIANTS[name]
+    if name == "cylinder 1 in front":
+        spec["joints"][0]["cylinder"]["closed_length"] = 0.5
+    _compare(booms.scene_of(spec), "arch", frequency=(5e-5, 1e-4, 2e-4, 5e-4, 5e-3, 5e-3))
+
+
+@pytest.mark.parametrize("pin", [[0.3, -0.12], [1.4, -0.25], [3.2, -0.2]])
+def test_rod_pin_inboard_and_outboard_of_other_pins(pin):
+    """On the root, on the beam inboard of C, on the beam outboard of C."""
+    spec = booms.document()
+    spec["sections"][0]["rod_pin"] = pin
+    spec["base"]["cylinder_pin"] = [1.2, -1.0]
+    spec["joints"][0]["cylinder"]["closed_length"] = 0.2
+    spec["joints"][0]["cylinder"]["max_stroke"] = 5.0
+    _compare(booms.scene_of(spec), "arch", frequency=(5e-5, 1e-4, 2e-4, 5e-4, 5e-3, 5e-3))
+
+
+STATICS_SEEDS = [0, 3, 5, 6, 7, 8, 9, 11, 13, 14, 16, 18, 22, 26, 27, 28, 34]
+
+
+@pytest.mark.parametrize("seed", STATICS_SEEDS)
+def test_random_booms(seed):
+    """1 to 5 sections, any order of joints, pins on root, beam and head, parts rigid, massless or incompressible.
+
+    With eight shapes a part the frequencies have only the single axial shape's error left.
+    """
+    scene = booms.random_boom(seed).model_copy(update={"modes": 8})
+    _compare(scene, "test", sag=3e-5, frequency=(1e-4, 1e-4))
+
+
+def test_random_booms_cover_what_they_promise():
+    scenes = [booms.random_boom(seed) for seed in STATICS_SEEDS]
+    joints = [joint for scene in scenes for joint in scene.joints]
+    sections = [section for scene in scenes for section in scene.sections]
+    assert {len(scene.sections) for scene in scenes} == {1, 2, 3, 4, 5}
+    assert {joint.kind for joint in joints} == {"A", "B1", "B2", "B3"}
+    assert any(joint.cylinder.k is None for joint in joints) and any(joint.mL is None for joint in joints[1:])
+    assert any(section.beam is None for section in sections) and any(section.modes == 0 for section in sections)
+    assert any(section.root is None for section in sections) and any(section.rho_I is None for section in sections)

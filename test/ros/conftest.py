@@ -1,0 +1,119 @@
+"""Nodes in processes of their own, in a ROS domain of this test run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.io.session import write_session
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+
+PATIENCE = 240.0  # s; the first node compiles
+SECONDS, RATE = 4.0, 200.0
+
+
+class Process:
+    """A child whose output is kept."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self._log = log
+        self._file = log.open("w")
+        self._child = subprocess.Popen([sys.executable, "-m", *arguments], stdout=self._file, stderr=subprocess.STDOUT)
+
+    def said(self) -> str:
+        return self._log.read_text()
+
+    def wait_for(self, text: str) -> None:
+        """Until it has said so."""
+        end = time.monotonic() + PATIENCE
+        while text not in self.said():
+            assert self._child.poll() is None and time.monotonic() < end, f"no {text!r} in:\n{self.said()}"
+            time.sleep(0.05)
+
+    def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """Exit code after a signal."""
+        self._child.send_signal(number)
+        return self.end(10.0)
+
+    def end(self, patience: float = PATIENCE) -> int:
+        return self._child.wait(patience)
+
+    def close(self) -> None:
+        self._child.kill()
+        self._child.wait()
+        self._file.close()
+
+
+@pytest.fixture(scope="module")
+def domain(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A domain that only this module of this run uses, confined to this machine; rclpy is started in it."""
+    import rclpy
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(1 + (os.getpid() + 17 * len(request.module.__name__)) % 101))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        rclpy.init(args=[])
+        yield
+        rclpy.shutdown()
+
+
+@pytest.fixture(scope="module")
+def spawn(domain: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Process]]:
+    """Starts ``python -m ARGUMENTS``; all are ended with the module."""
+    children: list[Process] = []
+
+    def start(*arguments: str) -> Process:
+        children.append(Process(tmp_path_factory.mktemp("process") / "log", *arguments))
+        return children[-1]
+
+    yield start
+    for child in children:
+        child.close()
+
+
+@pytest.fixture(scope="module")
+def spawn_node(spawn: Callable[..., Process]) -> Callable[..., Process]:
+    """Starts the node with ROS arguments."""
+
+    def start(*arguments: str) -> Process:
+        return spawn("boom_twin.ros.main", *(["--ros-args", *arguments] if arguments else []))
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def motion() -> dict[str, Any]:
+    """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""
+    scene, random = load_scene(), np.random.default_rng(3)
+    time_s = np.arange(int(SECONDS * RATE)) / RATE
+    stamps = (
+        1_700_000_000_000_000_000 + (time_s * 1e9).astype(np.int64) + random.integers(-150_000, 150_000, len(time_s))
+    )
+    strokes = np.tile(strokes_of_posture(scene, "arch"), (len(time_s), 1))
+    strokes[:, 0] += 0.02 * (1.0 - np.cos(1.5 * time_s))
+    strokes[:, 2] += 0.01 * (1.0 - np.cos(2.0 * time_s))
+    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
+    return {
+        "stamps_ns": stamps,
+        "strokes": strokes + random.normal(0.0, 2e-5, strokes.shape),
+        "joints": joints + random.normal(0.0, 1.7e-4, joints.shape),
+        "imu": random.normal((0.0, 9.81), 0.05, (len(time_s), 2)),
+    }
+
+
+@pytest.fixture(scope="session")
+def bag(motion: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The motion as a session."""
+    path = tmp_path_factory.mktemp("session") / "bag"
+    write_session(path, **motion, description={"origin": "synthetic, made for a test"})
+    return path

@@ -1,0 +1,117 @@
+"""The live node against the same three calls in this process, on what it accepted."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.intake import Intake, stamp_of
+from boom_twin.io.outlet import Outlet
+from boom_twin.io.reader import read, scan
+from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.io.typestore import jazzy
+from boom_twin.records import Stream
+from boom_twin.scene import load_scene
+from boom_twin.settings import load_settings
+from boom_twin.twin import Twin
+
+PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
+SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES]
+Recorded = dict[str, list[tuple[int, bytes]]]
+
+
+@pytest.fixture(scope="module")
+def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> Path:
+    """Inputs and outputs of a live run, recorded over DDS in a third process."""
+    from boom_twin.ros.player import Player
+
+    out = tmp_path_factory.mktemp("live") / "bag"
+    node = spawn_node("--params-file", str(PARAMETERS))
+    node.wait_for("active;")
+    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out))
+    recorder.wait_for("recording")
+    player = Player(scan(bag))
+    assert player.wait(60.0, listeners=2) == []
+    time.sleep(1.0)  # for the recorder to be known to the node
+    sent = sum(1 for _ in player.play())
+    time.sleep(1.0)
+    player.close()
+    assert sent == scan(bag).topics[0].count * 3
+    assert recorder.stop(signal.SIGINT) == 0, recorder.said()
+    assert node.stop(signal.SIGINT) == 0, node.said()
+    return out
+
+
+@pytest.fixture(scope="module")
+def outputs(recorded: Path) -> dict[Output, list[tuple[int, bytes]]]:
+    """Stamp and CDR of every output as the node published it, in the order of arrival."""
+    topics, session = load_topics().outputs, scan(recorded)
+    return {
+        key: _encoded(session, topics[key].absolute, TYPES[key]) for key in [*SINGLE, Output.RESIDUALS, Output.SHAPE]
+    }
+
+
+def _encoded(session: Any, name: str, type_name: str) -> list[tuple[int, bytes]]:
+    return [
+        (_stamp(msg), bytes(jazzy().serialize_cdr(msg, type_name))) for _, _, msg in read(session, {name: type_name})
+    ]
+
+
+def _stamp(msg: Any) -> int:
+    return stamp_of(msg.markers[0] if hasattr(msg, "markers") else msg)
+
+
+@pytest.fixture(scope="module")
+def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> dict[Output, list[tuple[int, bytes]]]:
+    """What intake, twin and outlet make here of the strokes that the node answered, and of all other samples."""
+    answered = {stamp for stamp, _ in outputs[Output.TIP_POSITION]}
+    inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
+    twin = Twin(load_scene(), load_settings(PARAMETERS))
+    intake, outlet = Intake(twin.plan.joints), Outlet(RosbagsTypes())
+    made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
+    for name, _, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):
+        stream, stamp = inputs[name], stamp_of(msg)
+        if stream is Stream.STROKES and stamp not in answered:
+            continue
+        sample = intake.put(stream, stamp, msg)
+        assert sample is not None
+        for key, filled in outlet.fill(twin.update(sample)):
+            made[key].append((_stamp(filled), bytes(jazzy().serialize_cdr(filled, TYPES[key]))))
+    return made
+
+
+@pytest.mark.parametrize("key", SINGLE)
+def test_nearly_every_stroke_is_answered_and_none_twice(outputs: Any, motion: dict[str, Any], key: Output) -> None:
+    stamps = [stamp for stamp, _ in outputs[key]]
+    assert len(stamps) == len(set(stamps))
+    assert set(stamps) <= set(motion["stamps_ns"].tolist())
+    assert len(stamps) > 0.99 * len(motion["stamps_ns"])
+
+
+@pytest.mark.parametrize("key", [*SINGLE, Output.SHAPE])
+def test_predictions_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: Any, key: Output) -> None:
+    assert len(outputs[key]) > 0
+    assert outputs[key] == expected[key]
+
+
+def test_residuals_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: Any, motion: dict[str, Any]) -> None:
+    live, here = set(outputs[Output.RESIDUALS]), set(expected[Output.RESIDUALS])
+    assert len(live) == len(outputs[Output.RESIDUALS]) > 0.98 * 2 * len(motion["stamps_ns"])
+    assert live <= here
+
+
+def test_the_node_read_its_parameter_file(recorded: Path, outputs: Any) -> None:
+    """The deviation of an IMU residual is at least the noise that the file states."""
+    decode = jazzy().deserialize_cdr
+    residuals = [decode(data, TYPES[Output.RESIDUALS]) for _, data in outputs[Output.RESIDUALS]]
+    deviations = np.array([msg.effort[0] for msg in residuals if msg.name[0] == "tip_imu_x"])
+    assert deviations.min() >= load_settings(PARAMETERS).imu_sigma

@@ -1,0 +1,144 @@
+"""Pictures of a replay: written, of the right size, not blank, the same for the same arrays, and robust."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.records import Array
+from boom_twin.view import History, ImuTrace, Truth, replay_pictures
+from boom_twin.view.posture import spread
+from boom_twin.view.residuals import running_mean
+from boom_twin.view.spectrum import density
+from boom_twin.view.style import broken, limits
+from boom_twin.view.tip import liveliest, rms_difference
+
+ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
+
+
+def pixels(path: Path) -> Array:
+    from matplotlib.image import imread
+
+    return np.asarray(imread(path)[:, :, :3], dtype=float)
+
+
+def history(joints: int, seconds: float = 12.0, imu: bool = True) -> History:
+    """A boom that nods at 1 Hz, with a jolt at two thirds."""
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, seconds, 0.005)
+    swing = np.sin(2.0 * np.pi * t) * np.exp(-0.2 * np.abs(t - 0.66 * seconds))
+    wave = np.stack([0.3 * swing, swing], axis=1)
+    heading = 0.5 + 0.1 * swing[:, None] * np.arange(1, joints + 1)
+    steps = 3.0 * np.stack([np.cos(heading), np.sin(heading)], axis=2)
+    lines = np.concatenate([np.zeros((len(t), 1, 2)), np.cumsum(steps, axis=1)], axis=1)
+    names = tuple(f"joint_{i + 1}" for i in range(joints)) + (("tip_imu_x", "tip_imu_z") if imu else ())
+    sigmas = np.tile(np.where([name.startswith("joint") for name in names], 2e-4, 0.05), (len(t), 1))
+    felt = 40.0 * wave + np.array([-9.0, 2.0])
+    return History(
+        stamps_s=t, tip_displacement=0.05 * wave - 0.1, tip_position=lines[:, -1], tip_acceleration=40.0 * 0.05 * wave,
+        joints=heading, cylinder_forces=1e4 * heading, strokes=0.1 * heading, residual_stamps_s=t, residual_names=names,
+        residual_values=sigmas * rng.standard_normal(sigmas.shape), residual_sigmas=sigmas,
+        imu=ImuTrace(t, felt + 0.05 * rng.standard_normal(felt.shape), felt) if imu else None,
+        shapes=[(float(t[k]), lines[k]) for k in range(0, len(t), 50)],
+    )  # fmt: skip
+
+
+def assert_drawn(path: Path) -> None:
+    image = pixels(path)
+    assert image.shape[1] == 1600 and 900 <= image.shape[0] <= 1300
+    assert image.std() > 0.05
+    dark = (image.min(axis=2) < 0.8).mean(axis=1)
+    assert all(part.max() > 0.01 for part in np.array_split(dark, 4)), "a quarter of the picture is empty"
+
+
+@pytest.mark.parametrize("joints", [1, 5])
+@pytest.mark.parametrize("imu", [True, False])
+def test_all_pictures_are_drawn(tmp_path: Path, joints: int, imu: bool) -> None:
+    paths = replay_pictures(tmp_path / "new", history(joints, imu=imu), session="test")
+    assert [path.name for path in paths] == ALL
+    for path in paths:
+        assert_drawn(path)
+
+
+def test_same_arrays_give_same_bytes(tmp_path: Path) -> None:
+    first, second = (replay_pictures(tmp_path / name, history(2), session="test") for name in "ab")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+
+
+def test_nan_and_gaps_are_survived_and_shown(tmp_path: Path) -> None:
+    whole = history(2)
+    t, values = whole.stamps_s, whole.residual_values.copy()
+    kept = (t < 3.0) | (t > 5.0)
+    values[::2, :2] = np.nan
+    values[:, 2] = np.nan
+    felt = whole.tip_acceleration.copy()
+    felt[100:120] = np.nan
+    holed = replace(whole, tip_acceleration=felt, residual_values=values)
+    names = ("stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes")
+    holed = replace(holed, **{name: getattr(holed, name)[kept] for name in names})
+    for gaps in ([], [(3.0, 5.0)]):
+        paths = replay_pictures(tmp_path / f"{len(gaps)}", replace(holed, gaps=gaps), session="test")
+        for path in paths:
+            assert_drawn(path)
+    for name in ("tip.png", "residuals.png"):
+        assert (tmp_path / "0" / name).read_bytes() != (tmp_path / "1" / name).read_bytes(), "the gap is not shown"
+
+
+def test_truth_and_note_are_drawn(tmp_path: Path) -> None:
+    told = history(2)
+    truth = Truth(told.stamps_s, told.tip_position + 0.01, told.tip_acceleration + 0.3)
+    plain, noted, true = (
+        pixels(replay_pictures(tmp_path / name, told, given, session="test", note=note)[0])
+        for name, given, note in (("a", None, ""), ("b", None, "synthetic session of a virtual rig"), ("c", truth, ""))
+    )
+    assert (noted != plain)[:60].any() and not (noted != plain)[60:].any()
+    assert (true != plain)[60:].any()
+
+
+def test_short_session_has_no_spectrum(tmp_path: Path) -> None:
+    assert [path.name for path in replay_pictures(tmp_path, history(1, seconds=0.1))] == ALL[:3]
+
+
+def test_one_sample_and_none(tmp_path: Path) -> None:
+    one = history(1, seconds=0.004)
+    assert [path.name for path in replay_pictures(tmp_path, one)] == ALL[:3]
+    none = replace(one, stamps_s=np.zeros(0), tip_displacement=np.zeros((0, 2)), tip_acceleration=np.zeros((0, 2)))
+    assert replay_pictures(tmp_path / "none", none) == []
+
+
+def test_nothing_but_strokes(tmp_path: Path) -> None:
+    told = history(2, imu=False)
+    bare = replace(told, residual_names=(), residual_values=np.zeros((0, 0)), residual_sigmas=np.zeros((0, 0)), shapes=[])
+    assert [path.name for path in replay_pictures(tmp_path, bare)] == ["tip.png", "spectrum.png"]
+
+
+def test_window_holds_the_largest_acceleration() -> None:
+    t = np.arange(0.0, 60.0, 0.005)
+    for peak in (0.1, 30.0, 59.9):
+        start, stop = liveliest(t, np.stack([np.exp(-((t - peak) ** 2)), np.zeros_like(t)], axis=1))
+        assert 0.0 <= start <= peak <= stop <= t[-1] + 1e-9
+        assert stop - start == pytest.approx(6.0, abs=0.01)
+
+
+def test_numbers_behind_the_pictures() -> None:
+    t = np.arange(0.0, 20.0, 0.005)
+    told = history(1, seconds=20.0)
+    assert rms_difference(told, told.tip_position, t, told.tip_position + np.array([0.03, 0.04])) == pytest.approx(0.05)
+    assert running_mean(t, t)[100:-100] == pytest.approx(t[100:-100], abs=1e-9)
+    frequencies, power = density(t, 3.0 * np.sin(2.0 * np.pi * 5.0 * t))
+    assert frequencies[np.argmax(power)] == pytest.approx(5.0, abs=0.13)
+    assert np.sum(power) * frequencies[0] == pytest.approx(4.5, rel=0.02)
+    assert spread(100, 5) == [0, 25, 50, 74, 99] and spread(2, 5) == [0, 1] and spread(0, 5) == []
+    stamps, values = broken(np.array([0.0, 1.0, 4.0]), np.ones((3, 2)), [(1.0, 4.0)])
+    assert stamps.tolist() == [0.0, 1.0, 2.5, 4.0] and np.isnan(values[2]).all() and np.isfinite(values[[0, 1, 3]]).all()
+    assert limits(np.array([np.nan, -1.0, 3.0]), around=0.0, share=0.0) == (-3.0, 3.0)
+
+
+def test_plotting_library_is_not_imported_before_a_picture_is_drawn() -> None:
+    code = "import sys, boom_twin.view, boom_twin.view.boom; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
