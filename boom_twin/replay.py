@@ -1,4 +1,7 @@
-"""Run the twin over a recorded session: the node's three calls in a loop over a bag."""
+"""Run the twin over a recorded session: the node's three calls for every message of a bag.
+
+The first and the last of them run in processes of their own (`boom_twin.io.ahead`, `boom_twin.io.behind`).
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,13 +19,12 @@ from typing import Any
 import numpy as np
 
 from .errors import BagError
-from .io.factory import RosbagsTypes
-from .io.intake import Intake, stamp_of
-from .io.outlet import Outlet
-from .io.reader import Session, read, scan
-from .io.topics import TYPES, Output, load_topics
-from .io.writer import FILE_NAME, SessionWriter
-from .records import Array, Prediction, Report, Residuals, Stream
+from .io.ahead import Ahead
+from .io.behind import Behind
+from .io.reader import Session, scan
+from .io.topics import load_topics
+from .io.writer import FILE_NAME
+from .records import Array, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .truth import TipTruth, load_truth
@@ -91,18 +94,23 @@ def replay(
     """
     session, out = scan(Path(bag)), Path(out)
     wanted = _wanted(session)
-    twin = Twin(scene, settings)
-    twin.warm_up()
     _clear(out)
-    recording = Recording()
-    began = time.perf_counter()
-    messages = read(session, {name: TYPES[stream] for name, stream in wanted.items()})
-    if progress is not None:
-        total = sum(topic.count for name in wanted if (topic := session.find(name)) is not None)
-        messages = progress(messages, total)
-    with _unhurried_collector(), SessionWriter(out / "bag", _outputs(), session.notes) as writer:
-        _feed(messages, wanted, twin, writer, recording)
-    wall = time.perf_counter() - began
+    twin, recording = Twin(scene, settings), Recording()
+    with _unhurried_collector(), _ends(session, wanted, twin, out / "bag") as (ahead, behind):
+        samples: Iterator[Sample | None] = iter(ahead)
+        if progress is not None:
+            samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
+        began = time.perf_counter()
+        for sample in samples:
+            if sample is None:
+                recording.refused += 1
+                continue
+            report = twin.update(sample)
+            recording.add(report)
+            behind.put(report)
+        behind.close()
+        wall = time.perf_counter() - began
+    twin.counts.update(ahead.oddities)
     if not recording.predictions:
         raise BagError(
             f"{session.path}: no stroke sample could be used ({_told(twin)}). "
@@ -127,10 +135,6 @@ def _wanted(session: Session) -> dict[str, Stream]:
     return wanted
 
 
-def _outputs() -> dict[str, Any]:
-    return {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
-
-
 def _clear(out: Path) -> None:
     """Make room for the results; only a bag that a replay wrote is removed."""
     try:
@@ -141,35 +145,32 @@ def _clear(out: Path) -> None:
         shutil.rmtree(out / "bag")
 
 
-class _unhurried_collector:
-    """Keep what was made before out of the garbage collector's sight: a replay makes many small lasting objects."""
+@contextmanager
+def _ends(session: Session, wanted: dict[str, Stream], twin: Twin, bag: Path) -> Iterator[tuple[Ahead, Behind]]:
+    """The processes that read and write, and the compiled model between them, all ready."""
+    ahead = Ahead(session.path, wanted, twin.plan.joints)
+    behind = Behind(bag, session.notes)
+    try:
+        twin.warm_up()
+        ahead.wait_ready()
+        behind.wait_ready()
+        yield ahead, behind
+    finally:
+        ahead.stop()
+        behind.stop()
 
-    def __enter__(self) -> None:
-        gc.collect()
-        gc.freeze()
-        gc.disable()
 
-    def __exit__(self, *_: object) -> None:
+@contextmanager
+def _unhurried_collector() -> Iterator[None]:
+    """Keep the garbage collector away: a replay makes many small objects that last."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
         gc.enable()
         gc.unfreeze()
-
-
-def _feed(
-    messages: Iterator[Any], wanted: dict[str, Stream], twin: Twin, writer: SessionWriter, recording: Recording
-) -> None:
-    """The node's callback, for every message of the session."""
-    intake, outlet = Intake(twin.plan.joints), Outlet(RosbagsTypes())
-    for name, _, message in messages:
-        stamp = stamp_of(message)
-        sample = intake.put(wanted[name], stamp, message)
-        if sample is None:
-            recording.refused += 1
-            continue
-        report = twin.update(sample)
-        recording.add(report)
-        for key, filled in outlet.fill(report):
-            writer.write(key, stamp, filled)
-    twin.counts.update(intake.oddities)
 
 
 def _told(twin: Twin) -> str:

@@ -28,7 +28,7 @@ Range = tuple[float, float]
 
 @contextmanager
 def sheet(path: Path, title: str, panels: list[tuple[Range, Range]], height: float) -> Iterator[list[Any]]:
-    """Equal axes without ticks side by side, for the ranges (m) of x and y in `panels`; all `height` hundreds of pixels high."""
+    """Equal axes side by side, for the ranges (m) of x and y in `panels`, all `height` hundreds of pixels high."""
     widths = [height * (x[1] - x[0]) / (y[1] - y[0]) for x, y in panels]
     with picture(path, title, SURROGATE, (sum(widths) + 0.3, height + 0.75)) as figure:
         found = np.ravel(figure.subplots(1, len(panels), squeeze=False, gridspec_kw={"width_ratios": widths}))
@@ -157,7 +157,7 @@ def _whole(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
 def _links(axes: Any, joint: JointPins, phi: float) -> None:
     """Pins D, E, Q and the lengths of the links."""
     assert joint.d is not None and joint.e is not None and joint.q is not None
-    x, y = joint.pivot
+    y = joint.pivot[1]
     frame(axes, joint.pivot, 0.0, 0.3, ("x", ""), BLUE)
     frame(axes, joint.pivot, phi, 0.3, ("x'", "y'"), INK)
     across = np.array([-np.sin(phi), np.cos(phi)])

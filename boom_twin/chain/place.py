@@ -46,38 +46,41 @@ def place(t, state, work):
     z, frames, position = state.z, state.frames, work.position
     for i in range(z.shape[0]):
         position[i] = z[i]
-    x, y, theta = 0.0, 0.0, 0.0
+    x, y, theta, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
     for k in range(t.operations.shape[0]):
         kind, row = t.operations[k].kind, t.operations[k].row
-        frames[k, 0], frames[k, 1], frames[k, 2] = x, y, theta
+        frames[k, 0], frames[k, 1], frames[k, 2], frames[k, 3], frames[k, 4] = x, y, theta, c, s
         if kind == BEAM:
-            beam = t.beams[row]
-            end = beam_shape(beam, t.psi[row], t.weights[row], z, work.rho[row], work.drho[row], work.turn[row])
-            place_beam(beam, t.psi[row], work.rho[row], z, x, y, theta, position)
-            bx, by = turned_by(theta, work.rho[row, beam.points, 0], work.rho[row, beam.points, 1])
-            x, y, theta = x + bx, y + by, theta + end
+            beam, rho = t.beams[row], work.rho[row]
+            end = beam_shape(beam, t.psi[row], t.weights[row], z, rho, work.drho[row], work.turn[row])
+            place_beam(beam, t.psi[row], rho, z, x, y, theta, c, s, position)
+            bx, by = rho[beam.points, 0], rho[beam.points, 1]
+            x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
+            c, s = math.cos(theta), math.sin(theta)
         elif kind == BODY:
             body = t.bodies[row]
-            bx, by = turned_by(theta, body.x, body.y)
-            position[body.history], position[body.history + 1], position[body.history + 2] = x + bx, y + by, theta
+            at = body.history
+            position[at], position[at + 1] = x + c * body.x - s * body.y, y + s * body.x + c * body.y
+            position[at + 2] = theta
         elif kind == OFFSET:
-            bx, by = turned_by(theta, t.offsets[row].x, t.offsets[row].y)
-            x, y = x + bx, y + by
+            bx, by = t.offsets[row].x, t.offsets[row].y
+            x, y = x + c * bx - s * by, y + s * bx + c * by
         elif kind == STATION:
             outlet = t.outlets[row]
-            bx, by = turned_by(theta, outlet.x, outlet.y)
-            state.pins[outlet.cylinder, 0], state.pins[outlet.cylinder, 1] = x + bx, y + by
+            pins = state.pins[outlet.cylinder]
+            pins[0], pins[1] = x + c * outlet.x - s * outlet.y, y + s * outlet.x + c * outlet.y
         elif kind == ROD_PIN:
             outlet = t.outlets[row]
-            bx, by = turned_by(theta, outlet.x, outlet.y)
             pins = state.pins[outlet.cylinder]
-            pins[2], pins[3] = x + bx, y + by
+            pins[2], pins[3] = x + c * outlet.x - s * outlet.y, y + s * outlet.x + c * outlet.y
             place_cylinder(t.cylinders[0], t.parts, pins[0], pins[1], pins[2], pins[3], position)
         elif kind == JOINT_B:
             place_linkage(t, state, work, row, x, y, theta)
             theta = z[t.joints[row].z]
+            c, s = math.cos(theta), math.sin(theta)
         elif kind == JOINT_A:
             x, y, theta = t.joints[row].x, t.joints[row].y, z[t.joints[row].z]
+            c, s = math.cos(theta), math.sin(theta)
     last = t.operations.shape[0]
-    frames[last, 0], frames[last, 1], frames[last, 2] = x, y, theta
+    frames[last, 0], frames[last, 1], frames[last, 2], frames[last, 3], frames[last, 4] = x, y, theta, c, s
     position[t.tip], position[t.tip + 1], position[t.tip + 2] = x, y, theta

@@ -86,7 +86,7 @@ class State(NamedTuple):
 
     z : (unknowns,) coordinates and forces, see the tables.
     history : (histories, 4) x, v, a, p of every unknown and then of every mass point; see `physics.integrators`.
-    frames : (operations + 1, 3) x, y, theta before every operation, and at the tip.
+    frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
     pins : (cylinders, 4) pins C and R of every cylinder, m.
     """
 
@@ -107,7 +107,9 @@ class Work(NamedTuple):
     g: Array  # (size,)
     h: Array  # (size, size)
     right: Array  # (6, 6)
-    gains: Array  # (operations, rows, 7): increments of the condensed unknowns by those of the cut; constants last
+    gains: Array  # (operations, rows, 6): decrements of the condensed unknowns by increments of the cut ..
+    free: Array  # (operations, rows): .. and those that do not depend on it
+    block: Array  # (rows, rows): H_qq of a beam part
     blocks: Array  # (cylinders, 6, 6) what a joint condenses, kept for counting natural frequencies
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)

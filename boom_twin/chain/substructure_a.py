@@ -9,12 +9,11 @@ from __future__ import annotations
 from ..physics.algebra import solve
 from ..physics.cylinder import cylinder_terms
 from ..physics.jit import kernel
-from ..physics.rigid import turned_by
 
 
 @kernel
-def join_rod(t, state, work, motion, drive, drive_rate, row, theta, m):
-    """Add cylinder 1 at outlet `row` of a frame turned by `theta`; the cut gains the column N. Returns m + 1."""
+def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
+    """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); the cut gains the column N. Returns m + 1."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
     g, h = work.g, work.h
@@ -22,7 +21,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, theta, m):
         cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[0], drive_rate[0],
         motion, t.gravity, work.position, g, h,
     )  # fmt: skip
-    bx, by = turned_by(theta, outlet.x, outlet.y)
+    bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
     for i in range(m + 1):
         s[m, i] = 0.0
         s[i, m] = 0.0
@@ -48,7 +47,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, theta, m):
 
 
 @kernel
-def close_base(t, work, operation):
+def close_base(work, operation):
     """Solve increments of theta and N of joint A into the gains of `operation`; False if singular."""
     s, p, a, b = work.s, work.p, work.h, work.right
     for i in range(2):
@@ -58,6 +57,6 @@ def close_base(t, work, operation):
             work.blocks[0, i, j] = a[i, j]
     if not solve(a, b, 2, 1):
         return False
-    work.gains[operation, 0, 6] = b[0, 0]
-    work.gains[operation, 1, 6] = b[1, 0]
+    work.free[operation, 0] = b[0, 0]
+    work.free[operation, 1] = b[1, 0]
     return True

@@ -154,7 +154,7 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, head
 def _condense_loop(work, index, operation):
     """Solve the six inner unknowns for the five outer ones; gains and block are kept, the cut is rewritten."""
     s, p, g, h, right = work.s, work.p, work.g, work.h, work.right
-    block, gains, inner = work.blocks[index], work.gains[operation], SIZE - 5
+    block, gains, free, inner = work.blocks[index], work.gains[operation], work.free[operation], SIZE - 5
     matrix = h[:inner, SIZE : SIZE + inner]
     for i in range(inner):
         right[i, 5] = g[5 + i]
@@ -181,5 +181,5 @@ def _condense_loop(work, index, operation):
     for i in range(inner):
         for j in range(5):
             gains[i, j] = right[i, j]
-        gains[i, 6] = right[i, 5]
+        free[i] = right[i, 5]
     return True

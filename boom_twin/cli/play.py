@@ -39,9 +39,7 @@ def run(args: Namespace) -> int:
         lonely = player.wait(args.wait)
         if lonely and args.wait > 0.0:
             _complain(lonely, len(player.topics), args.wait)
-        total = (session.end - session.start) * 1e-9 - args.start
-        total = total if args.duration is None else min(args.duration, total)
-        with tqdm(total=round(total, 1), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
+        with tqdm(total=player.length(args.start, args.duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in player.play(args.rate, args.start, args.duration):
                 bar.update(elapsed * 1e-9 - bar.n)
         played = player.played

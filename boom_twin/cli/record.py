@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--only", choices=["inputs", "outputs"], help="what goes into the twin, or what it publishes (both)"
     )
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (on Ctrl-C)")
-    parser.add_argument("--note", default="", metavar="TEXT", help="kept in the bag, such as where it was recorded")
+    parser.add_argument("--origin", metavar="TEXT", help="kept in the bag: where this comes from")
 
 
 def run(args: Namespace) -> int:
@@ -37,7 +37,7 @@ def run(args: Namespace) -> int:
         counts = record(
             args.out,
             topics,
-            {"note": args.note} if args.note else {},
+            {"origin": args.origin} if args.origin else {},
             stopped=lambda: bool(signals) or time.monotonic() >= end,
             started=lambda: print(f"recording {len(topics)} topics into {args.out}; Ctrl-C ends it", file=sys.stderr),
         )

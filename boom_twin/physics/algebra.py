@@ -8,15 +8,15 @@ SMALLEST_PIVOT = 1e-300
 
 
 @kernel
-def condense(h, g, m, n):
-    """Eliminate the last n of m + n unknowns of a symmetric system by L D L^T without pivoting.
+def condense(s, p, coupling, block, force, m, n):
+    """Eliminate n unknowns z from a symmetric system by L D L^T without pivoting.
 
     Parameters
     ----------
-    h : ndarray, shape (>= m + n, >= m + n)
-        Symmetric; the leading m rows and columns hold the condensed matrix afterwards, rows m.. the gains H_zz^-1 H_ze.
-    g : ndarray, shape (>= m + n,)
-        Likewise; g[m:] holds H_zz^-1 g_z afterwards.
+    s, p : ndarray, shapes (>= m, >= m), (>= m,)
+        What remains: H_ee, g_e; condensed in place.
+    coupling, block, force : ndarray, shapes (>= n, >= m), (>= n, >= n), (>= n,)
+        H_ze, H_zz (lower triangle), g_z; coupling and force hold the gains H_zz^-1 H_ze, H_zz^-1 g_z afterwards.
     m, n : int
 
     Returns
@@ -25,29 +25,39 @@ def condense(h, g, m, n):
         Number of negative pivots; -1 if a pivot vanished.
     """
     negative = 0
-    for k in range(m + n - 1, m - 1, -1):
-        pivot = h[k, k]
+    for k in range(n - 1, -1, -1):
+        pivot = block[k, k]
         if not abs(pivot) > SMALLEST_PIVOT:
             return -1
         if pivot < 0.0:
             negative += 1
+        inverse = 1.0 / pivot
         for j in range(k):
-            factor = h[k, j] / pivot
+            factor = block[k, j] * inverse
             for i in range(j + 1):
-                h[j, i] -= factor * h[k, i]
-            g[j] -= factor * g[k]
-        for j in range(k):
-            h[k, j] /= pivot
-        g[k] /= pivot
-    for k in range(m, m + n):
-        for j in range(m, k):
-            factor = h[k, j]
+                block[j, i] -= factor * block[k, i]
             for i in range(m):
-                h[k, i] -= factor * h[j, i]
-            g[k] -= factor * g[j]
+                coupling[j, i] -= factor * coupling[k, i]
+            force[j] -= factor * force[k]
+        for j in range(m):
+            factor = coupling[k, j] * inverse
+            for i in range(j + 1):
+                s[j, i] -= factor * coupling[k, i]
+            p[j] -= factor * force[k]
+        for j in range(k):
+            block[k, j] *= inverse
+        for j in range(m):
+            coupling[k, j] *= inverse
+        force[k] *= inverse
+    for k in range(n):
+        for j in range(k):
+            factor = block[k, j]
+            for i in range(m):
+                coupling[k, i] -= factor * coupling[j, i]
+            force[k] -= factor * force[j]
     for j in range(m):
         for i in range(j):
-            h[i, j] = h[j, i]
+            s[i, j] = s[j, i]
     return negative
 
 

@@ -72,9 +72,8 @@ def beam_shape(row, psi, weights, z, rho, drho, turn):
 
 
 @kernel
-def place_beam(row, psi, rho, z, x, y, theta, position):
+def place_beam(row, psi, rho, z, x, y, theta, c, s, position):
     """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
-    c, s = math.cos(theta), math.sin(theta)
     for i in range(row.points):
         at = row.history + 2 * i
         position[at] = x + c * rho[i, 0] - s * rho[i, 1]
@@ -87,107 +86,111 @@ def place_beam(row, psi, rho, z, x, y, theta, position):
 
 
 @kernel
-def transfer_beam(row, tables, scratch, z, theta, motion, gravity, position, s, p, m, g, h):
+def transfer_beam(row, tables, scratch, z, c, sn, motion, gravity, position, s, p, m, gains, force):
     """Carry a cut (s, p) with m slots from the output to the input end, condensing q.
 
     tables : psi, weights, stiffness (n, n), mass (P,), rotary (P,) of this part.
-    scratch : rho, drho, turn as `beam_shape` left them, and `local` (P, 2) for forces.
-    g, h : work; afterwards rows m.. of both hold the gains of q (see `condense`).
+    scratch : rho, drho, turn as `beam_shape` left them, `local` (P, 2) for forces, `block` for H_qq.
+    c, sn : cos and sin of the input end's orientation.
+    gains, force : (>= n + axial, m), (>= n + axial,); the gains of q afterwards (see `condense`).
 
     Returns the number of negative pivots, or -1.
     """
     psi, weights, stiffness, mass, rotary = tables
-    rho, drho, turn, local = scratch
-    c, sn = math.cos(theta), math.sin(theta)
-    n, points = row.bending, row.points
+    rho, drho, turn, local, block = scratch
+    n = row.bending
     size = n + row.axial
-    fx_end, fy_end = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # in the axes of the input end
-    _pull_back_end(psi[points], rho[points], drho[points], n, size, c, sn, s, p, m, g, h)
-    for a in range(size):  # second derivatives of the end, turning against bending
-        h[m + a, 2] += fy_end * drho[points, a, 0] - fx_end * drho[points, a, 1]
-    _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, g, h, m)
-    _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, 1.0 if size == n else 1.0 + z[row.z + n], h, m)
-    _add_stiffness(row, stiffness, z, motion, g, h, m)
-    negative = condense(h, g, m, size)
-    for i in range(m):
-        p[i] = g[i]
-        for j in range(m):
-            s[i, j] = h[i, j]
-    return negative
+    fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
+    _pull_back_end(psi[row.points], rho[row.points], drho[row.points], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
+    _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, gains, block, force)
+    _add_bending_of_forces(row, psi, weights, turn, local, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n], block)
+    _add_stiffness(row, stiffness, z, motion, block, force)
+    return condense(s, p, gains, block, force, m, size)
 
 
 @kernel
-def _pull_back_end(psi, rho, drho, n, size, c, sn, s, p, m, g, h):
-    """Pull (s, p) at the output end back to (e_I, carried slots, q) in g, h (lower triangle)."""
+def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, block, force):
+    """Pull (s, p) at the output end back to (e_I, carried slots) in place and to q in coupling, block, force."""
     ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
     for a in range(size):
-        bx, by = c * drho[a, 0] - sn * drho[a, 1], sn * drho[a, 0] + c * drho[a, 1]
+        ax, ay = drho[a, 0], drho[a, 1]
+        bx, by = c * ax - sn * ay, sn * ax + c * ay
         turn = psi[a] if a < n else 0.0
-        g[m + a] = bx * p[0] + by * p[1] + turn * p[2]
+        force[a] = bx * p[0] + by * p[1] + turn * p[2]
         for i in range(m):
-            h[m + a, i] = s[i, 0] * bx + s[i, 1] * by + s[i, 2] * turn
-    for a in range(size):
+            coupling[a, i] = s[i, 0] * bx + s[i, 1] * by + s[i, 2] * turn
+        h0, h1, h2 = coupling[a, 0], coupling[a, 1], coupling[a, 2]
         for b in range(a + 1):
-            bx, by = c * drho[b, 0] - sn * drho[b, 1], sn * drho[b, 0] + c * drho[b, 1]
-            turn = psi[b] if b < n else 0.0
-            h[m + a, m + b] = h[m + a, 0] * bx + h[m + a, 1] * by + h[m + a, 2] * turn
-        h[m + a, 2] += ex * h[m + a, 1] - ey * h[m + a, 0]
+            ox, oy = drho[b, 0], drho[b, 1]
+            other = psi[b] if b < n else 0.0
+            block[a, b] = h0 * (c * ox - sn * oy) + h1 * (sn * ox + c * oy) + h2 * other
+        coupling[a, 2] = h2 + ex * h1 - ey * h0 + fy * ax - fx * ay
+    bend = ex * p[0] + ey * p[1]
+    p[2] += ex * p[1] - ey * p[0]
     for i in range(m):
-        g[i] = p[i]
-        for j in range(m):
-            h[i, j] = s[i, j]
-    g[2] += ex * p[1] - ey * p[0]
+        s[i, 2] += ex * s[i, 1] - ey * s[i, 0]
     for i in range(m):
-        h[i, 2] += ex * h[i, 1] - ey * h[i, 0]
-    for i in range(m):
-        h[2, i] += ex * h[1, i] - ey * h[0, i]
-    h[2, 2] -= ex * p[0] + ey * p[1]
+        s[2, i] += ex * s[1, i] - ey * s[0, i]
+    s[2, 2] -= bend
 
 
 @kernel
-def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, g, h, m):
-    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`."""
-    size = row.bending + row.axial
+def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force):
+    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`.
+
+    Into s only below its diagonal.
+    """
+    n = row.bending
+    size = n + row.axial
+    total, fx_all, fy_all, moment, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(row.points):
         at = row.history + 2 * i
         inertial = mass[i] * motion.gain
         fx = inertial * (position[at] - motion.hat[at]) - mass[i] * gravity[0]
         fy = inertial * (position[at + 1] - motion.hat[at + 1]) - mass[i] * gravity[1]
         x, y = rho[i, 0], rho[i, 1]
-        dx, dy = c * x - sn * y, sn * x + c * y
         ux, uy = c * fx + sn * fy, c * fy - sn * fx
         local[i, 0], local[i, 1] = ux, uy
-        g[0] += fx
-        g[1] += fy
-        g[2] += dx * fy - dy * fx
-        h[0, 0] += inertial
-        h[1, 1] += inertial
-        h[2, 0] -= inertial * dy
-        h[2, 1] += inertial * dx
-        h[2, 2] += inertial * (x * x + y * y) - (dx * fx + dy * fy)
+        total += inertial
+        fx_all += fx
+        fy_all += fy
+        moment += x * uy - y * ux
+        lever_x += inertial * (c * x - sn * y)
+        lever_y += inertial * (sn * x + c * y)
+        turning += inertial * (x * x + y * y) - (x * ux + y * uy)
         for a in range(size):
             ax, ay = drho[i, a, 0], drho[i, a, 1]
-            g[m + a] += ux * ax + uy * ay
-            h[m + a, 0] += inertial * (c * ax - sn * ay)
-            h[m + a, 1] += inertial * (sn * ax + c * ay)
-            h[m + a, 2] += inertial * (x * ay - y * ax) + uy * ax - ux * ay
+            mx, my = inertial * ax, inertial * ay
+            force[a] += ux * ax + uy * ay
+            coupling[a, 0] += c * mx - sn * my
+            coupling[a, 1] += sn * mx + c * my
+            coupling[a, 2] += x * my - y * mx + uy * ax - ux * ay
             for b in range(a + 1):
-                h[m + a, m + b] += inertial * (ax * drho[i, b, 0] + ay * drho[i, b, 1])
+                block[a, b] += mx * drho[i, b, 0] + my * drho[i, b, 1]
     for i in range(row.rotary):
         at = row.history + 2 * row.points + i
         inertial = rotary[i] * motion.gain
         torque = inertial * (position[at] - motion.hat[at])
-        g[2] += torque
-        h[2, 2] += inertial
-        for a in range(row.bending):
-            g[m + a] += torque * psi[i, a]
-            h[m + a, 2] += inertial * psi[i, a]
+        moment += torque
+        turning += inertial
+        for a in range(n):
+            share = inertial * psi[i, a]
+            force[a] += torque * psi[i, a]
+            coupling[a, 2] += share
             for b in range(a + 1):
-                h[m + a, m + b] += inertial * psi[i, a] * psi[i, b]
+                block[a, b] += share * psi[i, b]
+    p[0] += fx_all
+    p[1] += fy_all
+    p[2] += moment
+    s[0, 0] += total
+    s[1, 1] += total
+    s[2, 0] -= lever_y
+    s[2, 1] += lever_x
+    s[2, 2] += turning
 
 
 @kernel
-def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stretch, h, m):
+def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stretch, block):
     """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
     n, points = row.bending, row.points
     for j in range(points):
@@ -198,29 +201,30 @@ def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stret
         along = stretch * (fx * turn[j, 0] + fy * turn[j, 1])
         across = fy * turn[j, 0] - fx * turn[j, 1]
         for a in range(n):
+            share = along * psi[j, a]
             for b in range(a + 1):
-                h[m + a, m + b] -= along * psi[j, a] * psi[j, b]
-            if row.axial:
-                h[m + n, m + a] += across * psi[j, a]
+                block[a, b] -= share * psi[j, b]
+        for a in range(n * row.axial):
+            block[n, a] += across * psi[j, a]
 
 
 @kernel
-def _add_stiffness(row, stiffness, z, motion, g, h, m):
+def _add_stiffness(row, stiffness, z, motion, block, force):
     """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
     n = row.bending
     lead = 1.0 + row.beta * motion.rate
     for a in range(n):
         for b in range(n):
-            g[m + a] += stiffness[a, b] * z[row.z + b]
-            if b <= a:
-                h[m + a, m + b] += lead * stiffness[a, b]
+            force[a] += stiffness[a, b] * z[row.z + b]
+        for b in range(a + 1):
+            block[a, b] += lead * stiffness[a, b]
     if row.axial:
-        g[m + n] += row.axial_stiffness * z[row.z + n]
-        h[m + n, m + n] += lead * row.axial_stiffness
+        force[n] += row.axial_stiffness * z[row.z + n]
+        block[n, n] += lead * row.axial_stiffness
     for b in range(row.damped):
         rate = row.beta * (motion.rate * z[row.z + b] + motion.offset[row.z + b])
         if b < n:
             for a in range(n):
-                g[m + a] += stiffness[a, b] * rate
+                force[a] += stiffness[a, b] * rate
         else:
-            g[m + n] += row.axial_stiffness * rate
+            force[n] += row.axial_stiffness * rate

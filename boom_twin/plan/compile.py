@@ -23,6 +23,7 @@ from .layout import Layout
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
 SAME_PLACE = 1e-9  # m
+LOOP = 17  # rows of the system of a six-bar and, beside it, of its cylinder
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Plan:
         """A fresh state, all zero but the pins in the base."""
         histories, n = len(self.masses), self.joints
         state = State(
-            np.zeros(len(self.names)), np.zeros((histories, 4)), np.zeros((len(self.tables.operations) + 1, 3)), np.zeros((n, 4))
+            np.zeros(len(self.names)), np.zeros((histories, 4)), np.zeros((len(self.tables.operations) + 1, 5)), np.zeros((n, 4))
         )
         first = self.tables.linkages[0]
         state.pins[0, :2] = self.tables.joints[0].x + first.cx, self.tables.joints[0].y + first.cy
@@ -68,11 +69,11 @@ class Plan:
         t, histories = self.tables, len(self.masses)
         points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
         beams, operations = len(t.beams), len(t.operations)
-        size = max(6 + shapes, 17)
         return Work(
             position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories),
-            s=np.zeros((6, 6)), p=np.zeros(6), g=np.zeros(size), h=np.zeros((size, size)), right=np.zeros((6, 6)),
-            gains=np.zeros((operations, max(6, shapes), 7)), blocks=np.zeros((len(t.joints), 6, 6)),
+            s=np.zeros((6, 6)), p=np.zeros(6), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)), right=np.zeros((6, 6)),
+            gains=np.zeros((operations, max(6, shapes), 6)), free=np.zeros((operations, max(6, shapes))),
+            block=np.zeros((shapes, shapes)), blocks=np.zeros((len(t.joints), 6, 6)),
             rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             turn=np.zeros((beams, points, 2)), local=np.zeros((points, 2)), dz=np.zeros(len(self.names)), cut=np.zeros(6),
         )  # fmt: skip

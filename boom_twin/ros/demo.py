@@ -21,9 +21,13 @@ from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
+from ..pictures import draw
 from ..records import Stream
+from ..replay import Replay, replay
+from ..scene import load_scene
+from ..truth import FILE_NAME as TRUTH
 from .require import require_rclpy
-from .scorecard import Scorecard, Truth, read_truth, score
+from .scorecard import Scorecard, score
 
 PATIENCE = 300.0
 """Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
@@ -44,13 +48,15 @@ def main() -> int:
         require_rclpy()
         _isolate()
         session = scan(args.bag)
-        truth_file = args.bag.with_name(args.bag.name + "_truth.csv.gz")
-        truth = read_truth(truth_file, session) if truth_file.is_file() else None
         recorded = args.out / "recorded"
         _make_room(args.out, recorded)
         sent = _run(session, args, recorded)
-        _print_table(session, sent, score(recorded, truth))
-        for path in [recorded, *_pictures(recorded, truth, args.out)]:
+        if (args.bag / TRUTH).is_file():
+            shutil.copy(args.bag / TRUTH, recorded)
+        card, scene = score(recorded), load_scene()
+        again = replay(recorded, scene, args.out / "replay")
+        _print_table(session, sent, card, _equal(card, again))
+        for path in [recorded, *draw(again, scene, args.out)]:
             print(path)
         return 0
     except BoomTwinError as error:
@@ -86,8 +92,7 @@ def _make_room(out: Path, recorded: Path) -> None:
 
 def _run(session: Session, args: Namespace, recorded: Path) -> dict[str, int]:
     """Play with node and recorder running; gives the messages sent by topic."""
-    note = "; ".join(["recorded live by the demonstration", *session.notes.values()])
-    recorder = [*RECORDER, "--out", str(recorded), "--note", note]
+    recorder = [*RECORDER, "--out", str(recorded), "--origin", f"live run of: {_origin(session)}"]
     with (
         _child(NODE, args.out / "node.log", signal.SIGTERM) as node_runs,
         _child(recorder, args.out / "recorder.log", signal.SIGINT) as recorder_runs,
@@ -98,6 +103,10 @@ def _run(session: Session, args: Namespace, recorded: Path) -> dict[str, int]:
             recorder_runs()
 
         return _play(session, args.duration, check)
+
+
+def _origin(session: Session) -> str:
+    return session.notes.get("origin", "origin not noted")
 
 
 def _play(session: Session, duration: float, check: Callable[[], None]) -> dict[str, int]:
@@ -111,8 +120,7 @@ def _play(session: Session, duration: float, check: Callable[[], None]) -> dict[
         if lonely := player.wait(PATIENCE, 2, check):
             raise BoomTwinError(f"node and recorder did not both listen to {', '.join(lonely)} in {PATIENCE:g} s.")
         time.sleep(SETTLE)
-        duration = min(duration, (session.end - session.start) * 1e-9)
-        with tqdm(total=duration, ncols=80, mininterval=0.5, bar_format=BAR) as bar:
+        with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in player.play(duration=duration):
                 bar.update(elapsed * 1e-9 - bar.n)
         check()
@@ -143,14 +151,21 @@ def _child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator
             process.wait()
 
 
-def _print_table(session: Session, sent: dict[str, int], card: Scorecard) -> None:
-    strokes = sent[Stream.STROKES.value]
+def _equal(card: Scorecard, again: Replay) -> int:
+    """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
+    replayed = {prediction.stamp: tuple(prediction.tip_position.tolist()) for prediction in again.recording.predictions}
+    return sum(replayed.get(stamp) == position for stamp, position in card.positions.items())
+
+
+def _print_table(session: Session, sent: dict[str, int], card: Scorecard, equal: int) -> None:
+    strokes, arrived = sent[Stream.STROKES.value], len(card.positions)
     rows = [
-        ("session", f"{session.path.name} ({'; '.join(session.notes.values()) or 'no notes'})"),
+        ("session", f"{session.path.name} ({_origin(session)})"),
         ("stroke samples sent", f"{strokes}"),
-        ("predictions received", f"{card.predictions}"),
-        ("lost", f"{strokes - card.predictions}"),
+        ("predictions received", f"{arrived}"),
+        ("lost", f"{strokes - arrived}"),
         ("residual sets", f"{card.residual_sets}"),
+        ("equal to a replay", f"{equal} of {arrived}, to the last bit"),
         ("latency, median / 99 %", f"{card.latency_ms[0]:.1f} / {card.latency_ms[1]:.1f} ms"),
     ]
     if card.tip_error_rms is not None:
@@ -160,11 +175,6 @@ def _print_table(session: Session, sent: dict[str, int], card: Scorecard) -> Non
         rows.append((f"residual {name}", amount))
     width = max(len(name) for name, _ in rows)
     print("\n".join(f"{name:{width}s}  {value}" for name, value in rows))
-
-
-def _pictures(recorded: Path, truth: Truth | None, out: Path) -> list[Path]:
-    """Pictures of the recorded run."""
-    return []
 
 
 if __name__ == "__main__":

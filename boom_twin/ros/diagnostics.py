@@ -30,7 +30,7 @@ class _Input:
     topic: Topic
     count: int = 0
     newest: int | None = None
-    heard: float | None = None  # by the node's clock, s
+    heard: float = 0.0  # last, or when listening began, by the node's clock, s
     rate: float = 0.0
     looked: int = 0
     told: int = 0
@@ -41,7 +41,7 @@ class _Input:
             self.looked, self.heard = self.count, now
 
     def is_silent(self, now: float) -> bool:
-        return self.heard is None or now - self.heard > SILENT
+        return now - self.heard > SILENT
 
     def count_rate(self, span: float) -> None:
         self.rate = (self.count - self.told) / span if span > 0.0 else 0.0
@@ -81,7 +81,7 @@ class Diagnostics:
         self._rest()
         self._active = True
         for entry in self._inputs.values():
-            entry.heard, entry.newest = None, None
+            entry.heard, entry.newest = self._now(), None
 
     def stop(self) -> None:
         """The node is active no more."""
@@ -169,10 +169,10 @@ class Diagnostics:
             "newest stamp": _seconds(entry.newest),
         }
         if not self._active or not entry.is_silent(now):
-            return self._status(entry.topic.name, OK, "received" if self._active else "not listened to", values)
-        if entry.heard is None and not entry.topic.required:
+            return self._status(entry.topic.name, OK, "listened to" if self._active else "not listened to", values)
+        if entry.newest is None and not entry.topic.required:
             return self._status(entry.topic.name, OK, "not there; optional", values)
-        message = "nothing received yet" if entry.heard is None else f"silent for more than {SILENT:g} s"
+        message = "nothing received yet" if entry.newest is None else f"silent for more than {SILENT:g} s"
         return self._status(entry.topic.name, STALE, message, values)
 
     def _status(self, name: str, level: bytes, message: str, values: dict[str, Any]) -> DiagnosticStatus:
@@ -201,7 +201,7 @@ class Diagnostics:
             return
         for name in sorted({*self._twin.counts, *self._intake.oddities} - self._oddities_told):
             self._oddities_told.add(name)
-            meaning = EVENTS.get(name, "in a message")
+            meaning = EVENTS.get(name, "seen in a message")
             self._node.get_logger().warning(f"{name}: {meaning} (told once; counted on /diagnostics)")
 
 

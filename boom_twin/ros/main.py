@@ -48,8 +48,8 @@ def _run(arguments: list[str]) -> int:
     on_stop_signal(interrupt)
     parser = ArgumentParser(prog="twin_node", description="The live boom twin, a ROS 2 lifecycle node.")
     parser.epilog = "Parameters: --ros-args -p scene:=PATH --params-file msg_config/twin.yaml"
-    parser.parse_args(remove_ros_args(["twin_node", *arguments])[1:])
     with ros(["twin_node", *arguments]):
+        parser.parse_args(remove_ros_args(["twin_node", *arguments])[1:])
         from .node import TwinNode
 
         node = TwinNode()

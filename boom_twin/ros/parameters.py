@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -34,8 +34,10 @@ def declare(node: Node) -> None:
         node.declare_parameter("autostart", True, _switch("the node configures and activates itself"))
         for name, field in Settings.model_fields.items():
             node.declare_parameter(name, float(field.default), _number(name, field))
-    except ParameterException as error:
+    except InvalidParameterTypeException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
+    except ParameterException as error:
+        raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
 
 
 def refuse_while(node: Node, frozen: Callable[[], bool]) -> None:

@@ -77,6 +77,13 @@ class Player:
             time.sleep(LOOK)
         return lonely
 
+    def length(self, start: float = 0.0, duration: float | None = None) -> float:
+        """Seconds of that part of the session; BagError if it starts after the end."""
+        whole = (self._session.end - self._session.start) * NANO
+        if start >= whole:
+            raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {whole:.1f} s.")
+        return min(whole - start, whole if duration is None else duration)
+
     def play(self, rate: float = 1.0, start: float = 0.0, duration: float | None = None) -> Iterator[int]:
         """Publish, one message for every step of the iterator; `played` tells afterwards what was sent.
 
@@ -95,7 +102,7 @@ class Player:
         Raises
         ------
         BagError
-            That part holds no message, or the session cannot be read.
+            The session cannot be read.
         """
         self._sent: Counter[str] = Counter()
         self._latest = 0.0
@@ -112,9 +119,6 @@ class Player:
             self._publish(name, data)
             yield stamp - first
         self._wall = time.monotonic() - began
-        if not self._sent:
-            span = (self._session.end - self._session.start) * NANO
-            raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {span:.1f} s.")
 
     @property
     def played(self) -> Played:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,9 @@ from ..io.intake import stamp_of
 from ..io.reader import Session, read, scan
 from ..io.topics import Output, Topic, load_topics
 from ..records import Array, Stream
+from ..truth import TipTruth, load_truth
 
-Truth = dict[int, Array]
-"""True tip position (x, y) in m by the stamp of the stroke sample."""
+Positions = dict[int, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,9 @@ class Scorecard:
 
     Attributes
     ----------
-    predictions, residual_sets : int
+    positions : dict of int to (float, float)
+        Predicted tip (x, z of ``base_link``, m) by stamp, as it arrived.
+    residual_sets : int
         Messages that arrived.
     latency_ms : ndarray, shape (2,)
         Median and 99 % quantile from the arrival of a stroke to that of its prediction, both at the recorder.
@@ -36,15 +37,15 @@ class Scorecard:
         Measured minus predicted by channel, in the unit of the sensor.
     """
 
-    predictions: int
+    positions: Positions
     residual_sets: int
     latency_ms: Array
     tip_error_rms: float | None
     residual_rms: dict[str, float]
 
 
-def score(recorded: Path, truth: Truth | None) -> Scorecard:
-    """The numbers of one recorded run.
+def score(recorded: Path) -> Scorecard:
+    """The numbers of one recorded run; with those against the truth, if the session's truth lies in the same folder.
 
     Raises
     ------
@@ -52,36 +53,21 @@ def score(recorded: Path, truth: Truth | None) -> Scorecard:
         The recording cannot be read, or holds no prediction.
     """
     topics, session = load_topics(), scan(recorded)
-    positions = _messages(session, topics.outputs[Output.TIP_POSITION])
-    if not positions:
-        raise BagError(f"{recorded}: the node published no prediction.")
+    arrived = _messages(session, topics.outputs[Output.TIP_POSITION])
     strokes = {stamp_of(msg): time for time, msg in _messages(session, topics.inputs[Stream.STROKES])}
-    delays = [time - strokes[stamp_of(msg)] for time, msg in positions if stamp_of(msg) in strokes]
+    if not arrived or not strokes:
+        raise BagError(f"{recorded}: the node published no prediction.")
+    delays = [time - strokes[stamp_of(msg)] for time, msg in arrived if stamp_of(msg) in strokes]
+    positions = {stamp_of(msg): (msg.point.x, msg.point.z) for _, msg in arrived}
     residuals = _messages(session, topics.outputs[Output.RESIDUALS])
+    truth = load_truth(recorded)
     return Scorecard(
-        predictions=len(positions),
+        positions=positions,
         residual_sets=len(residuals),
         latency_ms=np.quantile(delays, [0.5, 0.99]) * 1e-6 if delays else np.full(2, np.nan),
-        tip_error_rms=None if truth is None else _tip_error([msg for _, msg in positions], truth),
+        tip_error_rms=None if truth is None else _tip_error(positions, truth, min(strokes)),
         residual_rms=_residual_rms([msg for _, msg in residuals]),
     )
-
-
-def read_truth(path: Path, session: Session) -> Truth:
-    """The truth beside a synthetic session: a gzipped CSV with ``tip_x_m`` and ``tip_y_m``, one row per stroke sample.
-
-    Raises
-    ------
-    BagError
-        If its rows are not those of the session.
-    """
-    stamps = [stamp_of(msg) for _, msg in _messages(session, load_topics().inputs[Stream.STROKES])]
-    with gzip.open(path, "rt", encoding="utf-8") as file:
-        columns = file.readline().strip().split(",")
-        rows = np.loadtxt(file, delimiter=",", ndmin=2, usecols=[columns.index("tip_x_m"), columns.index("tip_y_m")])
-    if len(rows) != len(stamps):
-        raise BagError(f"{path}: {len(rows)} rows, but {session.path} has {len(stamps)} strokes. Write both anew.")
-    return dict(zip(stamps, rows, strict=True))
 
 
 def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
@@ -92,10 +78,12 @@ def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
     return [(time, msg) for _, time, msg in read(session, {topic.absolute: topic.type})]
 
 
-def _tip_error(positions: list[Any], truth: Truth) -> float:
-    """Root mean square distance between predicted and true tip, m."""
-    pairs = [(msg.point, truth[stamp_of(msg)]) for msg in positions if stamp_of(msg) in truth]
-    squares = [(point.x - true[0]) ** 2 + (point.z - true[1]) ** 2 for point, true in pairs]
+def _tip_error(positions: Positions, truth: TipTruth, first: int) -> float:
+    """Root mean square distance between predicted and true tip, m; `first` is the stamp of the truth's first row."""
+    times = (np.array(list(positions)) - first) * 1e-9 + truth.times[0]
+    x, z = np.array(list(positions.values())).T
+    true = truth.position.T
+    squares = (x - np.interp(times, truth.times, true[0])) ** 2 + (z - np.interp(times, truth.times, true[1])) ** 2
     return float(np.sqrt(np.mean(squares)))
 
 

@@ -22,10 +22,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 EXAGGERATION = 10.0
+TIMES = "\N{MULTIPLICATION SIGN}"
 DEEP = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
 
 
-def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str = "Boom at rest", note: str = "") -> Path:
+def boom_picture(
+    scene: Scene, equilibrium: Equilibrium, path: Path, title: str = "Boom at rest", note: str = ""
+) -> Path:
     """Draw a boom as `statics` found it.
 
     Parameters
@@ -47,7 +50,7 @@ def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str 
     bones, straight = skeleton(scene, angles), undeformed_outline(scene, angles)
     with picture(path, title, note) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=[3.0, 1.0], height_ratios=[1.35, 1.0])
-        axes, side, close = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+        axes, side, close = (figure.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1]))
         axes.set_aspect("equal", adjustable="datalim")
         draw_boom(axes, scene, bones)
         _deflected(axes, straight, equilibrium)
@@ -109,7 +112,7 @@ def _deflected(axes: Axes, straight: Array, equilibrium: Equilibrium) -> None:
     large = straight + EXAGGERATION * (bent - straight)
     axes.plot(straight[:, 0], straight[:, 1], color=GREY, linestyle=(0, (5, 3)), label="undeformed", zorder=9)
     axes.plot(bent[:, 0], bent[:, 1], color=BLUE, linewidth=2.6, label="deflected, true to scale", zorder=9)
-    label = f"deflected, displacements × {EXAGGERATION:g}"
+    label = f"deflected, displacements {TIMES} {EXAGGERATION:g}"
     axes.plot(large[:, 0], large[:, 1], color=ORANGE, linewidth=1.6, label=label, zorder=9)
     axes.plot(*bent[-1], "o", color=BLUE, markersize=7, zorder=10)
 
@@ -121,8 +124,8 @@ def _lengths(axes: Axes, scene: Scene, bones: Skeleton) -> None:
         where = bones.point(i, 0.5 * section.length, lift)
         degrees = float(np.degrees(bones.headings[i]))
         axes.text(
-            *where, f"{i + 1}: {section.length:.2f} m", rotation=degrees, rotation_mode="anchor", ha="center", va="bottom",
-            fontsize=12, color=INK, zorder=11,
+            where[0], where[1], f"{i + 1}: {section.length:.2f} m", rotation=degrees, rotation_mode="anchor",
+            ha="center", va="bottom", fontsize=12, color=INK, zorder=11,
         )  # fmt: skip
 
 
@@ -155,4 +158,5 @@ def _numbers(side: Axes, equilibrium: Equilibrium) -> None:
         lines.append(f"  {i + 1}   {angle:+8.2f}  {stroke:7.3f}  {force:+7.1f}")
     lines += ["force: tension positive", "", "natural frequencies, Hz, undamped"]
     lines += [f"  {k + 1}   {frequency:9.3f}" for k, frequency in enumerate(equilibrium.frequencies)]
-    side.text(0.0, 0.98, "\n".join(lines), transform=side.transAxes, va="top", fontsize=12.5, family="monospace", color=INK)
+    text = "\n".join(lines)
+    side.text(0.0, 0.98, text, transform=side.transAxes, va="top", fontsize=12.5, family="monospace", color=INK)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,16 +18,19 @@ STEEL, RIGID, BARREL, ROD = "#C9D6E2", "#8FA3B5", "#E6B98A", "#B9742F"
 def draw_base(axes: Axes, pivot: Array, size: float) -> None:
     """Triangle under a pivot (m) on hatched ground; `size` is its height (m)."""
     x, y = pivot
-    axes.fill([x - 0.6 * size, x, x + 0.6 * size], [y - size, y, y - size], facecolor="white", edgecolor=INK, zorder=1.5)
-    axes.plot([x - size, x + size], [y - size, y - size], color=INK, zorder=1.5)
+    ground, half = y - size, 0.6 * size
+    axes.fill([x - half, x, x + half], [ground, y, ground], facecolor="white", edgecolor=INK, zorder=1.5)
+    axes.plot([x - size, x + size], [ground, ground], color=INK, zorder=1.5)
     for k in np.linspace(-0.85, 1.0, 7):
-        axes.plot([x + k * size, x + (k - 0.25) * size], [y - size, y - 1.25 * size], color=INK, linewidth=0.9, zorder=1.5)
+        dash = [x + k * size, x + (k - 0.25) * size]
+        axes.plot(dash, [ground, ground - 0.25 * size], color=INK, linewidth=0.9, zorder=1.5)
     draw_pin(axes, pivot)
 
 
 def draw_pin(axes: Axes, place: Array, size: float = 6.0, colour: str = INK) -> None:
     """A pin: small circle, `size` in points."""
-    axes.plot(*place, "o", markersize=size, markerfacecolor="white", markeredgecolor=colour, markeredgewidth=1.5, zorder=8)
+    look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": colour, "markeredgewidth": 1.5}
+    axes.plot(place[0], place[1], "o", markersize=size, zorder=8, **look)
 
 
 def draw_link(axes: Axes, points: list[Array], colour: str = BLUE, width: float = 5.0) -> None:
@@ -55,9 +58,7 @@ def draw_section(axes: Axes, corners: list[tuple[Array, Array, bool]], depth: fl
             _box(axes, start, stop, depth, STEEL if flexible else RIGID, 2.0, alpha)
 
 
-def _box(
-    axes: Axes, start: Array, stop: Array, width: float, colour: str, order: float, alpha: float = 1.0
-) -> None:
+def _box(axes: Axes, start: Array, stop: Array, width: float, colour: str, order: float, alpha: float = 1.0) -> None:
     """Rectangle about the line from start to stop."""
     along = (stop - start) / np.hypot(*(stop - start))
     across = 0.5 * width * np.array([-along[1], along[0]])

@@ -38,7 +38,7 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
         axes.legend(loc="upper right")
         bar = figure.colorbar(ScalarMappable(span, colours), ax=axes, shrink=0.7, pad=0.01)
         bar.set_label("time since first sample, s")
-        bar.outline.set_edgecolor(GREY)  # type: ignore[operator]
+        bar.outline.set_edgecolor(GREY)
 
 
 def spread(count: int, most: int) -> list[int]:

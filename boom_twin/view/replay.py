@@ -31,8 +31,8 @@ def replay_pictures(
     Returns
     -------
     list of Path
-        ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png`` (from 4 s
-        on); none at all if nothing was predicted. The same arrays give the same bytes.
+        ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
+        (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes.
     """
     if len(history.stamps_s) == 0:
         return []

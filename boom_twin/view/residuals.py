@@ -14,6 +14,7 @@ from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_gaps
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 MEAN_OVER = 1.0  # s of the running mean
 EDGES = np.linspace(-5.0, 5.0, 51)
 
@@ -28,7 +29,7 @@ def residual_picture(path: Path, session: str, history: History, note: str) -> N
             _channel(over_time, history, channel)
             _distribution(spread, history.residual_values[:, channel] / history.residual_sigmas[:, channel])
         panels[-1, 0].set_xlabel("time since first sample, s")
-        panels[-1, 1].set_xlabel("residual / σ")
+        panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
         panels[0, 1].set_title("against the unit normal")
         panels[0, 0].legend(
             loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.4, markerscale=4
@@ -52,9 +53,9 @@ def _channel(axes: Axes, history: History, channel: int) -> None:
     if not stamps.size:
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
-    axes.fill_between(stamps, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label="±3 σ expected")
+    axes.fill_between(stamps, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label=f"±3 {SIGMA} expected")
     axes.plot(stamps, values, ".", color=BLUE, markersize=2.6, alpha=0.55, markeredgewidth=0, label="residual")
-    axes.plot(stamps, sigma, color=INK, linewidth=1.0, label="±1 σ")
+    axes.plot(stamps, sigma, color=INK, linewidth=1.0, label=f"±1 {SIGMA}")
     axes.plot(stamps, -sigma, color=INK, linewidth=1.0)
     axes.plot(stamps, running_mean(stamps, values), color=ORANGE, linewidth=1.6, label="mean over 1 s")
     reach = max(4.2 * float(np.median(sigma)), 1.1 * float(np.quantile(np.abs(values), 0.9995)))
@@ -78,6 +79,6 @@ def _distribution(axes: Axes, normalised: Array) -> None:
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     if values.size:
-        axes.hist(np.clip(values, EDGES[0], EDGES[-1]), EDGES, density=True, color=SKY, alpha=0.8, linewidth=0)
+        axes.hist(np.clip(values, EDGES[0], EDGES[-1]), EDGES.tolist(), density=True, color=SKY, alpha=0.8, linewidth=0)
         text = f"mean {np.mean(values):+.2f}\nsd {np.std(values):.2f}"
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)

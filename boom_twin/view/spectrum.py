@@ -1,4 +1,4 @@
-"""Picture of the tip's spectrum: Welch power spectral density of what was predicted and, if there is an IMU, measured."""
+"""Picture of the tip's spectrum: Welch power spectral density of what was predicted and, with an IMU, measured."""
 
 from __future__ import annotations
 

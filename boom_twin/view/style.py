@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
 DPI = 100
+MARGIN = 0.08  # of the height of an axis, above and below what is shown
+NOTE = 70  # characters of small print that fit beside a title
 
 LOOK = {
     "font.size": 13,
@@ -61,7 +64,8 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
         figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)  # type: ignore[union-attr, call-arg]
         figure.text(0.012, 1.0 - 0.14 / size[1], title, fontsize=17, color=INK, va="top", ha="left", weight="bold")
         if note:
-            figure.text(0.988, 1.0 - 0.16 / size[1], note, fontsize=13, color=GREY, va="top", ha="right", style="italic")
+            small: dict[str, Any] = {"fontsize": 13, "color": GREY, "style": "italic", "va": "top", "ha": "right"}
+            figure.text(0.988, 1.0 - 0.16 / size[1], shorten(note, NOTE, placeholder=" .."), **small)
         yield figure
         figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
@@ -79,7 +83,7 @@ def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tup
     return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
 
 
-def limits(*arrays: Array, around: float | None = None, share: float = 0.08) -> tuple[float, float]:
+def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:
     """Limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
     values = np.concatenate([np.ravel(array) for array in arrays])
     values = values[np.isfinite(values)]
@@ -89,5 +93,5 @@ def limits(*arrays: Array, around: float | None = None, share: float = 0.08) -> 
     if around is not None:
         reach = max(high - around, around - low)
         low, high = around - reach, around + reach
-    margin = share * (high - low) or 1.0
+    margin = MARGIN * (high - low) or 1.0
     return low - margin, high + margin

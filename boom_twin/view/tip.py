@@ -50,7 +50,7 @@ def liveliest(stamps: Array, acceleration: Array) -> tuple[float, float]:
 
 
 def rms_difference(history: History, values: Array, stamps: Array, other: Array) -> float:
-    """Root mean square of the distance between `values` (m, 2) and `other` (t, 2), interpolated to the history's stamps."""
+    """Root mean square of the distance between `values` (m, 2) and `other` (t, 2), taken at the history's stamps."""
     gap = values - _at(history.stamps_s, stamps, other)
     return float(np.sqrt(np.nanmean(np.sum(gap**2, axis=1)))) if np.isfinite(gap).any() else float("nan")
 
@@ -115,8 +115,8 @@ def _mark(axes: Axes, window: tuple[float, float]) -> None:
     text = "enlarged below"
     frame = axes.get_xaxis_transform()
     axes.annotate(
-        text, (place, 0.04), xycoords=frame, xytext=(-4 if late else 4, 0), textcoords="offset points", ha=side, fontsize=11,
-        color=GREY,
+        text, (place, 0.04), xycoords=frame, xytext=(-4 if late else 4, 0), textcoords="offset points", ha=side,
+        fontsize=11, color=GREY,
     )  # fmt: skip
 
 
@@ -148,7 +148,7 @@ def _enlarged(panels: list[Axes], history: History, truth: Truth | None, window:
 
 
 def _window(axes: Axes, history: History, window: tuple[float, float]) -> None:
-    shade_gaps(axes, history.gaps)
+    shade_gaps(axes, [gap for gap in history.gaps if gap[0] < window[1] and gap[1] > window[0]])
     axes.set_xlim(*window)
     axes.set_xlabel("time since first sample, s")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderaxespad=0.1, handlelength=1.6)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from boom_twin.scene.load import default_text
 from boom_twin.scene.parts import Scene
-from ruamel.yaml import YAML
 
 from .segments import Segments, link_headings
 

@@ -7,6 +7,7 @@ gradient by all unknowns; the increments of the sweeps have to solve this large 
 from __future__ import annotations
 
 import numpy as np
+
 from boom_twin.chain.place import place
 from boom_twin.chain.program import JOINT_B
 

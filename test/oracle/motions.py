@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.step import observe, rest, run

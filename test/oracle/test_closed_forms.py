@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from boom_twin.analysis.statics import statics
 from oracle import booms
+
+from boom_twin.analysis.statics import statics
 
 ROOTS = np.array([1.87510407, 4.69409113, 7.85475744])
 LENGTH, RIGIDITY, DENSITY, GRAVITY = 3.0, 2.06e11 * 2.0e-5, 40.0, 9.81

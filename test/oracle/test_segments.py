@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracle import booms, segments
+
 from boom_twin.analysis.statics import statics
 from boom_twin.scene import load_scene
-from oracle import booms, segments
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "statics.json"
 
@@ -117,3 +118,18 @@ def test_random_booms_cover_what_they_promise():
     assert any(joint.cylinder.k is None for joint in joints) and any(joint.mL is None for joint in joints[1:])
     assert any(section.beam is None for section in sections) and any(section.modes == 0 for section in sections)
     assert any(section.root is None for section in sections) and any(section.rho_I is None for section in sections)
+
+
+@pytest.mark.parametrize("chosen", [[0], [3], [0, 1], [2, 3], [0, 1, 2], [1, 2, 3]])
+def test_default_modes_suffice_for_short_booms(chosen):
+    """Fewer sections put stretching and higher bending among the first six modes; the bounds asked for hold there too."""
+    spec = booms.document()
+    spec["sections"] = [{k: v for k, v in spec["sections"][i].items() if k != "rod_pin"} for i in chosen]
+    spec["sections"][0]["rod_pin"] = [0.6, -0.12]
+    spec["joints"] = [spec["joints"][0], *(spec["joints"][max(i, 1)] for i in chosen[1:])]
+    spec["postures"] = {"bent": [10.0 - 20.0 * k for k in range(len(chosen))]}
+    scene = booms.scene_of(spec)
+    _, (_, _, _, frequencies) = _witness(scene, "bent", coarse=5)
+    found = statics(scene, posture="bent").frequencies
+    assert found[:4] == pytest.approx(frequencies[:4], rel=5e-3)
+    assert found[4:] == pytest.approx(frequencies[4:], rel=2e-2)

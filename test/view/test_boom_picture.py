@@ -32,7 +32,8 @@ def shortened(scene: Scene, count: int) -> Scene:
 def test_pins_agree_with_lengths_and_strokes(scene: Scene, name: str) -> None:
     bones, strokes = skeleton(scene, posture_angles(scene, name)), strokes_of_posture(scene, name)
     for joint, part, stroke in zip(bones.joints, scene.joints, strokes, strict=True):
-        assert np.hypot(*(joint.rod_pin - joint.barrel_pin)) == pytest.approx(part.cylinder.closed_length + stroke, abs=1e-9)
+        length = np.hypot(*(joint.rod_pin - joint.barrel_pin))
+        assert length == pytest.approx(part.cylinder.closed_length + stroke, abs=1e-9)
         if joint.d is not None and joint.e is not None and joint.q is not None:
             assert np.hypot(*(joint.q - joint.d)) == pytest.approx(part.lL, abs=1e-9)
             assert np.hypot(*(joint.q - joint.e)) == pytest.approx(part.lR, abs=1e-9)

@@ -77,11 +77,15 @@ def test_there_are_mistakes_and_pictures() -> None:
         assert (DOCS / name).is_file(), name
 
 
+def without(*keys: str) -> str:
+    """The guide's file without the lines that begin with these keys."""
+    return "".join(line for line in WHOLE.splitlines(keepends=True) if not line.strip().startswith(keys))
+
+
 def test_table_of_what_leaving_out_does(boom: Path) -> None:
     from boom_twin.analysis.statics import statics
 
-    without_k = "\n".join(line for line in WHOLE.splitlines() if not line.strip().startswith(("k:", "d:")))
-    without_mass = "\n".join(line for line in WHOLE.splitlines() if not line.strip().startswith(("barrel:", "rod:", "mL", "mR")))
+    without_k, without_mass = without("k:", "d:"), without("barrel:", "rod:", "mL:", "mR:")
     scenes = {
         "as above": WHOLE,
         "no `k`, no `d`": without_k,

@@ -1,0 +1,125 @@
+"""Fill messages and write a result bag in a process behind the replay."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BoomTwinError
+from ..records import Array, Prediction, Report, Residuals, Stream
+from .factory import RosbagsTypes
+from .outlet import Outlet
+from .pipe import Pipe, say_ready
+from .topics import Output, load_topics
+from .writer import SessionWriter
+
+BATCH = 200  # reports in one pickle
+Packed = tuple[int, bytes | None, bytes | None, list[tuple[str, int, tuple[str, ...], bytes, bytes]]]
+
+
+def pack(report: Report) -> Packed:
+    """A report as plain numbers and bytes; events and status are not written to a bag, and left out."""
+    residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
+    p = report.prediction
+    if p is None:
+        return report.stamp, None, None, residuals
+    turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
+    tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
+    numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
+    return report.stamp, numbers, None if p.shape is None else p.shape.tobytes(), residuals
+
+
+def unpack(packed: Packed) -> Report:
+    """What `pack` was given, less what it leaves out."""
+    stamp, numbers, line, rows = packed
+    residuals = tuple(
+        Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
+        for stream, at, names, values, sigmas in rows
+    )
+    return Report(stamp, True, None if numbers is None else _prediction(stamp, np.frombuffer(numbers), line), residuals)
+
+
+def _prediction(stamp: int, row: Array, line: bytes | None) -> Prediction:
+    n = (len(row) - 11) // 3
+    return Prediction(
+        stamp,
+        *(row[i : i + 2] for i in (0, 2, 4, 6)),
+        *(float(value) for value in row[8:11]),
+        *(row[11 + i * n : 11 + (i + 1) * n] for i in range(3)),
+        None if line is None else np.frombuffer(line).reshape(-1, 2),
+    )
+
+
+class Behind:
+    """The replay's end of the pipe.
+
+    Parameters
+    ----------
+    directory : Path
+        Of the bag; must be new or empty.
+    notes : mapping of str to str
+        Kept in the bag.
+
+    Raises
+    ------
+    BagError
+        From any method: the bag could not be written; says why.
+    """
+
+    def __init__(self, directory: Path, notes: Mapping[str, str]) -> None:
+        self._batch: list[Packed] = []
+        self._pipe = Pipe(__name__, str(directory))
+        self._pipe.send(dict(notes))
+
+    def wait_ready(self) -> None:
+        """Until the process can begin."""
+        self._pipe.wait_ready()
+
+    def put(self, report: Report) -> None:
+        """Write what `report` holds, in its turn; its stamp becomes the log time."""
+        if report.prediction is None and not report.residuals:
+            return
+        self._batch.append(pack(report))
+        if len(self._batch) == BATCH:
+            self._pipe.send(self._batch)
+            self._batch = []
+
+    def close(self) -> None:
+        """Send the rest; returns when the bag is complete."""
+        self._pipe.send(self._batch)
+        self._pipe.finish()
+
+    def stop(self) -> None:
+        """End the process; the bag stays incomplete."""
+        self._pipe.stop()
+
+
+def main(directory: Path) -> int:
+    """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
+    stream, outlet = sys.stdin.buffer, Outlet(RosbagsTypes())
+    outputs = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
+    try:
+        with SessionWriter(directory, outputs, pickle.load(stream)) as writer:
+            say_ready()
+            while True:
+                try:
+                    batch = pickle.load(stream)
+                except EOFError:
+                    return 0
+                for packed in batch:
+                    report = unpack(packed)
+                    for key, message in outlet.fill(report):
+                        writer.write(key, report.stamp, message)
+    except BoomTwinError as error:
+        print(error, file=sys.stderr)
+    except OSError as error:
+        print(f"{directory}: {error.strerror or error}. Free some space, or give another folder.", file=sys.stderr)
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
