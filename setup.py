@@ -30,7 +30,8 @@ setup(
         "pydantic>=2.7,<3",
         "ruamel.yaml>=0.18,<1",
         "mcap>=1.2,<2",
-        "rosbags>=0.10,<0.12",
+        "rosbags>=0.11,<0.12",
+        "zstandard>=0.21,<1",
         "matplotlib>=3.8,<4",
         "tqdm>=4.66,<5",
     ],
@@ -43,7 +44,9 @@ setup(
             "mypy>=1.11,<3",
             "import-linter>=2.0,<3",
         ],
-        "peers": ["exudyn>=1.9,<2"],
+        "peers": ["exudyn>=1.13,<2"],
     },
+    # where `ros2 run` looks; pip puts scripts into bin/ all the same
+    options={"install": {"install_scripts": "$base/lib/boom_twin"}, "develop": {"script_dir": "$base/lib/boom_twin"}},
     entry_points={"console_scripts": ["boom_twin = boom_twin.cli.main:main", "twin_node = boom_twin.ros.main:main"]},
 )

@@ -1,0 +1,90 @@
+"""The bundled session, synthetic, replayed as recorded: what the README and the issue of this version promise of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream, Twin, load_scene, replay
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.intake import Intake, stamp_of
+from boom_twin.io.outlet import Outlet
+from boom_twin.io.reader import read, scan
+from boom_twin.io.topics import load_topics
+from boom_twin.io.typestore import jazzy
+from boom_twin.truth import load_truth
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+SENSOR = 1.745e-4  # rad, a joint encoder's own noise
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    out = tmp_path_factory.mktemp("replay")
+    return replay(SESSION, load_scene(), out), out
+
+
+def test_tip_follows_the_truth(first):
+    summary = first[0].summary
+    assert summary["samples"] == 12000 and summary["dropped"] == 0 and summary["alarms"] == []
+    assert summary["tip_error_rms_m"] < 3e-3
+    assert summary["tip_acceleration_error_rms_m_s2"] < 0.25
+
+
+def test_residuals_are_what_is_expected(first):
+    summary, recording = first[0].summary, first[0].recording
+    spread = np.array(summary["joint_residual_normalised_std"])
+    assert np.all((spread > 0.85) & (spread < 1.15))
+    assert np.all(np.abs(summary["joint_residual_normalised_mean"]) < 0.3)
+    sigmas = np.array([residuals.sigmas for residuals in recording.of(Stream.ANGLES)])
+    assert np.all(sigmas >= SENSOR) and np.all(sigmas <= 2 * SENSOR)
+
+
+def test_true_strokes_leave_the_lag_of_the_estimator_alone():
+    truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
+    strokes = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)])
+    stamps = np.round(truth["t_s"] * 1e9).astype(np.int64)
+    twin = Twin(load_scene())
+    predictions = [
+        twin.update(Sample(Stream.STROKES, int(t), y)).prediction for t, y in zip(stamps, strokes, strict=True)
+    ]
+    assert load_truth(SESSION).errors(predictions)["tip_acceleration_error_rms_m_s2"] < 0.10
+
+
+def test_two_replays_give_the_same_bytes(first, tmp_path):
+    again = replay(SESSION, load_scene(), tmp_path)
+    assert again.summary["output_sha256"] == first[0].summary["output_sha256"]
+    files = [next((out / "bag").glob("*.mcap")).read_bytes() for out in (first[1], tmp_path)]
+    assert files[0] == files[1] and len(files[0]) > 1e6
+
+
+def test_summary_is_on_disk_and_complete(first):
+    summary = json.loads((first[1] / "summary.json").read_text())
+    assert summary == first[0].summary
+    wanted = {"samples", "duration_s", "wall_s", "realtime_factor", "dropped", "joint_residual_rms_rad"}
+    wanted |= {"tip_acceleration_max_m_s2", "output_sha256", "alarms"}
+    assert wanted <= summary.keys()
+    assert summary["realtime_factor"] == pytest.approx(summary["duration_s"] / summary["wall_s"])
+
+
+def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
+    """Two seconds of it: reading and writing in other processes changes nothing."""
+    inputs, outputs = load_topics().inputs, load_topics().outputs
+    wanted = {inputs[stream].name: inputs[stream].type for stream in Stream}
+    roles = {inputs[stream].name: stream for stream in Stream}
+    twin, intake, outlet, store = Twin(load_scene()), Intake(4), Outlet(RosbagsTypes()), jazzy()
+    expected = []
+    for name, log_time, message in read(scan(SESSION), wanted):
+        sample = intake.put(roles[name], stamp_of(message), message)
+        for key, filled in outlet.fill(twin.update(sample)):
+            expected.append((outputs[key].absolute, log_time, bytes(store.serialize_cdr(filled, outputs[key].type))))
+        if len(expected) > 2400:
+            break
+    types = {topic.absolute: topic.type for key, topic in outputs.items() if key != "diagnostics"}
+    got = read(scan(first[1] / "bag"), types)
+    for topic, _, data in expected:
+        name, _, message = next(got)
+        assert (name, bytes(store.serialize_cdr(message, types[name]))) == (topic, data)

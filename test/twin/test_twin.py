@@ -1,0 +1,223 @@
+"""The twin on samples that are late, doubled, incomplete, out of order, or from another time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin.scene.kinematics import strokes_of_posture
+
+MS = 1_000_000
+START = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene()
+
+
+@pytest.fixture
+def twin(scene):
+    return Twin(scene)
+
+
+@pytest.fixture(scope="module")
+def still(scene):
+    return strokes_of_posture(scene, "arch")
+
+
+def strokes(stamp_ms, values):
+    return Sample(Stream.STROKES, START + int(stamp_ms * MS), np.array(values))
+
+
+def angles(stamp_ms, values):
+    return Sample(Stream.ANGLES, START + int(stamp_ms * MS), np.array(values))
+
+
+def moved(still, t):
+    """A smooth move of cylinders 1 and 3 within 0.4 s from 0.1 s on."""
+    x = min(max((t - 0.1) / 0.4, 0.0), 1.0)
+    return still + np.array([0.01, 0.0, -0.005, 0.0]) * (10 * x**3 - 15 * x**4 + 6 * x**5)
+
+
+def follow(twin, still, stop, step=5, first=0):
+    return [twin.update(strokes(ms, moved(still, ms * 1e-3))) for ms in range(first, stop, step)]
+
+
+def equal(one, other):
+    """Whether two predictions are the same to the bit."""
+    fields = ("tip_position", "tip_displacement", "tip_acceleration", "joints", "strokes", "cylinder_forces")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in fields)
+
+
+def test_starts_in_static_equilibrium(scene, twin, still):
+    report, rest = twin.update(strokes(0, still)), statics(scene, posture="arch", modes=0)
+    assert report.accepted and report.status == "ok"
+    assert report.prediction.tip_position == pytest.approx(rest.tip, abs=1e-8)
+    assert report.prediction.joints == pytest.approx(rest.joints, abs=1e-9)
+    assert report.prediction.cylinder_forces == pytest.approx(rest.cylinder_forces, rel=1e-6)
+    assert report.prediction.tip_displacement == pytest.approx(rest.tip - rest.tip_rigid, abs=1e-8)
+    assert np.all(report.prediction.tip_acceleration == 0.0)
+
+
+def test_stays_at_rest_on_constant_strokes(twin, still):
+    first = twin.update(strokes(0, still)).prediction
+    last = [twin.update(strokes(ms, still)) for ms in range(5, 3000, 5)][-1].prediction
+    assert last.tip_position == pytest.approx(first.tip_position, abs=1e-7)
+    assert np.abs(last.tip_acceleration).max() < 1e-5
+
+
+def test_every_stroke_stamp_is_answered_with_its_own(twin, still):
+    reports = follow(twin, still, 600)
+    assert [r.prediction.stamp for r in reports] == [START + ms * MS for ms in range(0, 600, 5)]
+
+
+def test_late_and_double_samples_are_left_out_and_counted(scene, still):
+    clean, disturbed = Twin(scene), Twin(scene)
+    expected = follow(clean, still, 300)
+    got = []
+    for ms in range(0, 300, 5):
+        got.append(disturbed.update(strokes(ms, moved(still, ms * 1e-3))))
+        assert disturbed.update(strokes(ms, still + 0.1)).events == ("duplicate",)
+        if ms:
+            assert disturbed.update(strokes(ms - 2, still - 0.1)).events == ("late",)
+    assert all(equal(a.prediction, b.prediction) for a, b in zip(expected, got, strict=True))
+    assert disturbed.counts == {"duplicate": 60, "late": 59}
+
+
+def test_partial_strokes_use_what_is_there(scene, still):
+    whole, partial = Twin(scene), Twin(scene)
+    for ms in range(0, 400, 5):
+        values = moved(still, ms * 1e-3)
+        a = whole.update(strokes(ms, values)).prediction
+        if 200 <= ms < 220:
+            values = values.copy()
+            values[1] = np.nan  # cylinder 2 stands still anyway
+        report = partial.update(strokes(ms, values))
+        assert report.events == (("partial",) if 200 <= ms < 220 else ())
+    assert report.prediction.tip_position == pytest.approx(a.tip_position, abs=1e-4)
+    assert partial.counts["partial"] == 4
+
+
+def test_waits_for_all_strokes(twin, still):
+    lacking = still.copy()
+    lacking[3] = np.nan
+    report = twin.update(strokes(0, lacking))
+    assert not report.accepted and "waiting" in report.events and report.prediction is None
+    assert twin.update(strokes(5, np.full(4, np.nan))).events == ("empty",)
+    assert twin.update(strokes(10, still)).accepted
+
+
+def test_a_gap_is_bridged_and_flagged(scene, still):
+    steady, gappy = Twin(scene), Twin(scene)
+    for ms in range(0, 3000, 5):
+        a = steady.update(strokes(ms, moved(still, ms * 1e-3))).prediction
+        if not 100 < ms < 400:
+            report = gappy.update(strokes(ms, moved(still, ms * 1e-3)))
+            if ms == 400:
+                assert report.events == ("gap",)
+    assert gappy.counts == {"gap": 1}
+    assert report.prediction.tip_position == pytest.approx(a.tip_position, abs=0.02)
+
+
+def test_a_long_pause_starts_again_from_rest(twin, still):
+    follow(twin, still, 300)
+    report = twin.update(strokes(300 + 60_000, still))
+    assert report.events == ("restart",) and np.all(report.prediction.tip_acceleration == 0.0)
+
+
+def test_time_set_back_starts_everything_again(scene, still):
+    fresh, looped = Twin(scene), Twin(scene)
+    follow(looped, still, 2000)
+    looped.update(angles(5000, np.zeros(4)))  # would wait for a stroke that never comes
+    again, expected = follow(looped, still, 300), follow(fresh, still, 300)
+    assert again[0].events == ("jump back",)
+    assert all(equal(a.prediction, b.prediction) for a, b in zip(again, expected, strict=True))
+    assert sum(len(report.residuals) for report in again) == 0
+
+
+def test_a_stamp_of_the_far_future_is_survived(scene, still):
+    twin = Twin(scene)
+    follow(twin, still, 100)
+    assert twin.update(Sample(Stream.STROKES, 4_102_444_800_000_000_000, still)).events == ("restart",)
+    assert twin.update(strokes(105, still)).events == ("jump back",)
+    assert twin.update(strokes(110, still)).accepted
+
+
+def test_strokes_out_of_reach_do_not_start_the_model(twin, still):
+    report = twin.update(strokes(0, still + 5.0))
+    assert not report.accepted and "stroke_1" in report.status and "reaches" in report.status
+    assert twin.update(strokes(5, still)).accepted
+
+
+def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
+    follow(twin, still, 300)
+    wild = [twin.update(strokes(300 + 5 * k, still + (-1) ** k * 1e5)) for k in range(5)]
+    assert any(not report.accepted and report.status != "ok" for report in wild)
+    recovered = [twin.update(strokes(400 + 5 * k, still)) for k in range(200)][-1]
+    assert recovered.accepted and np.isfinite(recovered.prediction.tip_position).all()
+
+
+@pytest.mark.parametrize("order", ["before", "after", "shuffled"])
+def test_residuals_do_not_depend_on_the_order_of_arrival(scene, still, order):
+    rng = np.random.default_rng(3)
+    first = [strokes(ms, moved(still, ms * 1e-3)) for ms in range(0, 400, 5)]
+    second = [angles(ms + 1.7, rng.normal(0.0, 1.0, 4)) for ms in range(0, 390, 5)]
+    def residuals(samples):
+        twin = Twin(scene)
+        return {r.stamp: r.values for sample in samples for r in twin.update(sample).residuals}
+
+    expected = residuals(sorted(first + second, key=lambda s: s.stamp))
+    arrival = {
+        "before": sorted(second + first, key=lambda s: s.stamp - (30 * MS if s.stream is Stream.ANGLES else 0)),
+        "after": sorted(first + second, key=lambda s: s.stamp + (30 * MS if s.stream is Stream.ANGLES else 0)),
+        "shuffled": sorted(first + second, key=lambda s: s.stamp // (20 * MS) * 2 + (s.stream is Stream.STROKES)),
+    }[order]
+    got = residuals(arrival)
+    assert len(expected) == len(second)
+    assert got.keys() == expected.keys() and all(np.array_equal(got[k], expected[k]) for k in expected)
+
+
+def test_predictions_are_a_function_of_the_strokes_alone(scene, still):
+    alone, watched = Twin(scene), Twin(scene)
+    for ms in range(0, 400, 5):
+        a = alone.update(strokes(ms, moved(still, ms * 1e-3))).prediction
+        watched.update(angles(ms, np.full(4, 0.3)))
+        b = watched.update(strokes(ms, moved(still, ms * 1e-3))).prediction
+        watched.update(Sample(Stream.IMU, START + ms * MS, np.array([1.0, 2.0])))
+    assert equal(a, b)
+
+
+def test_a_residual_is_measured_minus_predicted_at_its_stamp(twin, still):
+    reports = {r.stamp: r.prediction for r in follow(twin, still, 300)}
+    at, after = START + 200 * MS, START + 205 * MS
+    same = twin.update(angles(200, reports[at].joints + 0.01)).residuals[0]
+    assert same.values == pytest.approx(np.full(4, 0.01), abs=1e-15)
+    between = twin.update(angles(202, 0.6 * reports[at].joints + 0.4 * reports[after].joints)).residuals[0]
+    assert between.values == pytest.approx(np.zeros(4), abs=1e-12)
+
+
+def test_measured_samples_without_a_prediction_are_counted(twin, still):
+    twin.update(strokes(1000, still))
+    assert twin.update(angles(500, np.zeros(4))).events == ("unmatched",)
+    partial = twin.update(angles(1000, np.array([0.0, np.nan, 0.0, 0.0])))
+    assert partial.events == ("partial",) and np.isnan(partial.residuals[0].values[1])
+
+
+def test_quiet_sensors_give_smaller_deviations(scene, still):
+    def sigma(**noise):
+        twin = Twin(scene, Settings(**noise))
+        follow(twin, still, 300)
+        return twin.update(angles(290, np.zeros(4))).residuals[0].sigmas
+
+    standard, quiet = sigma(), sigma(angle_sigma=1e-5, angle_resolution=1e-6)
+    assert np.all(standard > 1.745e-4) and np.all(quiet < 0.8 * standard)
+
+
+def test_imu_at_rest_reads_gravity(scene, twin, still):
+    prediction = twin.update(strokes(0, still)).prediction
+    c, s = np.cos(prediction.tip_angle), np.sin(prediction.tip_angle)
+    residual = twin.update(Sample(Stream.IMU, START, np.array([9.81 * s, 9.81 * c]))).residuals[0]
+    assert residual.names == ("tip_imu_x", "tip_imu_z")
+    assert residual.values == pytest.approx([0.0, 0.0], abs=1e-9)
