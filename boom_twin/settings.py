@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML, YAMLError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from .errors import UsageError
 
@@ -20,19 +21,19 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    stroke_sigma: NotNegative = Field(2.0e-5, description="noise of a stroke transducer, m")
-    stroke_resolution: Positive = Field(5.0e-6, description="resolution of a stroke transducer, m")
-    angle_sigma: NotNegative = Field(1.745e-4, description="noise of a joint encoder, rad")
-    angle_resolution: Positive = Field(8.727e-5, description="resolution of a joint encoder, rad")
-    imu_sigma: Positive = Field(0.05, description="noise of the tip IMU, m/s^2")
-    jerk_density: Positive = Field(4.0e-4, description="density of the strokes' white jerk, m^2/s^5")
-    lag: Positive = Field(0.045, description="time a stroke is smoothed for, s")
-    step: Positive = Field(0.005, description="longest step of the remembered boom, s")
-    look_step: Positive = Field(0.026, description="longest step of the look ahead to now, s")
-    rho: Annotated[float, Field(ge=0, lt=1)] = Field(0.8, description="spectral radius at infinite frequency")
-    gap: Positive = Field(0.1, description="longer pauses between strokes are flagged, s")
-    restart_gap: Positive = Field(5.0, description="longer pauses start again from rest, s")
-    jump_back: Positive = Field(1.0, description="a stamp earlier by more than this starts everything again, s")
+    stroke_sigma: NotNegative = Field(default=2.0e-5, description="noise of a stroke transducer, m")
+    stroke_resolution: Positive = Field(default=5.0e-6, description="resolution of a stroke transducer, m")
+    angle_sigma: NotNegative = Field(default=1.745e-4, description="noise of a joint encoder, rad")
+    angle_resolution: Positive = Field(default=8.727e-5, description="resolution of a joint encoder, rad")
+    imu_sigma: Positive = Field(default=0.05, description="noise of the tip IMU, m/s^2")
+    jerk_density: Positive = Field(default=4.0e-4, description="density of the strokes' white jerk, m^2/s^5")
+    lag: Positive = Field(default=0.045, description="time a stroke is smoothed for, s")
+    step: Positive = Field(default=0.005, description="longest step of the remembered boom, s")
+    look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s")
+    rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")
+    gap: Positive = Field(default=0.1, description="longer pauses between strokes are flagged, s")
+    restart_gap: Positive = Field(default=5.0, description="longer pauses start again from rest, s")
+    jump_back: Positive = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
 
     @property
     def stroke_variance(self) -> float:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, deque
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from .analysis.noise import StrokeNoise, stroke_noise
 from .analysis.statics import outline, settle
 from .chain.newton import OK
 from .chain.status import SENTENCES
+from .deviations import Deviations, specific_force
 from .errors import BoomTwinError
-from .estimate.follower import Tuning, begin, copy_state, follow, new_track
+from .estimate.follower import Tuning, begin, follow, new_track
+from .memory import Expected, Memory
 from .plan.compile import compile_scene
 from .records import Array, Prediction, Report, Residuals, Sample, Stream
-from .scene.kinematics import joint_angles_of_strokes, linkage
+from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
-from .physics.linkage import cylinder_length
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -34,12 +34,21 @@ EVENTS = {
 }
 
 NANO = 1e-9
-MEMORY = 2_000_000_000  # ns of predictions kept for samples that come late
+SMOOTHING = 0.05  # weight of the newest interval in the running mean
 PENDING = 4096  # most samples that wait for a stroke
 SHAPE_PERIOD = 50_000_000  # ns of one slot; one shape is given in each, 20 a second
-POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
-NOISE_INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
-SMOOTH_INTERVAL = 0.1  # weight of a new sample interval in the running mean
+
+
+@dataclass
+class _Run:
+    """What the twin knows since the boom was last taken to be at rest."""
+
+    epoch: int
+    newest: int
+    deviations: Deviations
+    interval: float = 0.0
+    slot: int = -1
+    memory: Memory = field(default_factory=Memory)
 
 
 class Twin:
@@ -51,6 +60,11 @@ class Twin:
         The boom.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
+
+    Attributes
+    ----------
+    counts : Counter
+        How often each of `EVENTS` happened.
 
     Notes
     -----
@@ -71,31 +85,28 @@ class Twin:
         self._track = new_track(self.plan, lengths)
         self._row = np.zeros(4 * self.plan.joints + 11)
         self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
-        gx, gy = self.plan.tables.gravity
-        self._gravity = np.array([gx, gy])
-        self._clear()
+        self._run: _Run | None = None
+        self._newest_measured: dict[Stream, int] = {}
+        self._pending: deque[Sample] = deque()
 
     def reset(self) -> None:
         """Forget everything but the counts; the next full stroke sample starts from static equilibrium."""
-        self._clear()
+        self._run = None
+        self._newest_measured = {}
+        self._pending = deque()
 
     def warm_up(self) -> None:
-        """Compile every kernel, with a boom of the same kind that is thrown away."""
+        """Compile every kernel, with a twin of the same boom that is thrown away."""
         other = Twin(self.scene, self.settings)
-        middle = np.array([0.5 * math.radians(sum(joint.range_deg)) for joint in self.scene.joints])
-        strokes = np.array(
-            [
-                cylinder_length(linkage(self.scene, i), angle)[0] - self.scene.joints[i].cylinder.closed_length
-                for i, angle in enumerate(middle)
-            ]
-        )
+        middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
+        strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
         for k in range(20):
             other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
         other.update(Sample(Stream.ANGLES, 0, middle))
 
     def update(self, sample: Sample) -> Report:
         """Take one sample; see `Report` for what comes back. Never raises on what a sample holds."""
-        complete = math.isfinite(sample.values.sum())
+        complete = bool(np.isfinite(sample.values.sum()))
         if not complete and not np.isfinite(sample.values).any():
             return self._refuse(sample, "empty")
         if sample.stream is Stream.STROKES:
@@ -106,20 +117,20 @@ class Twin:
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         events: list[str] = []
-        if self._newest is not None:
-            span = (sample.stamp - self._newest) * NANO
+        if self._run is not None:
+            span = (sample.stamp - self._run.newest) * NANO
             if -self.settings.jump_back <= span <= 0.0:
                 return self._refuse(sample, "duplicate" if span == 0.0 else "late")
             if span < 0.0 or span > self.settings.restart_gap:
                 events.append("jump back" if span < 0.0 else "restart")
-                self._clear()
+                self.reset()
             elif span > self.settings.gap:
                 events.append("gap")
         if not complete:
             events.append("partial")
-        if self._newest is None:
-            return self._start(sample, events) if complete else self._refuse(sample, "waiting", *events)
-        return self._step(sample, events)
+        if self._run is not None:
+            return self._step(self._run, sample, events)
+        return self._start(sample, events) if complete else self._refuse(sample, "waiting", *events)
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
@@ -128,34 +139,32 @@ class Twin:
         except BoomTwinError as error:
             return self._refuse(sample, "model", *events, status=str(error))
         self._track.angles[:] = angles
-        self._epoch = sample.stamp
+        self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp))
         status = begin(
             self.plan.tables, self._anchor, self._live, self._work, self._track, self._tuning, sample.values, self._row
         )
-        return self._finish(sample, events, status)
+        return self._finish(self._run, sample, events, status)
 
-    def _step(self, sample: Sample, events: list[str]) -> Report:
-        assert self._newest is not None and self._epoch is not None
-        span = (sample.stamp - self._newest) * NANO
-        if span > 0.0:
-            self._interval += SMOOTH_INTERVAL * (span - self._interval) if self._interval else span
-        time = (sample.stamp - self._epoch) * NANO
+    def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
+        time = (sample.stamp - run.epoch) * NANO
         status = follow(
             self.plan.tables, self._anchor, self._live, self._work, self._track, self._tuning, time, sample.values, self._row
         )
-        return self._finish(sample, events, status)
+        return self._finish(run, sample, events, status)
 
-    def _finish(self, sample: Sample, events: list[str], status: int) -> Report:
+    def _finish(self, run: _Run, sample: Sample, events: list[str], status: int) -> Report:
         if status != OK:
-            self._clear()
+            self.reset()
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
-        self._newest = sample.stamp
-        prediction = self._prediction(sample.stamp)
-        self._remember(prediction, self._row[3 * self.plan.joints + 9 : 4 * self.plan.joints + 9])
+        span = (sample.stamp - run.newest) * NANO
+        run.interval += SMOOTHING * (span - run.interval) if run.interval else span
+        run.newest = sample.stamp
+        prediction = self._prediction(run, sample.stamp)
+        self._remember(run, prediction)
         self.counts.update(events)
-        return Report(sample.stamp, True, prediction, self._settle_pending(), tuple(events))
+        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events))
 
-    def _prediction(self, stamp: int) -> Prediction:
+    def _prediction(self, run: _Run, stamp: int) -> Prediction:
         n, row = self.plan.joints, self._row.copy()
         tip = row[2 * n : 2 * n + 9]
         return Prediction(
@@ -170,13 +179,21 @@ class Twin:
             joints=row[:n],
             strokes=row[2 * n + 9 : 3 * n + 9],
             cylinder_forces=row[n : 2 * n],
-            shape=self._shape(stamp),
+            shape=self._shape(run, stamp),
         )
 
-    def _shape(self, stamp: int) -> Array | None:
+    def _shape(self, run: _Run, stamp: int) -> Array | None:
         """The centre line at the first stamp of its slot of time: a rule of the stamps only, indifferent to jitter."""
-        before, self._slot = self._slot, stamp // SHAPE_PERIOD
-        return outline(self.plan, self._live, self._work.position) if self._slot != before else None
+        before, run.slot = run.slot, stamp // SHAPE_PERIOD
+        return outline(self.plan, self._live, self._work.position) if run.slot != before else None
+
+    def _remember(self, run: _Run, prediction: Prediction) -> None:
+        """Keep what residuals need."""
+        n, interval = self.plan.joints, run.interval or self.settings.step
+        variances = self._row[3 * n + 9 : 4 * n + 9]
+        sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        force = specific_force(prediction, self.plan.tables.gravity)
+        run.memory.add(Expected(prediction.stamp, prediction.joints, force, *sigmas))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
@@ -187,105 +204,37 @@ class Twin:
         self._newest_measured[sample.stream] = sample.stamp
         events = () if complete else ("partial",)
         self.counts.update(events)
-        if self._newest is None or sample.stamp > self._newest:
+        if self._run is None or sample.stamp > self._run.newest:
             if len(self._pending) == PENDING:
                 self._pending.popleft()
                 self.counts["unmatched"] += 1
             self._pending.append(sample)
             return Report(sample.stamp, True, events=events)
-        residuals = self._residuals(sample)
+        residuals = self._residuals(self._run, sample)
         if residuals is None:
             return self._refuse(sample, "unmatched", *events)
         return Report(sample.stamp, True, residuals=(residuals,), events=events)
 
-    def _settle_pending(self) -> tuple[Residuals, ...]:
+    def _settle_pending(self, run: _Run) -> tuple[Residuals, ...]:
         """Residuals of all samples that waited for the newest stroke."""
         if not self._pending:
             return ()
-        assert self._newest is not None
-        ready = sorted((s for s in self._pending if s.stamp <= self._newest), key=lambda s: (s.stamp, s.stream.value))
-        self._pending = deque(s for s in self._pending if s.stamp > self._newest)
-        found = [self._residuals(sample) for sample in ready]
+        ready = sorted((s for s in self._pending if s.stamp <= run.newest), key=lambda s: (s.stamp, s.stream.value))
+        self._pending = deque(s for s in self._pending if s.stamp > run.newest)
+        found = [self._residuals(run, sample) for sample in ready]
         self.counts["unmatched"] += found.count(None)
         return tuple(residuals for residuals in found if residuals is not None)
 
-    def _residuals(self, sample: Sample) -> Residuals | None:
-        expected = self._expected(sample.stamp)
+    def _residuals(self, run: _Run, sample: Sample) -> Residuals | None:
+        expected = run.memory.at(sample.stamp)
         if expected is None:
             return None
-        joints, force, sigmas, force_sigmas = expected
         if sample.stream is Stream.ANGLES:
-            return Residuals(sample.stream, sample.stamp, self._names, sample.values - joints, sigmas)
-        return Residuals(sample.stream, sample.stamp, ("tip_imu_x", "tip_imu_z"), sample.values - force, force_sigmas)
-
-    def _remember(self, prediction: Prediction, variances: Array) -> None:
-        """Keep what residuals need: joint angles, specific force at the tip, and the deviations to expect."""
-        c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
-        ax, ay = prediction.tip_acceleration - self._gravity
-        force = np.array([c * ax + s * ay, c * ay - s * ax])
-        self._refresh_noise(prediction)
-        sigmas = np.sqrt(self._quiet[0] + self._slopes2 * variances)
-        self._past.append((prediction.stamp, prediction.joints, force, sigmas, self._quiet[1]))
-        while self._past[0][0] < prediction.stamp - MEMORY:
-            self._past.popleft()
-
-    def _expected(self, stamp: int) -> tuple[Array, Array, Array, Array] | None:
-        """Joints, specific force and their deviations at `stamp`, linear between the two predictions around it."""
-        after = None
-        for entry in reversed(self._past):
-            if entry[0] == stamp:
-                return entry[1:]
-            if entry[0] < stamp:
-                if after is None:
-                    return None
-                share = (stamp - entry[0]) / (after[0] - entry[0])
-                joints = entry[1] + share * (after[1] - entry[1])
-                return joints, entry[2] + share * (after[2] - entry[2]), after[3], after[4]
-            after = entry
-        return None
-
-    # -- expected deviations ------------------------------------------------------------------------------------------
-
-    def _refresh_noise(self, prediction: Prediction) -> None:
-        """Propagate stroke noise anew when the posture has changed, and let it grow with time."""
-        assert self._epoch is not None
-        if self._noise is not None and prediction.stamp < self._noise_stamp + NOISE_INTERVAL:
-            return
-        if self._noise is None or float(np.max(np.abs(prediction.strokes - self._noise_at))) > POSTURE_STEP:
-            self._propagate(prediction)
-        assert self._noise is not None
-        self._noise_stamp = prediction.stamp
-        time = (prediction.stamp - self._epoch) * NANO
-        joints, acceleration = self._noise.after(time, prediction.tip_angle)
-        self._quiet = (self.settings.angle_variance + joints, np.sqrt(self.settings.imu_sigma**2 + acceleration))
-
-    def _propagate(self, prediction: Prediction) -> None:
-        tuned = self.settings
-        interval = self._interval or tuned.step
-        copy_state(self._live, self._probe)
-        position = self._work.position.copy()
-        self._noise = stroke_noise(
-            self.plan, self._probe, self._work, tuned.stroke_variance, interval, tuned.jerk_density
-        )
-        self._work.position[:] = position
-        self._noise_at = prediction.strokes
-        slopes = [cylinder_length(self.plan.tables.linkages[i], a)[1] for i, a in enumerate(self._track.angles)]
-        self._slopes2 = 1.0 / np.square(slopes)
-
-    # -- bookkeeping --------------------------------------------------------------------------------------------------
-
-    def _clear(self) -> None:
-        self._newest: int | None = None
-        self._slot: int | None = None
-        self._epoch: int | None = None
-        self._interval = 0.0
-        self._newest_measured: dict[Stream, int] = {}
-        self._pending: deque[Sample] = deque()
-        self._past: deque[tuple[int, Array, Array, Array, Array]] = deque()
-        self._noise: StrokeNoise | None = None
-        self._noise_at = np.zeros(self.plan.joints)
-        self._noise_stamp = 0
-        self._probe = self.plan.state()
+            values, sigmas, names = sample.values - expected.joints, expected.joint_sigmas, self._names
+        else:
+            values, sigmas = sample.values - expected.force, expected.force_sigmas
+            names = ("tip_imu_x", "tip_imu_z")
+        return Residuals(sample.stream, sample.stamp, names, values, sigmas)
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

@@ -29,4 +29,4 @@ def rigid_tip(scene: Scene, angles: Array) -> Array:
     heading = np.cumsum(angles)
     lengths = np.array([section.length for section in scene.sections])
     pivot = np.array(scene.base.pivot)
-    return pivot + np.array([lengths @ np.cos(heading), lengths @ np.sin(heading)])
+    return np.asarray(pivot + np.array([lengths @ np.cos(heading), lengths @ np.sin(heading)]))

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from ..chain.newton import OK
@@ -122,7 +123,9 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     return times, strokes
 
 
-def _drive(plan: Plan, times: Array, strokes: Array, dt: float) -> tuple[Array, Array, Array, Array]:
+def _drive(
+    plan: Plan, times: Array, strokes: Array, dt: float
+) -> tuple[Array, NDArray[np.int64], Array, Array]:
     """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
     spans = np.diff(times)
     counts = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)

@@ -12,8 +12,6 @@ B1, B2, B3 differ in the numbers of the rod pin only (see `physics.linkage`).
 
 from __future__ import annotations
 
-import math
-
 from ..physics.algebra import solve
 from ..physics.cylinder import cylinder_terms
 from ..physics.jit import kernel

@@ -39,7 +39,7 @@ def run(args: Namespace) -> int:
             topics,
             {"origin": args.origin} if args.origin else {},
             stopped=lambda: bool(signals) or time.monotonic() >= end,
-            started=lambda: print(f"recording {len(topics)} topics into {args.out}; Ctrl-C ends it", file=sys.stderr),
+            tell=lambda text: print(text, file=sys.stderr, flush=True),
         )
     for key, topic in topics.items():
         print(f"  {counts[key]:8d}  {topic.absolute}", file=sys.stderr)

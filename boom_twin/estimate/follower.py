@@ -46,12 +46,12 @@ class Tuning(NamedTuple):
 class Track(NamedTuple):
     """What the follower remembers besides the anchor's state.
 
-    count : (1,) nodes in the window. moved : (1,) whether the anchor has left its first equilibrium.
+    nodes : (1,) number of nodes in the window. moved : (1,) whether the anchor has left its first equilibrium.
     times : (NODES,) s. x, c : nodes of the smoother. anchor : (n, 3) drive where the anchor stands.
     angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch. zeros : (histories,)
     """
 
-    count: np.ndarray
+    nodes: np.ndarray
     moved: np.ndarray
     times: Array
     x: Array
@@ -69,7 +69,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     """An empty track for a compiled boom whose sections are `lengths` (m), shape (n,), long."""
     n = plan.joints
     return Track(
-        count=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES), x=np.zeros((NODES, n, 3)),
+        nodes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES), x=np.zeros((NODES, n, 3)),
         c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n), drive=np.zeros(n), rate=np.zeros(n),
         zeros=np.zeros(len(plan.masses)), closed=plan.closed_lengths, lengths=lengths,
     )  # fmt: skip
@@ -78,7 +78,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
 @kernel
 def begin(t, anchor, live, work, track, tuning, y, out):
     """First sample, at time 0: strokes y (m), shape (n,), at rest in equilibrium; `out` as in `follow`."""
-    track.count[0], track.moved[0], track.times[0] = 1, 0, 0.0
+    track.nodes[0], track.moved[0], track.times[0] = 1, 0, 0.0
     start_node(track.x, track.c, y, tuning.variance)
     status = settle_anchor(t, anchor, work, track)
     copy_state(anchor, live)
@@ -95,12 +95,12 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
 
     Returns a status of `chain.newton`.
     """
-    for j in range(track.count[0], 0, -1):
+    for j in range(track.nodes[0], 0, -1):
         track.times[j] = track.times[j - 1]
-    add_node(track.x, track.c, track.count[0], time - track.times[1], tuning.density)
+    add_node(track.x, track.c, track.nodes[0], time - track.times[1], tuning.density)
     track.times[0] = time
-    track.count[0] += 1
-    measure(track.x, track.c, track.count[0], y, tuning.variance)
+    track.nodes[0] += 1
+    measure(track.x, track.c, track.nodes[0], y, tuning.variance)
     status = move_anchor(t, anchor, work, track, tuning)
     if status != OK:
         return status
@@ -126,7 +126,7 @@ def report(t, live, track, out):
 @kernel
 def move_anchor(t, anchor, work, track, tuning):
     """Step the anchor to the youngest node that is older than the lag, and drop the nodes behind it."""
-    count = track.count
+    count = track.nodes
     while count[0] > 2 and (track.times[0] - track.times[count[0] - 2] >= tuning.lag or count[0] == NODES):
         old, new = count[0] - 1, count[0] - 2
         span = track.times[new] - track.times[old]
@@ -144,7 +144,7 @@ def move_anchor(t, anchor, work, track, tuning):
 @kernel
 def settle_anchor(t, anchor, work, track):
     """Equilibrium at the strokes of the oldest node, until the anchor moves."""
-    track.anchor[:] = track.x[track.count[0] - 1]
+    track.anchor[:] = track.x[track.nodes[0] - 1]
     for i in range(track.drive.shape[0]):
         track.anchor[i, 1], track.anchor[i, 2] = 0.0, 0.0
         track.drive[i], track.rate[i] = track.closed[i] + track.anchor[i, 0], 0.0
@@ -172,13 +172,13 @@ def glide(t, state, work, track, tuning, old, new, span, longest, tolerance):
 @kernel
 def look_ahead(t, live, work, track, tuning):
     """Run the copy from the anchor's node to the newest one, skipping nodes as long as steps stay below `look_step`."""
-    old = track.count[0] - 1
+    old = track.nodes[0] - 1
     while old > 0:
         new = old - 1
         while new > 0 and track.times[new - 1] - track.times[old] <= tuning.look_step:
             new -= 1
         span = track.times[new] - track.times[old]
-        start = track.anchor if old == track.count[0] - 1 else track.x[old]
+        start = track.anchor if old == track.nodes[0] - 1 else track.x[old]
         status = glide(t, live, work, track, tuning, start, track.x[new], span, tuning.look_step, LOOK_TOLERANCE)
         if status != OK:
             return status

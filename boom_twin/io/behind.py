@@ -14,7 +14,7 @@ from ..records import Array, Prediction, Report, Residuals, Stream
 from .factory import RosbagsTypes
 from .outlet import Outlet
 from .pipe import Pipe, say_ready
-from .topics import Output, load_topics
+from .topics import Output, Topic, load_topics
 from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
@@ -45,12 +45,21 @@ def unpack(packed: Packed) -> Report:
 
 def _prediction(stamp: int, row: Array, line: bytes | None) -> Prediction:
     n = (len(row) - 11) // 3
+    turn, velocity, acceleration = (float(value) for value in row[8:11])
+    joints, strokes, forces = (row[11 + i * n : 11 + (i + 1) * n] for i in range(3))
     return Prediction(
-        stamp,
-        *(row[i : i + 2] for i in (0, 2, 4, 6)),
-        *(float(value) for value in row[8:11]),
-        *(row[11 + i * n : 11 + (i + 1) * n] for i in range(3)),
-        None if line is None else np.frombuffer(line).reshape(-1, 2),
+        stamp=stamp,
+        tip_position=row[0:2],
+        tip_displacement=row[2:4],
+        tip_velocity=row[4:6],
+        tip_acceleration=row[6:8],
+        tip_angle=turn,
+        tip_angular_velocity=velocity,
+        tip_angular_acceleration=acceleration,
+        joints=joints,
+        strokes=strokes,
+        cylinder_forces=forces,
+        shape=None if line is None else np.frombuffer(line).reshape(-1, 2),
     )
 
 
@@ -101,7 +110,7 @@ class Behind:
 def main(directory: Path) -> int:
     """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
     stream, outlet = sys.stdin.buffer, Outlet(RosbagsTypes())
-    outputs = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
+    outputs: dict[str, Topic] = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
     try:
         with SessionWriter(directory, outputs, pickle.load(stream)) as writer:
             say_ready()

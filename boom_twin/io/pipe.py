@@ -37,7 +37,7 @@ class Pipe:
         """Until the process has its imports done."""
         if next(self.receive(), None) != READY:
             self.finish()
-            raise BagError(f"{self._process.args}: ended before it began. Run it again.")
+            raise BagError("a process of the replay ended before it began. Run it again.")
 
     def send(self, item: Any) -> None:
         """One object down the pipe."""

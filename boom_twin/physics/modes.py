@@ -52,7 +52,7 @@ def end_shapes_and_bubbles(n: int, count: int) -> Basis:
     points, _ = gauss_points(count)
     ends = np.append(points, 1.0)
     psi = np.stack([legendre.legval(2.0 * ends - 1.0, _integral(k)) for k in range(n)], axis=1)
-    return Basis(psi, legendre.legvander(2.0 * points - 1.0, n - 1))
+    return Basis(np.asarray(psi, float), np.asarray(legendre.legvander(2.0 * points - 1.0, n - 1), float))
 
 
 CANTILEVER_ROOTS = (1.87510407, 4.69409113, 7.85475744, 10.99554073)
@@ -79,4 +79,4 @@ def cantilever_modes(n: int, count: int) -> Basis:
 def bending_stiffness(basis: Basis, rigidity: float, length: float) -> Array:
     """K (n, n) in N m: energy is 1/2 q.K q, for rigidity E I (N m^2) and length (m)."""
     _, weights = gauss_points(len(basis.curvature))
-    return rigidity / length * np.einsum("p,pa,pb->ab", weights, basis.curvature, basis.curvature)
+    return np.asarray(rigidity / length * np.einsum("p,pa,pb->ab", weights, basis.curvature, basis.curvature))

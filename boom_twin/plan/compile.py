@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..physics import cylinder, modes
 from ..physics.linkage import LINK_L, LINK_R, LINKAGE
 from ..records import Array
 from ..scene.kinematics import linkage
-from ..scene.parts import Cylinder, RigidPart, Scene, Section
+from ..scene.parts import Cylinder, RigidPart, Scene
 from .layout import Layout
 
 BasisName = Literal["end-shapes", "cantilever"]
@@ -58,8 +58,9 @@ class Plan:
         """A fresh state, all zero but the pins in the base."""
         histories, n = len(self.masses), self.joints
         state = State(
-            np.zeros(len(self.names)), np.zeros((histories, 4)), np.zeros((len(self.tables.operations) + 1, 5)), np.zeros((n, 4))
-        )
+            z=np.zeros(len(self.names)), history=np.zeros((histories, 4)),
+            frames=np.zeros((len(self.tables.operations) + 1, 5)), pins=np.zeros((n, 4)),
+        )  # fmt: skip
         first = self.tables.linkages[0]
         state.pins[0, :2] = self.tables.joints[0].x + first.cx, self.tables.joints[0].y + first.cy
         return state
@@ -285,9 +286,9 @@ class _Builder:
         tip = layout.histories([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
         self._mark_frame()
         unknowns = len(layout.names)
+        arrays: dict[str, Any] = {name: layout.table(name) for name in layout.rows} | _stacked(self.beam_tables)
         tables = Tables(
-            **{name: layout.table(name) for name in layout.rows},
-            **_stacked(self.beam_tables),
+            **arrays,
             gravity=self.gravity,
             moving=np.array([0.0 if scale == 0.0 else 1.0 for scale in self.scale]),
             scale=np.array(self.scale),
@@ -320,6 +321,6 @@ def _stacked(parts: list[tuple[Array, Array, Array, Array, Array]]) -> dict[str,
         shape = np.max([part[i].shape for part in parts], axis=0) if parts else np.zeros(dimensions[i], int)
         block = np.zeros((len(parts), *shape))
         for k, part in enumerate(parts):
-            block[(k, *(slice(size) for size in part[i].shape))] = part[i]
+            block[k][tuple(slice(size) for size in part[i].shape)] = part[i]
         stacked[name] = block
     return stacked

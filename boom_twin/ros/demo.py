@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -33,8 +33,10 @@ PATIENCE = 300.0
 """Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
 PARTING = 10.0
 """Seconds that a process may take to end."""
+LOOK = 1.0
+"""Seconds between looks at whether all have found each other."""
 SETTLE = 1.0
-"""Seconds for the recorder to match the node's outputs, and for the last messages to arrive."""
+"""Seconds for the last messages to arrive."""
 BAR = "playing {l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 NODE = ["-m", "boom_twin.ros.main"]
@@ -55,7 +57,8 @@ def main() -> int:
             shutil.copy(args.bag / TRUTH, recorded)
         card, scene = score(recorded), load_scene()
         again = replay(recorded, scene, args.out / "replay")
-        _print_table(session, sent, card, _equal(card, again))
+        about = f"{session.path.name} ({_origin(session)})"
+        print("\n".join(card.as_text(about, sent[Stream.STROKES.value], _equal(card, again))))
         for path in [recorded, *draw(again, scene, args.out)]:
             print(path)
         return 0
@@ -94,32 +97,34 @@ def _run(session: Session, args: Namespace, recorded: Path) -> dict[str, int]:
     """Play with node and recorder running; gives the messages sent by topic."""
     recorder = [*RECORDER, "--out", str(recorded), "--origin", f"live run of: {_origin(session)}"]
     with (
-        _child(NODE, args.out / "node.log", signal.SIGTERM) as node_runs,
-        _child(recorder, args.out / "recorder.log", signal.SIGINT) as recorder_runs,
+        _child(NODE, args.out / "node.log", signal.SIGTERM) as node,
+        _child(recorder, args.out / "recorder.log", signal.SIGINT) as record,
     ):
-
-        def check() -> None:
-            node_runs()
-            recorder_runs()
-
-        return _play(session, args.duration, check)
+        return _play(session, args.duration, node, record)
 
 
 def _origin(session: Session) -> str:
     return session.notes.get("origin", "origin not noted")
 
 
-def _play(session: Session, duration: float, check: Callable[[], None]) -> dict[str, int]:
-    """Wait for node and recorder, then play; `check` raises when one of them has ended."""
+def _play(session: Session, duration: float, node: _Child, recorder: _Child) -> dict[str, int]:
+    """Wait until all three have found each other, then play."""
     from .context import ros
     from .player import Player
+    from .recorder import COMPLETE
+
+    def check() -> None:
+        node.check()
+        recorder.check()
 
     with ros([]):
         player = Player(session)
         print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
-        if lonely := player.wait(PATIENCE, 2, check):
-            raise BoomTwinError(f"node and recorder did not both listen to {', '.join(lonely)} in {PATIENCE:g} s.")
-        time.sleep(SETTLE)
+        end = time.monotonic() + PATIENCE
+        while player.wait(LOOK, 2, check) or not recorder.has_said(COMPLETE):
+            check()
+            if time.monotonic() > end:
+                raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
         with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in player.play(duration=duration):
                 bar.update(elapsed * 1e-9 - bar.n)
@@ -129,52 +134,43 @@ def _play(session: Session, duration: float, check: Callable[[], None]) -> dict[
     return player.played.sent
 
 
+class _Child:
+    """A running process whose words go into a log."""
+
+    def __init__(self, arguments: list[str], log: Path) -> None:
+        self._name, self._log = " ".join(arguments[:3]), log
+        with log.open("w", encoding="utf-8") as file:
+            self.process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
+
+    def has_said(self, text: str) -> bool:
+        return text in self._log.read_text(encoding="utf-8")
+
+    def check(self) -> None:
+        """Raise if it has ended."""
+        if self.process.poll() is not None:
+            last = (self._log.read_text(encoding="utf-8").strip().splitlines() or ["nothing was said"])[-1]
+            raise BoomTwinError(f"{self._name} ended with {self.process.returncode}: {last} (see {self._log})")
+
+
 @contextmanager
-def _child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator[Callable[[], None]]:
-    """A Python process with its stderr in `log`; gives a function that raises when it has ended."""
-    with log.open("w", encoding="utf-8") as file:
-        process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
-
-    def check() -> None:
-        if process.poll() is not None:
-            last = (log.read_text(encoding="utf-8").strip().splitlines() or ["nothing was said"])[-1]
-            raise BoomTwinError(f"{' '.join(arguments[:3])} ended with {process.returncode}: {last} (see {log})")
-
+def _child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator[_Child]:
+    """A Python process, ended by the signal `parting`."""
+    child = _Child(arguments, log)
     try:
-        yield check
+        yield child
     finally:
-        process.send_signal(parting)
+        child.process.send_signal(parting)
         try:
-            process.wait(PARTING)
+            child.process.wait(PARTING)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            child.process.kill()
+            child.process.wait()
 
 
 def _equal(card: Scorecard, again: Replay) -> int:
     """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
     replayed = {prediction.stamp: tuple(prediction.tip_position.tolist()) for prediction in again.recording.predictions}
     return sum(replayed.get(stamp) == position for stamp, position in card.positions.items())
-
-
-def _print_table(session: Session, sent: dict[str, int], card: Scorecard, equal: int) -> None:
-    strokes, arrived = sent[Stream.STROKES.value], len(card.positions)
-    rows = [
-        ("session", f"{session.path.name} ({_origin(session)})"),
-        ("stroke samples sent", f"{strokes}"),
-        ("predictions received", f"{arrived}"),
-        ("lost", f"{strokes - arrived}"),
-        ("residual sets", f"{card.residual_sets}"),
-        ("equal to a replay", f"{equal} of {arrived}, to the last bit"),
-        ("latency, median / 99 %", f"{card.latency_ms[0]:.1f} / {card.latency_ms[1]:.1f} ms"),
-    ]
-    if card.tip_error_rms is not None:
-        rows.append(("tip position error", f"{card.tip_error_rms * 1e3:.2f} mm rms against the rig's truth"))
-    for name, value in card.residual_rms.items():
-        amount = f"{value * 1e3:.3f} mrad rms" if name.startswith("joint") else f"{value:.3f} m/s^2 rms"
-        rows.append((f"residual {name}", amount))
-    width = max(len(name) for name, _ in rows)
-    print("\n".join(f"{name:{width}s}  {value}" for name, value in rows))
 
 
 if __name__ == "__main__":

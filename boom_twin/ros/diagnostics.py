@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -10,42 +9,17 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..io.intake import Intake
-from ..io.topics import Output, Topic, Topics
+from ..io.topics import Output, Topics
 from ..records import Report, Stream
 from ..twin import EVENTS, Twin
+from .input_watch import InputWatch, seconds
 from .qos import qos_profile
 
 TICK = 0.1  # s of steady time between looks at the state
 PERIOD = 10  # ticks from one message to the next, where no level changes
-SILENT = 2.0  # s by the node's clock after which an input is stale
 HOLD = 1.0  # s by the node's clock for which a failure of the model is shown
 
-OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
-
-
-@dataclass
-class _Input:
-    """What came by one topic."""
-
-    topic: Topic
-    count: int = 0
-    newest: int | None = None
-    heard: float = 0.0  # last, or when listening began, by the node's clock, s
-    rate: float = 0.0
-    looked: int = 0
-    told: int = 0
-
-    def look(self, now: float) -> None:
-        """Notice whether anything has come since the last look."""
-        if self.count != self.looked:
-            self.looked, self.heard = self.count, now
-
-    def is_silent(self, now: float) -> bool:
-        return now - self.heard > SILENT
-
-    def count_rate(self, span: float) -> None:
-        self.rate = (self.count - self.told) / span if span > 0.0 else 0.0
-        self.told = self.count
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
 class Diagnostics:
@@ -59,7 +33,7 @@ class Diagnostics:
 
     def __init__(self, node: Node, topics: Topics) -> None:
         self._node = node
-        self._inputs = {stream: _Input(topic) for stream, topic in topics.inputs.items()}
+        self._inputs = {stream: InputWatch(topic) for stream, topic in topics.inputs.items()}
         topic = topics.outputs[Output.DIAGNOSTICS]
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -81,7 +55,7 @@ class Diagnostics:
         self._rest()
         self._active = True
         for entry in self._inputs.values():
-            entry.heard, entry.newest = self._now(), None
+            entry.begin(self._now())
 
     def stop(self) -> None:
         """The node is active no more."""
@@ -89,9 +63,7 @@ class Diagnostics:
 
     def seen(self, stream: Stream, stamp: int) -> None:
         """A message came."""
-        entry = self._inputs[stream]
-        entry.count += 1
-        entry.newest = stamp
+        self._inputs[stream].seen(stamp)
 
     def reported(self, report: Report) -> None:
         """The twin took a sample."""
@@ -143,7 +115,7 @@ class Diagnostics:
         values: dict[str, Any] = {
             "scene": self._scene,
             "predictions": self._predictions,
-            "newest stroke stamp": _seconds(newest),
+            "newest stroke stamp": seconds(newest),
             "unhandled messages": self._broken,
         }
         if self._twin is not None and self._intake is not None:
@@ -160,20 +132,10 @@ class Diagnostics:
             return WARN, "waiting for strokes"
         return OK, "following the strokes"
 
-    def _input(self, entry: _Input, now: float) -> DiagnosticStatus:
+    def _input(self, entry: InputWatch, now: float) -> DiagnosticStatus:
         """State of one input topic."""
-        values = {
-            "topic": self._node.resolve_topic_name(entry.topic.name),
-            "messages": entry.count,
-            "rate (Hz)": f"{entry.rate:.1f}",
-            "newest stamp": _seconds(entry.newest),
-        }
-        if not self._active or not entry.is_silent(now):
-            return self._status(entry.topic.name, OK, "listened to" if self._active else "not listened to", values)
-        if entry.newest is None and not entry.topic.required:
-            return self._status(entry.topic.name, OK, "not there; optional", values)
-        message = "nothing received yet" if entry.newest is None else f"silent for more than {SILENT:g} s"
-        return self._status(entry.topic.name, STALE, message, values)
+        topic = self._node.resolve_topic_name(entry.topic.name)
+        return self._status(entry.topic.name, *entry.judge(self._active, now), {"topic": topic, **entry.values()})
 
     def _status(self, name: str, level: bytes, message: str, values: dict[str, Any]) -> DiagnosticStatus:
         return DiagnosticStatus(
@@ -203,7 +165,3 @@ class Diagnostics:
             self._oddities_told.add(name)
             meaning = EVENTS.get(name, "seen in a message")
             self._node.get_logger().warning(f"{name}: {meaning} (told once; counted on /diagnostics)")
-
-
-def _seconds(stamp: int | None) -> str:
-    return "none" if stamp is None else f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d}"

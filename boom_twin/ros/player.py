@@ -25,6 +25,8 @@ CLOCK_PERIOD = 25_000_000
 """ns of session time between two messages on ``/clock``: 40 Hz, as ``ros2 bag play --clock`` has it."""
 LOOK = 0.05
 """Time (s) between looks for listeners."""
+SETTLE = 0.5
+"""Time (s) from the match with the last listener to the first message."""
 
 NANO = 1e-9
 
@@ -70,11 +72,16 @@ class Player:
         return [name for name, each in self._publishers.items() if each.get_subscription_count() < listeners]
 
     def wait(self, timeout: float, listeners: int = 1, check: Callable[[], None] = lambda: None) -> list[str]:
-        """Wait until every topic is listened to, calling `check` now and then; gives the topics that are not."""
+        """Wait until every topic is listened to, calling `check` now and then; gives the topics that are not.
+
+        A little longer still, because a subscription may know of its publisher a moment after the publisher of it.
+        """
         end = time.monotonic() + timeout
         while (lonely := self.lonely(listeners)) and time.monotonic() < end:
             check()
             time.sleep(LOOK)
+        if timeout > 0.0:
+            time.sleep(SETTLE)
         return lonely
 
     def length(self, start: float = 0.0, duration: float | None = None) -> float:

@@ -23,6 +23,7 @@ DEPTH = 4000
 WAKE = 0.1
 FLUSH = 1.0
 """Seconds after which what was recorded is on the disk."""
+COMPLETE = "every required topic has a publisher"
 
 
 class _Journal(SessionWriter):
@@ -39,7 +40,7 @@ def record(
     topics: Mapping[str, Topic],
     notes: Mapping[str, str],
     stopped: Callable[[], bool],
-    started: Callable[[], None] = lambda: None,
+    tell: Callable[[str], None],
 ) -> Counter[str]:
     """Record until `stopped`; needs an initialised rclpy. Log times are those of the reception.
 
@@ -53,8 +54,8 @@ def record(
         Kept in the bag.
     stopped : callable
         Asked after every message, and ten times a second.
-    started : callable
-        Called once all subscriptions are made.
+    tell : callable
+        Told in words when recording begins, and once every required topic has a publisher (`COMPLETE`).
 
     Returns
     -------
@@ -74,10 +75,13 @@ def record(
             bag.write_encoded(key, info["received_timestamp"], data)
             counts[key] += 1
 
+        awaited = []
         for key, topic in topics.items():
             kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
-            node.create_subscription(kind, topic.absolute, partial(store, key), qos, raw=True)
-        started()
+            subscription = node.create_subscription(kind, topic.absolute, partial(store, key), qos, raw=True)
+            if topic.required:
+                awaited.append(subscription)
+        tell(f"recording {len(topics)} topics into {out}; Ctrl-C ends it")
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         due = time.monotonic() + FLUSH
@@ -85,6 +89,9 @@ def record(
             executor.spin_once(timeout_sec=WAKE)
             if time.monotonic() >= due:
                 bag.flush()
+                if awaited and all(each.get_publisher_count() for each in awaited):
+                    awaited.clear()
+                    tell(COMPLETE)
                 due = time.monotonic() + FLUSH
         node.destroy_node()
     return counts

@@ -43,6 +43,25 @@ class Scorecard:
     tip_error_rms: float | None
     residual_rms: dict[str, float]
 
+    def as_text(self, session: str, sent: int, equal: int) -> list[str]:
+        """Lines of a short table; `sent` strokes were played, a replay gave `equal` of the predictions again."""
+        arrived, (median, slowest) = len(self.positions), self.latency_ms
+        rows = [
+            ("session", session),
+            ("stroke samples sent", f"{sent}"),
+            ("predictions received", f"{arrived}"),
+            ("lost", f"{sent - arrived}"),
+            ("residual sets", f"{self.residual_sets}"),
+            ("equal to a replay", f"{equal} of {arrived}, to the last bit"),
+            ("latency, median / 99 %", f"{median:.1f} / {slowest:.1f} ms"),
+        ]
+        if self.tip_error_rms is not None:
+            rows.append(("tip position error", f"{self.tip_error_rms * 1e3:.2f} mm rms against the rig's truth"))
+        for name, value in self.residual_rms.items():
+            amount = f"{value * 1e3:.3f} mrad rms" if name.startswith("joint") else f"{value:.3f} m/s^2 rms"
+            rows.append((f"residual {name}", amount))
+        return [f"{name:22s}  {value}" for name, value in rows]
+
 
 def score(recorded: Path) -> Scorecard:
     """The numbers of one recorded run; with those against the truth, if the session's truth lies in the same folder.

@@ -1,9 +1,14 @@
-"""The Riccati sweeps against the same equations written out at once, and Newton's method by its quadratic convergence."""
+"""The Riccati sweeps against the same equations written out at once, and Newton's method by its order."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from chain.dense import Dense
+from oracle import booms
+
 from boom_twin.analysis.posture import set_undeformed
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.newton import NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, newton
@@ -15,46 +20,57 @@ from boom_twin.physics.integrators import generalised_alpha
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from oracle import booms
-from oracle.dense import Dense
 
 SEEDS = [2, 3, 4, 8, 14, 18, 25]
 
 
-def boom_beside_equilibrium(scene, posture, seed=0):
-    """Plan, state and work with every unknown a little off."""
+def boom_beside_equilibrium(scene, posture, seed=0, size=2e-3):
+    """Plan, state and work with every unknown a little off: angles by `size` rad, forces by a million N/rad."""
     rng, plan = np.random.default_rng(seed), compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes_of_posture(scene, posture), posture_angles(scene, posture))
-    moving = plan.tables.moving > 0
-    state.z[moving] += rng.normal(size=moving.sum()) * 2e-3
-    state.z[~moving] += rng.normal(size=(~moving).sum()) * 2e3
+    still = work.position.copy()
+    state.z[:] += rng.normal(size=len(state.z)) * size * np.where(plan.tables.moving > 0, 1.0, 1e6)
     place(plan.tables, state, work)
-    return plan, state, work, rng
+    return plan, state, work, still
+
+
+
+
+def rod_pin_outboard_of_c():
+    """Cylinder 1 holds section 1 outboard of where cylinder 2 starts: the other order of carried columns."""
+    spec = booms.document()
+    spec["sections"][0]["rod_pin"] = [3.2, -0.2]
+    spec["base"]["cylinder_pin"] = [1.2, -1.0]
+    return booms.scene_of(spec)
 
 
 SCENES = [pytest.param(load_scene(), "arch", id="default")]
+SCENES += [pytest.param(rod_pin_outboard_of_c(), "arch", id="rod pin outboard of C")]
 SCENES += [pytest.param(booms.random_boom(seed), "test", id=f"boom {seed}") for seed in SEEDS]
 
 
 @pytest.mark.parametrize("scene, posture", SCENES)
-@pytest.mark.parametrize("still", [True, False], ids=["statics", "step"])
-def test_increments_solve_the_equations_of_all_unknowns_at_once(scene, posture, still):
-    plan, state, work, rng = boom_beside_equilibrium(scene, posture)
-    drive = plan.closed_lengths + strokes_of_posture(scene, posture)
-    histories = len(plan.masses)
-    motion = motion_at_rest(histories)
-    if not still:
-        hat = work.position + rng.normal(size=histories) * 1e-6
-        motion = Motion(1.5e6, 2e3, hat, -2e3 * work.position + rng.normal(size=histories))
-    rates = rng.normal(size=plan.joints)
-    z = state.z.copy()
-    sweep_in(plan.tables, state, work, motion, drive, rates)
-    sweep_out(plan.tables, state, work)
-    left, before = Dense(plan, motion, drive, rates).left_by(z, work.dz)
+@pytest.mark.parametrize("gain, rate", [(0.0, 0.0), (1.5e6, 2e3)], ids=["statics", "step"])
+def test_increments_solve_the_equations_of_all_unknowns_at_once(scene, posture, gain, rate):
+    """What the sweeps' step leaves falls with the square of the distance from the solution.
+
+    Not to rounding: bending already condensed enters the tangent of what lies inboard with its predicted force.
+    """
+    drive = strokes_of_posture(scene, posture)
+    left = []
+    for size in (1e-2, 1e-3):
+        plan, state, work, rested = boom_beside_equilibrium(scene, posture, size=size)
+        motion, still = Motion(gain, rate, rested, -rate * rested), np.zeros(plan.joints)
+        z = state.z.copy()
+        sweep_in(plan.tables, state, work, motion, plan.closed_lengths + drive, still)
+        sweep_out(plan.tables, state, work)
+        left.append(Dense(plan, motion, plan.closed_lengths + drive, still).left_by(z, work.dz))
+    (far, before), (near, _) = left
     moving = plan.tables.moving > 0
-    for rows in (moving, ~moving):
-        assert np.abs(left[rows]).max() < 1e-5 * np.abs(before[rows]).max()
+    assert np.abs(near[moving]).max() < np.abs(far[moving]).max() / 50.0 + 1e-4  # N m; rounding of differences
+    assert np.abs(far[moving]).max() < 0.05 * np.abs(before[moving]).max()
+    assert np.abs(far[~moving]).max() < 1e-5 * np.abs(before[~moving]).max()
 
 
 @pytest.mark.parametrize("scene, posture", SCENES)
@@ -66,16 +82,15 @@ def test_newton_converges_quadratically(scene, posture):
     for _ in range(6):
         _, _, size = newton(plan.tables, state, work, motion, drive, still, 0.0, 1, 10.0)
         sizes.append(size)
-    factors = [b / a**2 for a, b in zip(sizes, sizes[1:], strict=False) if b > 1e-11]
+    factors = [b / a**2 for a, b in pairwise(sizes) if b > 1e-11]
     assert sizes[-1] < 1e-12 and len(factors) >= 1
     assert max(factors) < 100.0
 
 
 @pytest.mark.parametrize("scene, posture", SCENES)
 def test_condensed_tangent_is_symmetric(scene, posture):
-    plan, state, work, rng = boom_beside_equilibrium(scene, posture)
-    histories = len(plan.masses)
-    motion = Motion(1e5, 500.0, work.position + rng.normal(size=histories) * 1e-5, np.zeros(histories))
+    plan, state, work, rested = boom_beside_equilibrium(scene, posture)
+    motion = Motion(1e5, 500.0, rested, -500.0 * rested)
     sweep_in(plan.tables, state, work, motion, plan.closed_lengths, np.zeros(plan.joints))
     for index in range(plan.joints):
         block = work.blocks[index]

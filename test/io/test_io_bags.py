@@ -126,7 +126,7 @@ def test_file_is_as_the_contract_says(bag: Path) -> None:
     with (bag / FILE_NAME).open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         header, summary = reader.get_header(), reader.get_summary()
-        notes = [record for record in reader.iter_metadata()]
+        notes = list(reader.iter_metadata())
     assert (header.profile, header.library) == ("ros2", "boom_twin")
     assert summary is not None
     assert {schema.encoding for schema in summary.schemas.values()} == {"ros2msg"}

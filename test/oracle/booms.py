@@ -1,4 +1,4 @@
-"""Seeded booms unlike the default scene: 1 to 5 sections, any joints, pins anywhere, parts missing. All values are made up."""
+"""Seeded booms unlike the default scene: 1 to 5 sections, any joints, pins anywhere, parts missing. All made up."""
 
 from __future__ import annotations
 

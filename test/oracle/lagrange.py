@@ -2,8 +2,8 @@
 
     M q'' + J^T (J' q') + dV/dq + dissipation + G^T lambda = 0,     G q'' + q'.(d2g) q' - l_ref'' = 0 ,
 
-solved for q'' and lambda at every call and integrated by an explicit Runge-Kutta method of order 8. With fineness 0 it is a
-multibody system of rigid bodies. No discretisation of time or of constraints is shared with the model.
+solved for q'' and lambda at every call and integrated by an explicit Runge-Kutta method of order 8. With fineness 0 it
+is a multibody system of rigid bodies. No discretisation of time or of constraints is shared with the model.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Lagrange:
         return force
 
     def solve(self, times, angles, tolerance=1e-11):
-        """From rest in equilibrium; rows of joints (n), cylinder forces (n), tip x, y, turn, its acceleration x, y, turn."""
+        """From rest in equilibrium; rows of joints (n), cylinder forces (n), tip x, y, turn and their accelerations."""
         q, *_ = equilibrium(self.model, self.drive(times[0])[0], angles)
         size = len(q)
 

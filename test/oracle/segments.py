@@ -1,14 +1,15 @@
-"""Finite-segment boom: short rigid pieces with bending and axial springs between them, and all loops closed by constraints.
+"""Finite-segment boom: short rigid pieces with bending and axial springs between them, loops closed by constraints.
 
-A witness that shares no code with the model. Coordinates: heading of every section's root, headings of both links of every
-six-bar, and at each spring a turn and a stretch. Everything else (points, energy, constraints) is written once as plain
-geometry on `jets`, which give gradients and Hessians. Its error falls with the square of the number of springs per section.
+A witness that shares no code with the model. Coordinates: heading of every section's root, headings of both links of
+every six-bar, and at each spring a turn and a stretch. Everything else (points, energy, constraints) is written once as
+plain geometry on `jets`, which give gradients and Hessians. Its error falls with the square of the number of springs.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -101,7 +102,7 @@ class Segments:
         inside = sorted({p for p, _ in self._pins(i).values() if x0 + 1e-9 < p < x1 - 1e-9})
         borders = [x0, *inside, x1]
         parts = []
-        for a, b in zip(borders, borders[1:], strict=False):
+        for a, b in pairwise(borders):
             parts.append((a, b, self.fineness * max(1, round(4 * (b - a) / (x1 - x0)))))
         return [(0.0, x0, 0), *parts, (x1, section.length, 0)]
 
@@ -134,7 +135,8 @@ class Segments:
         """A rigid stretch: the named part that belongs to it, the beam if it does not bend, and the line's fill."""
         whole = x1 - x0 == section.length
         rods = [(fill, 0.0, x0, x1)]
-        bodies = [p for p, here in ((section.root, whole or x0 == 0.0), (section.head, whole or x0 > 0.0)) if p and here]
+        ends = (section.root, whole or x0 == 0.0), (section.head, whole or x0 > 0.0)
+        bodies = [part for part, here in ends if part is not None and here]
         if whole and section.beam is not None:
             rods.append((section.rho_A, section.rho_I or 0.0, *section.beam))
         for density, turning, a, b in rods:
@@ -213,23 +215,25 @@ class Segments:
 
 
 def equilibrium(model, drive, angles):
-    """Newton's method on the energy with multipliers; returns coordinates, boom, multipliers and Hessian of the Lagrangian."""
+    """Newton's method on the energy; returns coordinates, boom, multipliers and Hessian of the Lagrangian."""
     q, multipliers = model.start(angles), None
-    for _ in range(60):
+    for iteration in range(60):
         boom = model.place(q)
         energy, constraints = model.energy(boom, drive)
         jacobian = np.array([c.g for c in constraints]).reshape(-1, len(q))
         if multipliers is None:
             multipliers = np.zeros(len(constraints))
-        hessian = energy.h + sum((m * c.h for m, c in zip(multipliers, constraints, strict=True)), np.zeros_like(energy.h))
+        hessian = energy.h.copy()
+        for multiplier, constraint in zip(multipliers, constraints, strict=True):
+            hessian += multiplier * constraint.h
         matrix = np.block([[hessian, jacobian.T], [jacobian, np.zeros((len(constraints),) * 2)]])
         right = np.concatenate([energy.g, [c.v for c in constraints]])
         step = np.linalg.solve(matrix, -right)
         dq = step[: len(q)]
         size = np.abs(dq).max(initial=0.0)
-        if size < 1e-11:
+        if size < 1e-11 and iteration > 0:  # the first pass finds the multipliers of a boom that cannot move
             return q, boom, multipliers, hessian
-        share = min(1.0, 0.1 / size)
+        share = 0.1 / max(size, 0.1)
         q = q + share * dq
         multipliers = step[len(q) :] if share == 1.0 else multipliers + share * (step[len(q) :] - multipliers)
     raise RuntimeError("the oracle found no equilibrium")
@@ -248,6 +252,8 @@ def frequencies(model, boom, hessian, count=6):
     _, constraints = model.energy(boom, [length.v for length in boom.lengths])
     n = len(hessian)
     free = null_space(np.array([c.g for c in constraints])) if constraints else np.eye(n)
+    if free.shape[1] == 0:
+        return np.zeros(0)
     values = eigh(free.T @ hessian @ free, free.T @ mass_matrix(boom) @ free, eigvals_only=True)
     assert values[0] > 0.0, "the oracle's equilibrium is not stable"
     return np.sqrt(values[:count]) / (2.0 * math.pi)

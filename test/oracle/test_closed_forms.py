@@ -62,7 +62,7 @@ def test_weight_that_hangs_stiffens_and_weight_that_stands_softens():
 
 
 def test_rotary_inertia_lowers_frequencies_by_rayleighs_share():
-    """For a slender beam: relative change of omega_1 is -1/2 (rho_I/rho_A) int psi'^2 / int psi^2, by 1st-order perturbation."""
+    """First-order perturbation: omega_1 changes by -1/2 (rho_I/rho_A) int w'^2 / int w^2 of itself."""
     plain = statics(booms.scene_of(cantilever()), posture="level").frequencies[0]
     rotary = statics(booms.scene_of(cantilever(rho_I=0.02)), posture="level").frequencies[0]
     x = np.linspace(0.0, 1.0, 20001)

@@ -1,10 +1,11 @@
-"""The model's motion against Lagrange's equations of the same rigid bodies, integrated to 1e-11: second order to a small error."""
+"""The model's motion against Lagrange's equations of the same bodies, solved to 1e-11: second order, small errors."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import booms, lagrange, motions, segments
+from convergence import motions
+from oracle import booms, lagrange, segments
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 DURATION, SAMPLES = 0.32, 8

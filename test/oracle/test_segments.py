@@ -36,7 +36,7 @@ def _compare(scene, posture, sag=2e-5, frequency=None):
     strokes, (tip, joints, forces, frequencies) = _witness(scene, posture)
     found = statics(scene, posture=posture)
     assert found.strokes == pytest.approx(strokes, abs=1e-12)
-    assert np.linalg.norm(found.tip - tip) < sag * np.linalg.norm(tip - found.tip_rigid)
+    assert np.linalg.norm(found.tip - tip) < sag * np.linalg.norm(tip - found.tip_rigid) + 1e-9
     assert found.joints == pytest.approx(joints, abs=2e-6)
     assert found.cylinder_forces == pytest.approx(forces, rel=2e-5, abs=0.05)
     for k, bound in enumerate(frequency or ()):
@@ -96,7 +96,7 @@ def test_rod_pin_inboard_and_outboard_of_other_pins(pin):
     _compare(booms.scene_of(spec), "arch", frequency=(5e-5, 1e-4, 2e-4, 5e-4, 5e-3, 5e-3))
 
 
-STATICS_SEEDS = [0, 3, 5, 6, 7, 8, 9, 11, 13, 14, 16, 18, 22, 26, 27, 28, 34]
+STATICS_SEEDS = [0, 70, 3, 5, 6, 7, 8, 9, 11, 13, 14, 16, 18, 22, 26, 27, 28, 34]
 
 
 @pytest.mark.parametrize("seed", STATICS_SEEDS)
@@ -122,14 +122,14 @@ def test_random_booms_cover_what_they_promise():
 
 @pytest.mark.parametrize("chosen", [[0], [3], [0, 1], [2, 3], [0, 1, 2], [1, 2, 3]])
 def test_default_modes_suffice_for_short_booms(chosen):
-    """Fewer sections put stretching and higher bending among the first six modes; the bounds asked for hold there too."""
+    """Fewer sections put stretching and higher bending among the first six modes; the bounds must hold there too."""
     spec = booms.document()
     spec["sections"] = [{k: v for k, v in spec["sections"][i].items() if k != "rod_pin"} for i in chosen]
     spec["sections"][0]["rod_pin"] = [0.6, -0.12]
     spec["joints"] = [spec["joints"][0], *(spec["joints"][max(i, 1)] for i in chosen[1:])]
     spec["postures"] = {"bent": [10.0 - 20.0 * k for k in range(len(chosen))]}
     scene = booms.scene_of(spec)
-    _, (_, _, _, frequencies) = _witness(scene, "bent", coarse=5)
+    _, (_, _, _, frequencies) = _witness(scene, "bent", coarse=4)
     found = statics(scene, posture="bent").frequencies
     assert found[:4] == pytest.approx(frequencies[:4], rel=5e-3)
     assert found[4:] == pytest.approx(frequencies[4:], rel=2e-2)

@@ -1,16 +1,17 @@
-"""Every element's forces are the derivative of its energy, and its tangent the derivative of its forces: finite differences.
+"""Every element's forces are the derivative of its energy, and its tangent the derivative of its forces.
 
-With a = A (x - x_hat) the inertia forces of one step derive from 1/2 m A (x - x_hat)^2, so at a frozen instant every element
-has a potential, written here from its definition.
+With a = A (x - x_hat) the inertia forces of one step derive from 1/2 m A (x - x_hat)^2, so at a frozen instant every
+element has a potential, written here from its definition.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracle.jets import coordinates, cos, sin
+
 from boom_twin.chain.program import Motion
 from boom_twin.physics import algebra, beam, cylinder, modes, rigid
-from oracle.jets import coordinates, cos, sin
 
 GRAVITY = np.array([0.7, -9.5])
 GAIN, RATE = 3.0e3, 90.0
@@ -125,21 +126,20 @@ def placed(z, row):
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
     turn, position = np.zeros((POINTS, 2)), np.zeros(COUNT + 1 + 3 * POINTS)
     angle = beam.beam_shape(row, BASIS.psi, TABLES[1], z[3:], rho, drho, turn)
-    beam.place_beam(row, BASIS.psi, rho, z[3:], *z[:3], position)
     c, s = np.cos(z[2]), np.sin(z[2])
+    beam.place_beam(row, BASIS.psi, rho, z[3:], *z[:3], c, s, position)
     end = z[:2] + np.array([[c, -s], [s, c]]) @ rho[-1]
-    return np.append(end, z[2] + angle), position, (rho, drho, turn, np.zeros((POINTS, 2)))
+    scratch = rho, drho, turn, np.zeros((POINTS, 2)), np.zeros((COUNT + 1, COUNT + 1))
+    return np.append(end, z[2] + angle), position, scratch
 
 
 def swept(z, row):
     """Cut at the input end and gains, with two carried slots and the outboard side linearised at END_AT."""
     _, position, scratch = placed(z, row)
-    m, size = 5, COUNT + 1
-    s, p = END_STIFFNESS.copy(), END_FORCE.copy()
-    g, h = np.zeros(m + size), np.zeros((m + size, m + size))
-    motion = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS)
-    beam.transfer_beam(row, TABLES, scratch, z[3:], z[2], motion, GRAVITY, position, s, p, m, g, h)
-    return s, p, g[m:], h[m:, :m]
+    s, p, gains, free = END_STIFFNESS.copy(), END_FORCE.copy(), np.zeros((COUNT + 1, 5)), np.zeros(COUNT + 1)
+    motion, turn = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS), (np.cos(z[2]), np.sin(z[2]))
+    beam.transfer_beam(row, TABLES, scratch, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5), gains, free)
+    return s, p, free, gains
 
 
 END_AT, _, _ = placed(BEAM_Z, beam_row(0.0))
@@ -199,7 +199,7 @@ def test_beam_condenses_the_hessian_of_its_energy(beta):
 
 def test_beam_shape_derivatives():
     row = beam_row(0.0)
-    _, _, (_, drho, _, _) = placed(BEAM_Z, row)
+    drho = placed(BEAM_Z, row)[2][1]
     expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2][0], BEAM_Z[3:])
     assert drho == pytest.approx(np.moveaxis(expected, -1, 1), abs=1e-8)
 
@@ -261,16 +261,18 @@ def test_condense_against_numpy(m, n):
     h = rng.normal(size=(m + n, m + n))
     h, g = h + h.T, rng.normal(size=m + n)
     inner = np.linalg.solve(h[m:, m:], np.column_stack([h[m:, :m], g[m:]]))
-    expected = h[:m, :m] - h[:m, m:] @ inner[:, :m], g[:m] - h[:m, m:] @ inner[:, m]
-    negative = int(np.sum(np.linalg.eigvalsh(h[m:, m:]) < 0.0))
-    assert algebra.condense(h, g, m, n) == negative
-    assert h[:m, :m] == pytest.approx(expected[0], rel=1e-9)
-    assert h[m:, :m] == pytest.approx(inner[:, :m], rel=1e-9)
-    assert g == pytest.approx(np.concatenate([expected[1], inner[:, m]]), rel=1e-9)
+    s, p, coupling, block, force = h[:m, :m].copy(), g[:m].copy(), h[m:, :m].copy(), h[m:, m:].copy(), g[m:].copy()
+    negative = int(np.sum(np.linalg.eigvalsh(block) < 0.0))
+    assert algebra.condense(s, p, coupling, block, force, m, n) == negative
+    assert s == pytest.approx(h[:m, :m] - h[:m, m:] @ inner[:, :m], rel=1e-9)
+    assert p == pytest.approx(g[:m] - h[:m, m:] @ inner[:, m], rel=1e-9)
+    assert coupling == pytest.approx(inner[:, :m], rel=1e-9)
+    assert force == pytest.approx(inner[:, m], rel=1e-9)
 
 
 def test_condense_reports_a_vanishing_pivot():
-    assert algebra.condense(np.diag([1.0, 0.0]), np.ones(2), 1, 1) == -1
+    one, none = np.ones((1, 1)), np.zeros((1, 1))
+    assert algebra.condense(one, np.ones(1), np.ones((1, 1)), none, np.ones(1), 1, 1) == -1
 
 
 def test_solve_pivots_and_reports_singular():

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracle import booms
+
 from boom_twin.chain import program
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.splits import flexible_parts
-from oracle import booms
 
 
 def total_mass(scene):

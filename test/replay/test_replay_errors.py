@@ -28,7 +28,7 @@ def test_missing_folder(tmp_path):
 
 
 def test_strokes_that_are_not_the_scenes(tmp_path):
-    with pytest.raises(BagError, match="no stroke sample could be used.*cylinder_1..4"):
+    with pytest.raises(BagError, match=r"no stroke sample could be used.*cylinder_1\.\.4"):
         replay(session(tmp_path / "bag", strokes=[5.0, 5.0, 5.0, 5.0]), load_scene(), tmp_path / "out")
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ class Process:
     def __init__(self, log: Path, *arguments: str) -> None:
         self._log = log
         self._file = log.open("w")
-        self._child = subprocess.Popen([sys.executable, "-m", *arguments], stdout=self._file, stderr=subprocess.STDOUT)
+        command = [sys.executable, "-m", *arguments]
+        self._child = subprocess.Popen(command, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True)
 
     def said(self) -> str:
         return self._log.read_text()
@@ -49,7 +51,8 @@ class Process:
         return self._child.wait(patience)
 
     def close(self) -> None:
-        self._child.kill()
+        with suppress(ProcessLookupError):  # its children too
+            os.killpg(self._child.pid, signal.SIGKILL)
         self._child.wait()
         self._file.close()
 
@@ -64,7 +67,7 @@ def domain(request: pytest.FixtureRequest) -> Iterator[None]:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         rclpy.init(args=[])
         yield
-        rclpy.shutdown()
+        rclpy.try_shutdown()
 
 
 @pytest.fixture(scope="module")

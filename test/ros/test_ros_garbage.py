@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -59,15 +59,22 @@ class Bench:
 
 
 @pytest.fixture
-def bench(domain: None) -> Any:
+def bench(domain: None) -> Iterator[Bench]:
     made = Bench()
     yield made
     made.node.destroy_node()
 
 
-def test_garbage_is_counted_and_survived(spawn_node: Callable[..., Any], bench: Bench, motion: dict[str, Any]) -> None:
-    node = spawn_node()
-    node.wait_for("active;")
+@pytest.fixture
+def node(spawn_node: Callable[..., Any]) -> Iterator[Any]:
+    """An active node, gone after the test."""
+    made = spawn_node()
+    made.wait_for("active;")
+    yield made
+    made.close()
+
+
+def test_garbage_is_counted_and_survived(node: Any, bench: Bench, motion: dict[str, Any]) -> None:
     bench.until(lambda: bench.strokes.get_subscription_count() == 1 and bench.imu.get_subscription_count() == 1)
     bench.until(lambda: bench.node.count_publishers("/boom_twin/tip/position") == 1 and bool(bench.diagnostics))
     start = [float(value) for value in motion["strokes"][0]]
@@ -109,9 +116,7 @@ def test_garbage_is_counted_and_survived(spawn_node: Callable[..., Any], bench: 
     assert node.stop() == 0
 
 
-def test_diagnostics_follow_the_strokes(spawn_node: Callable[..., Any], bench: Bench, motion: dict[str, Any]) -> None:
-    node = spawn_node()
-    node.wait_for("active;")
+def test_diagnostics_follow_the_strokes(node: Any, bench: Bench, motion: dict[str, Any]) -> None:
     bench.until(lambda: bench.strokes.get_subscription_count() == 1)
 
     def shows(model: bytes, strokes: bytes) -> bool:

@@ -33,15 +33,15 @@ Recorded = dict[str, list[tuple[int, bytes]]]
 def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> Path:
     """Inputs and outputs of a live run, recorded over DDS in a third process."""
     from boom_twin.ros.player import Player
+    from boom_twin.ros.recorder import COMPLETE
 
     out = tmp_path_factory.mktemp("live") / "bag"
     node = spawn_node("--params-file", str(PARAMETERS))
     node.wait_for("active;")
     recorder = spawn("boom_twin.cli.main", "record", "--out", str(out))
-    recorder.wait_for("recording")
     player = Player(scan(bag))
+    recorder.wait_for(COMPLETE)
     assert player.wait(60.0, listeners=2) == []
-    time.sleep(1.0)  # for the recorder to be known to the node
     sent = sum(1 for _ in player.play())
     time.sleep(1.0)
     player.close()

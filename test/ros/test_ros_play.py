@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
@@ -24,10 +24,9 @@ def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path
     strokes: list[JointState] = []
     ticks: list[int] = []
     node = rclpy.create_node("listener")
-    node.create_subscription(JointState, "cylinder_strokes", strokes.append, qos_profile_sensor_data)
-    node.create_subscription(
-        Clock, "/clock", lambda msg: ticks.append(msg.clock.sec * 10**9 + msg.clock.nanosec), qos_profile_sensor_data
-    )
+    qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_subscription(JointState, "cylinder_strokes", strokes.append, qos)
+    node.create_subscription(Clock, "/clock", lambda msg: ticks.append(msg.clock.sec * 10**9 + msg.clock.nanosec), qos)
     part = ["--start", "1", "--duration", "2", "--rate", "2", "--clock"]
     play = spawn("boom_twin.cli.main", "play", str(bag), *part, "--wait", "5")
     end = time.monotonic() + 60.0

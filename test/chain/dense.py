@@ -1,6 +1,6 @@
 """The boom's equations written out over all unknowns at once, without any condensing: residual by differences.
 
-Only positions come from the model (`place`). Forces of the mass points, of beams, cylinders and closures are put together as a
+Only positions come from the model (`place`). Forces of mass points, beams, cylinders and closures are put together as a
 gradient by all unknowns; the increments of the sweeps have to solve this large linearised system.
 """
 

@@ -13,7 +13,7 @@ from boom_twin.plan.compile import compile_scene
 def smooth_drive(start, travel, duration):
     """Drive from `start` lengths by `travel` (both (n,), m) with q(t) = 35x^4 - 84x^5 + 70x^6 - 20x^7, x = t/duration.
 
-    Three derivatives vanish at both ends. Returns a function of time: lengths, rates, accelerations; time may be (m, 1).
+    Three derivatives vanish at both ends. Returns a function of time: lengths, rates, accelerations.
     """
     start, travel = np.asarray(start), np.asarray(travel)
 

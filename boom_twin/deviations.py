@@ -1,0 +1,87 @@
+"""How far measured values may be from predicted ones while all is well: sensor noise, and stroke noise through the model."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .analysis.noise import StrokeNoise, stroke_noise
+from .chain.program import State
+from .estimate.follower import copy_state
+from .physics.linkage import cylinder_length
+from .plan.compile import Plan
+from .records import Array, Prediction
+from .settings import Settings
+
+POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
+INTERVAL_STEP = 0.2  # of the time between samples, likewise
+INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
+
+
+class Deviations:
+    """Expected standard deviations of the residuals, following the posture.
+
+    Parameters
+    ----------
+    plan : Plan
+    settings : Settings
+    epoch : int
+        Stamp (ns) of the first one, when the boom was at rest.
+    """
+
+    def __init__(self, plan: Plan, settings: Settings, epoch: int) -> None:
+        self._plan, self._settings, self._epoch = plan, settings, epoch
+        self._noise: StrokeNoise | None = None
+        self._interval = 0.0
+        self._at = np.zeros(plan.joints)
+        self._seen = epoch
+        self._slopes2 = np.zeros(plan.joints)
+        self._joints = np.zeros(plan.joints)
+        self._force = np.zeros(2)
+
+    def at(
+        self, prediction: Prediction, interval: float, variances: Array, live: State, angles: Array
+    ) -> tuple[Array, Array]:
+        """Deviations of the joint angles (n,) in rad, and of the specific force (2,) in m/s^2.
+
+        Parameters
+        ----------
+        interval : float
+            Time between stroke samples, s.
+        variances : ndarray, shape (n,)
+            Of the strokes' newest estimates, m^2.
+        live : State
+            The boom as predicted; left as it is.
+        angles : ndarray, shape (n,)
+            Joint angles of the rigid boom, rad.
+        """
+        if self._noise is None or prediction.stamp >= self._seen + INTERVAL:
+            self._refresh(prediction, interval, live, angles)
+        return np.sqrt(self._joints + self._slopes2 * variances), self._force
+
+    def _refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
+        self._seen = prediction.stamp
+        moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP
+        if self._noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
+            self._noise = self._propagate(live, interval)
+            self._at, self._interval = prediction.strokes, interval
+            slopes = [cylinder_length(self._plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
+            self._slopes2 = 1.0 / np.square(slopes)
+        time = (prediction.stamp - self._epoch) * 1e-9
+        joints, acceleration = self._noise.after(time, prediction.tip_angle)
+        self._joints = self._settings.angle_variance + joints
+        self._force = np.sqrt(self._settings.imu_sigma**2 + acceleration)
+
+    def _propagate(self, live: State, interval: float) -> StrokeNoise:
+        probe, work = self._plan.state(), self._plan.work()
+        copy_state(live, probe)
+        tuned = self._settings
+        return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
+
+
+def specific_force(prediction: Prediction, gravity: Array) -> Array:
+    """What an IMU at the tip feels along its x and z, shape (2,), m/s^2."""
+    c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
+    ax, ay = prediction.tip_acceleration - gravity
+    return np.array([c * ax + s * ay, c * ay - s * ax])

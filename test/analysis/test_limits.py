@@ -1,0 +1,178 @@
+"""What is left out is the limit of what is small or stiff."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from convergence import motions
+from oracle import booms, segments
+
+from boom_twin.analysis.simulate import simulate
+from boom_twin.analysis.statics import statics
+
+DECADES = 10.0 ** np.arange(0, 6)
+
+
+def rigid(spec, beams=True):
+    """A copy of a scene's dicts with incompressible cylinders, and rigid sections, by `modes` or for want of beams."""
+    spec = dict(spec, modes=0 if beams else 3)
+    spec["joints"] = [dict(joint, cylinder=_without(joint["cylinder"], "k", "d")) for joint in spec["joints"]]
+    if not beams:
+        spec["sections"] = [_without(s, "beam", "head", "A", "I", "rho_A", "rho_I", "beta") for s in spec["sections"]]
+    return spec
+
+
+def _without(part, *keys):
+    return {key: value for key, value in part.items() if key not in keys}
+
+
+def deviation(scene, posture="arch"):
+    """Distance (m) of the tip from that of the undeformed boom."""
+    found = statics(scene, posture=posture, modes=0)
+    return np.linalg.norm(found.tip - found.tip_rigid)
+
+
+@pytest.mark.parametrize("beams", [True, False])
+@pytest.mark.parametrize("posture", ["horizontal", "arch", "high", "low"])
+def test_rigid_boom_at_rest_is_the_rigid_kinematics(beams, posture):
+    scene = booms.scene_of(rigid(booms.document(), beams))
+    found = statics(scene, posture=posture)
+    angles = np.diff(np.radians(scene.postures[posture]), prepend=0.0)
+    assert found.tip == pytest.approx(found.tip_rigid, abs=1e-9)
+    assert found.joints == pytest.approx(angles, abs=1e-9)
+    assert len(found.frequencies) == 0
+    assert np.all(np.abs(found.cylinder_forces) > 1.0)
+
+
+@pytest.mark.parametrize("beams", [True, False])
+def test_rigid_boom_in_motion_is_the_rigid_kinematics(beams):
+    """The tip follows the circles of the linkages through every stroke; its angles come from the oracle's geometry."""
+    scene = booms.scene_of(rigid(booms.document(), beams))
+    start = np.array([1.0, -0.7, -0.9, -0.9])
+    travel = np.array([0.05, -0.06, 0.07, 0.04])
+    model = segments.Segments(scene, 0)
+    drive = motions.smooth_drive(model.lengths(start), travel, 0.4)
+    rows = motions.follow(scene, drive, start, 2e-3, 200, 20)
+    angles = start
+    for row, time in zip(rows, np.linspace(0.0, 0.4, 11), strict=True):
+        for _ in range(6):  # Newton on the oracle's rigid geometry, joint by joint
+            slopes = [(model.lengths(angles + 1e-6)[i] - model.lengths(angles - 1e-6)[i]) / 2e-6 for i in range(4)]
+            angles = angles + (drive(time)[0] - model.lengths(angles)) / np.array(slopes)
+        headings = np.cumsum(angles)
+        tip = [s.length * np.array([np.cos(h), np.sin(h)]) for s, h in zip(scene.sections, headings, strict=True)]
+        assert row[:4] == pytest.approx(angles, abs=1e-9)
+        assert row[8:10] == pytest.approx(np.sum(tip, axis=0), abs=1e-9)
+
+
+def test_growing_oil_stiffness_approaches_the_incompressible_cylinder():
+    spec, errors = booms.document(), []
+    limit = statics(booms.scene_of(spec | {"joints": rigid(spec)["joints"]}), posture="arch", modes=0)
+    for factor in DECADES:
+        joints = [dict(j, cylinder=j["cylinder"] | {"k": j["cylinder"]["k"] * factor}) for j in spec["joints"]]
+        found = statics(booms.scene_of(spec | {"joints": joints}), posture="arch", modes=0)
+        errors.append(np.linalg.norm(found.tip - limit.tip))
+    ratios = np.array(errors[:-1]) / errors[1:]
+    assert np.all(ratios > 8.0) and np.all(ratios[1:] == pytest.approx(10.0, rel=0.02))
+
+
+def test_growing_beam_stiffness_approaches_the_rigid_section():
+    """EI and EA by the modulus; the limit keeps the beam's mass: modes 0."""
+    spec, errors = booms.document(), []
+    limit = statics(booms.scene_of(spec | {"modes": 0}), posture="arch", modes=4)
+    for factor in DECADES:
+        material = spec["material"] | {"E": spec["material"]["E"] * factor}
+        found = statics(booms.scene_of(spec | {"material": material}), posture="arch", modes=4)
+        errors.append([np.linalg.norm(found.tip - limit.tip), *np.abs(found.frequencies - limit.frequencies)])
+    ratios = np.array(errors[:-1]) / errors[1:]
+    assert np.all(ratios[:, 0] > 8.0) and ratios[1:, 0] == pytest.approx(10.0, rel=0.02)
+    assert ratios[2:, 1:] == pytest.approx(10.0, rel=0.1)
+
+
+def test_all_stiff_together_approach_the_rigid_kinematics():
+    spec, errors = booms.document(), []
+    for factor in DECADES:
+        material = spec["material"] | {"E": spec["material"]["E"] * factor}
+        joints = [dict(j, cylinder=j["cylinder"] | {"k": j["cylinder"]["k"] * factor}) for j in spec["joints"]]
+        errors.append(deviation(booms.scene_of(spec | {"material": material, "joints": joints})))
+    assert np.all(np.array(errors[:-1]) / errors[1:] > 8.0)
+
+
+def light(spec, factor):
+    """Barrels, rods and links of `factor` times the mass; 0 leaves them out."""
+    joints = []
+    for joint in spec["joints"]:
+        parts = {}
+        for name in ("barrel", "rod"):
+            part = joint["cylinder"][name]
+            parts[name] = part | {"mass": factor * part["mass"], "inertia": factor * part["inertia"]}
+        links = {name: factor * joint[name] for name in ("mL", "mR") if name in joint}
+        joints.append(joint | links | {"cylinder": joint["cylinder"] | parts})
+    if factor == 0.0:
+        joints = [_without(j, "mL", "mR") | {"cylinder": _without(j["cylinder"], "barrel", "rod")} for j in joints]
+    return booms.scene_of(spec | {"joints": joints})
+
+
+def test_massless_parts_are_the_limit_of_light_ones():
+    spec, limit = booms.document(), None
+    limit = statics(light(spec, 0.0), posture="arch")
+    errors = []
+    for factor in (1e-1, 1e-2, 1e-3, 1e-4):
+        found = statics(light(spec, factor), posture="arch")
+        errors.append([np.linalg.norm(found.tip - limit.tip), *np.abs(found.frequencies - limit.frequencies)])
+    ratios = np.array(errors[:-1]) / errors[1:]
+    assert ratios == pytest.approx(10.0, rel=0.15)
+    assert np.all(np.array(errors[-1]) < [1e-5, *[2e-4] * 6])
+
+
+def test_massless_parts_in_motion():
+    spec = booms.document()
+    times = np.linspace(0.0, 0.3, 31)
+    start = statics(light(spec, 0.0), posture="arch", modes=0).strokes
+    q = 10 * (times / 0.3) ** 3 - 15 * (times / 0.3) ** 4 + 6 * (times / 0.3) ** 5
+    strokes = start + q[:, None] * np.array([0.02, 0.01, -0.02, 0.01])
+    runs = [simulate(light(spec, factor), times, strokes, dt=2e-3) for factor in (1e-2, 1e-4, 0.0)]
+    far, near = (np.abs(run.tip - runs[-1].tip).max() for run in runs[:-1])
+    assert near < 1e-5 and far / near == pytest.approx(100.0, rel=0.1)
+
+
+def test_more_modes_converge_from_above():
+    """Frequencies of a richer basis never rise, and settle."""
+    spec = booms.document()
+    scenes = [booms.scene_of(spec | {"modes": n}) for n in (2, 3, 4, 6, 8)]
+    table = np.array([statics(scene, posture="arch").frequencies for scene in scenes])
+    assert np.all(np.diff(table, axis=0) < 1e-9 * table[:-1])
+    assert table[-1] == pytest.approx(table[-2], rel=1e-5)
+    assert table[1][:4] == pytest.approx(table[-1][:4], rel=1e-4)
+
+
+def test_both_bases_have_the_same_limit():
+    from boom_twin.analysis.frequencies import natural_modes
+    from boom_twin.analysis.statics import settle
+    from boom_twin.plan.compile import compile_scene
+    from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+
+    found = []
+    for basis, modes in (("end-shapes", 3), ("cantilever", 3), ("cantilever", 10)):
+        scene = booms.scene_of(booms.document() | {"modes": modes})
+        plan = compile_scene(scene, basis)
+        state, work = plan.state(), plan.work()
+        settle(plan, state, work, strokes_of_posture(scene, "horizontal"), posture_angles(scene, "horizontal"))
+        found.append(natural_modes(plan, state, work, 1)[0].frequency)
+    assert 0.005 < found[1] / found[0] - 1.0 < 0.03  # pure cantilever modes are percents too stiff here
+    assert abs(found[2] / found[0] - 1.0) < 0.4 * (found[1] / found[0] - 1.0)
+
+
+def test_a_split_without_force_changes_nothing():
+    """The barrel pin of a weightless section splits the beam or, on the head, does not: the beam bends alike."""
+    pivots = []
+    for c in ([-1.5, 0.15], [-0.22, 0.55]):
+        spec = booms.document()
+        spec |= {"sections": spec["sections"][:2], "joints": spec["joints"][:2], "postures": {"down": [0.0, -60.0]}}
+        spec["joints"][1] = _without(spec["joints"][1], "mL", "mR") | {"C": c}
+        spec["joints"][1]["cylinder"] = {"k": 3e7, "closed_length": 0.3, "max_stroke": 3.0}
+        spec["sections"][1] = {"length": 3.3}
+        found = statics(booms.scene_of(spec), posture="down", modes=0)
+        pivots.append(found.outline[-2])
+        assert np.linalg.norm(found.tip - pivots[-1]) == pytest.approx(3.3)
+    assert pivots[0][1] < -2e-3  # it does sag
+    assert pivots[0] == pytest.approx(pivots[1], abs=1e-9)
