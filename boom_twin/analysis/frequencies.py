@@ -24,6 +24,7 @@ from ..records import Array
 HIGHEST = 1e7  # rad/s; no mode is looked for above
 RELATIVE_WIDTH = 1e-11  # of the last bracket
 SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
+LOAD = 1e-9  # m, displacement whose inertia forces load the boom for that
 NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
 
 
@@ -131,13 +132,20 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
 
 
 def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -> Array:
-    """Solve (K - omega^2 M) dz = M load, up to a factor."""
+    """Solve (K - omega^2 M) dz = M load, up to a factor.
+
+    Half the difference of two small loads: the tangent holds forces too, so a large one would change K, and what the state
+    lacks to equilibrium cancels.
+    """
     place(plan.tables, state, work)
-    hat = work.position + load
-    motion = Motion(-omega * omega, 0.0, hat, np.zeros_like(hat))
-    sweep_in(plan.tables, state, work, motion, _drive(plan, state, work), np.zeros(plan.joints))
-    sweep_out(plan.tables, state, work)
-    return work.dz.copy()
+    position, still = work.position.copy(), np.zeros_like(work.position)
+    drive, sides = _drive(plan, state, work), []
+    for size in (LOAD, -LOAD):
+        motion = Motion(-omega * omega, 0.0, position + size * load, still)
+        sweep_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
+        sweep_out(plan.tables, state, work)
+        sides.append(work.dz.copy())
+    return np.asarray(sides[0] - sides[1])
 
 
 def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..chain.newton import OK, newton
 from ..chain.program import State, Work
-from ..chain.status import SENTENCES
 from ..chain.step import motion_at_rest, observe
 from ..errors import SolverError, UsageError
 from ..plan.compile import Plan, compile_scene
@@ -122,8 +121,11 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
         if status == OK and is_stable(plan, state, work):
             return
     where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
-    reason = "the equilibrium found is not stable" if status == OK else SENTENCES[status]
-    raise SolverError(f"no equilibrium at strokes {where} m: {reason}. Check masses, stiffnesses and the posture.")
+    reason = "what was found is not stable" if status == OK else "weight moves it on and on, or a linkage folds over"
+    raise SolverError(
+        f"no equilibrium at strokes {where} m: {reason}. Check masses, payload, stiffnesses, and how near the posture is to "
+        "the end of a joint's range."
+    )
 
 
 def is_stable(plan: Plan, state: State, work: Work) -> bool:

@@ -10,6 +10,7 @@ from ..errors import Fault
 from ..scene import Scene
 from ..scene.explain import Account, JointAccount, SectionAccount, explain
 from ..scene.load import DEFAULT_NAME, examine
+from ..scene.splits import LEAST
 from .common import add_json, add_scene, print_json
 
 SIZE_A = "angle of the section, cylinder force"
@@ -100,10 +101,13 @@ def _section_words(section: SectionAccount) -> str:
         return "rigid (no beam), all of it described by root"
     x0, x1 = section.parts[0][0], section.parts[-1][1]
     coordinates = f"{section.bending} bending + 1 axial coordinates"
-    if not section.splits:
-        return f"flexible from {x0:g} to {x1:g} m: {coordinates}"
-    where = " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
-    return f"flexible from {x0:g} to {x1:g} m, split {where}: {len(section.parts)} parts with {coordinates} each"
+    words = f"flexible from {x0:g} to {x1:g} m"
+    if section.splits:
+        words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
+    if len(section.parts) > len(section.splits) + 1:
+        words += f", cut evenly because fewer than {LEAST} sections bend"
+    parts = f"{len(section.parts)} parts with {coordinates} each" if len(section.parts) > 1 else coordinates
+    return f"{words}: {parts}"
 
 
 def _cylinders(account: Account) -> list[str]:

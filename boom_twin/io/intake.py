@@ -17,6 +17,9 @@ from ..records import Sample, Stream
 LIMIT = 1e6
 """Largest magnitude that is taken for a reading: no stroke (m), angle (rad) or acceleration (m/s^2) comes near it."""
 
+LATEST = 2**31 * 1_000_000_000
+"""Stamps (ns) from here on have no place in a message."""
+
 _PREFIX = {Stream.STROKES: "cylinder_", Stream.ANGLES: "joint_"}
 _ABSENT = float("nan")
 """Known by identity: stands for a channel that the message does not have, unlike one that reads NaN."""
@@ -62,6 +65,8 @@ class Intake:
             An Imu that says by ``linear_acceleration_covariance[0] = -1`` that it has none (REP-145); no sample.
         ``no usable value``
             Nothing was left; no sample.
+        ``impossible stamp``
+            Before 1970, or more seconds than a message can hold; no sample.
     """
 
     def __init__(self, count: int) -> None:
@@ -85,6 +90,9 @@ class Intake:
         Sample or None
             None when no value of it can be used.
         """
+        if not 0 <= stamp_ns < LATEST:
+            self.oddities["impossible stamp"] += 1
+            return None
         raw = self._force(msg) if stream is Stream.IMU else self._positions(msg, _PREFIX[stream])
         if raw is None:
             return None

@@ -63,7 +63,9 @@ class Pipe:
         _, told = self._process.communicate()
         if self._process.returncode != 0:
             text = told.decode(errors="replace").strip()
-            raise BagError(text if self._process.returncode == 1 else text.splitlines()[-1])
+            if self._process.returncode != 1 or not text:
+                text = (text.splitlines() or ["a process of the replay was ended from outside. Run it again."])[-1]
+            raise BagError(text)
 
     def stop(self) -> None:
         """End the process at once, whatever it is doing."""

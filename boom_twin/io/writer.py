@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -76,6 +77,11 @@ class SessionWriter:
         first, last = self._times or (stamp_ns, stamp_ns)
         self._times = min(first, stamp_ns), max(last, stamp_ns)
         self._writer.add_message(self._channels[key], stamp_ns, data, stamp_ns, self._counts[key])
+
+    def flush(self) -> None:
+        """Put all messages so far on the disk, to survive the loss of the process and of power."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""

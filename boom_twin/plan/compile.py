@@ -18,11 +18,11 @@ from ..physics.linkage import LINK_L, LINK_R, LINKAGE
 from ..records import Array
 from ..scene.kinematics import linkage
 from ..scene.parts import Cylinder, RigidPart, Scene
+from ..scene.splits import SAME_PLACE, flexible_parts
 from .layout import Layout
 
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
-SAME_PLACE = 1e-9  # m
 LOOP = 17  # rows of the system of a six-bar and, beside it, of its cylinder
 
 
@@ -170,12 +170,10 @@ class _Builder:
         self._body(self._with_line(section.root, 0.0, x0), 0.0)
         self._stations([pin for pin in pins if pin.x <= x0 + SAME_PLACE], 0.0)
         self._offset(x0)
-        inner = sorted((pin for pin in pins if x0 + SAME_PLACE < pin.x < x1 - SAME_PLACE), key=lambda pin: pin.x)
-        start = x0
-        for stop in sorted({pin.x for pin in inner} | {x1}):
+        inner = [pin for pin in pins if x0 + SAME_PLACE < pin.x < x1 - SAME_PLACE]
+        for start, stop in flexible_parts(self.scene, index):
             self._beam(index, stop - start)
             self._stations([pin for pin in inner if pin.x == stop], stop)
-            start = stop
         self._body(self._with_line(section.head, x1, section.length), x1)
         self._stations([pin for pin in pins if pin.x >= x1 - SAME_PLACE], x1)
         self._offset(section.length - x1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -24,15 +23,6 @@ WAKE = 0.1
 FLUSH = 1.0
 """Seconds after which what was recorded is on the disk."""
 COMPLETE = "every required topic has a publisher"
-
-
-class _Journal(SessionWriter):
-    """A writer whose messages survive the loss of the process and of power."""
-
-    def flush(self) -> None:
-        """Put all messages so far on the disk."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
-        os.fsync(self._file.fileno())
 
 
 def record(
@@ -68,7 +58,7 @@ def record(
         The bag cannot be written there.
     """
     counts: Counter[str] = Counter()
-    with _Journal(out, topics, notes) as bag:
+    with SessionWriter(out, topics, notes) as bag:
         node = rclpy.create_node(NAME)
 
         def store(key: str, data: bytes, info: Mapping[str, int]) -> None:

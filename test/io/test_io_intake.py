@@ -154,3 +154,12 @@ def test_stamp_of_is_exact() -> None:
     msg = TYPES.make("sensor_msgs/msg/Imu")
     msg.header.stamp.sec, msg.header.stamp.nanosec = 1_700_000_000, 999_999_999
     assert stamp_of(msg) == 1_700_000_000_999_999_999
+
+
+@pytest.mark.parametrize("stamp", [-1, 2**31 * 10**9])
+def test_impossible_stamps_give_no_sample(stamp: int) -> None:
+    intake = Intake(1)
+    message = RosbagsTypes().make("sensor_msgs/msg/JointState")
+    message.name, message.position = ["cylinder_1"], np.array([0.1])
+    assert intake.put(Stream.STROKES, stamp, message) is None
+    assert intake.oddities == {"impossible stamp": 1}

@@ -28,7 +28,7 @@ def test_statics(posture):
 
 @pytest.mark.parametrize("step", [1e-3, 5e-4])
 def test_arch_move(step):
-    expected = np.genfromtxt(REFERENCE / "arch_move.csv", delimiter=",", names=True)
+    expected = np.genfromtxt(REFERENCE / "arch_move.csv.gz", delimiter=",", names=True)
     first = tuple(float(expected[f"stroke_{i}_m"][0]) for i in range(1, 5))
     move = Programme(first, (Move(0, 0.0, 1.5, first[0] + 0.05), Move(2, 0.0, 1.5, first[2] + 0.03)))
     found = simulate(load_scene(), move, 4.0, step=step)
