@@ -221,3 +221,18 @@ def test_imu_at_rest_reads_gravity(scene, twin, still):
     residual = twin.update(Sample(Stream.IMU, START, np.array([9.81 * s, 9.81 * c]))).residuals[0]
     assert residual.names == ("tip_imu_x", "tip_imu_z")
     assert residual.values == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shapes_come_20_times_a_second_in_spite_of_jitter(twin, still, seed):
+    jitter = np.random.default_rng(seed).uniform(-0.2, 0.2, 401)
+    reports = [twin.update(strokes(5 * k + 1 + late, still)) for k, late in enumerate(jitter)]
+    sent = [report.stamp for report in reports if report.prediction.shape is not None]
+    assert 40 <= len(sent) <= 42
+    assert np.min(np.diff(sent[1:])) > 44 * MS
+    assert reports[0].prediction.shape[-1] == pytest.approx(reports[0].prediction.tip_position, abs=1e-12)
+
+
+def test_a_shape_is_sent_after_time_was_set_back(twin, still):
+    shapes = [twin.update(strokes(ms, still)).prediction.shape for ms in (5000, 5001, 1000)]
+    assert [shape is not None for shape in shapes] == [True, False, True]
