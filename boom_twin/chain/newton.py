@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ..physics.jit import kernel
+from ..physics.jit import inner, kernel
 from .place import place
 from .sweep import SWEPT, sweep_in, sweep_out
 
 OK, NOT_CONVERGED, SINGULAR, NOT_FINITE = 0, 1, 2, 3
 
 
-@kernel
+@inner
 def largest(scale, dz):
     """Largest increment as an angle (rad); NaN if any increment is not finite."""
     size = 0.0

@@ -6,13 +6,13 @@ import math
 
 from ..physics.beam import beam_shape, place_beam
 from ..physics.cylinder import place_cylinder
-from ..physics.jit import kernel
+from ..physics.jit import inner, kernel
 from ..physics.linkage import LINK_L
 from ..physics.rigid import turned_by
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
 
 
-@kernel
+@inner
 def link_frame(side, joint, linkage, z, head, theta):
     """Pin on the body (from the pivot) and angle of link L (pin D on the head) or R (pin E on the section)."""
     if side == LINK_L:
@@ -22,7 +22,7 @@ def link_frame(side, joint, linkage, z, head, theta):
     return x, y, z[joint.z + 2]
 
 
-@kernel
+@inner
 def place_linkage(t, state, work, index, x, y, head):
     """Links and cylinder of joint B `index` (row of all joint tables), whose pivot is (x, y) on a head turned by `head`."""
     joint, linkage, z = t.joints[index], t.linkages[index], state.z

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..physics.integrators import finish_step, generalised_alpha, start_step
-from ..physics.jit import kernel
+from ..physics.jit import inner, kernel
 from .newton import OK, newton
 from .program import JOINT_A, JOINT_B, Motion
 
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
 
 
-@kernel
+@inner
 def predict(t, state, step):
     """First guess of the unknowns at the new time: x + h v + h^2 a/2 for coordinates, forces as they were."""
     for i in range(state.z.shape[0]):
@@ -46,7 +46,7 @@ def rest(state, work):
         state.history[i, 3] = 0.0
 
 
-@kernel
+@inner
 def observe(t, state, out):
     """Write one row of results: joint angles (n), cylinder forces (n), then x, v, a of tip x, y, theta (9)."""
     n, at = t.joints.shape[0], 0

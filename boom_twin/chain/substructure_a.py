@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from ..physics.algebra import solve
 from ..physics.cylinder import cylinder_terms
-from ..physics.jit import kernel
+from ..physics.jit import inner
 
 
-@kernel
+@inner
 def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); the cut gains the column N. Returns m + 1."""
     outlet = t.outlets[row]
@@ -46,7 +46,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     return m + 1
 
 
-@kernel
+@inner
 def close_base(work, operation):
     """Solve increments of theta and N of joint A into the gains of `operation`; False if singular."""
     s, p, a, b = work.s, work.p, work.h, work.right

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from ..physics.algebra import solve
 from ..physics.cylinder import cylinder_terms
-from ..physics.jit import kernel
+from ..physics.jit import inner
 from ..physics.linkage import LINK_L
 from ..physics.rigid import turned_by
 from .place import link_frame
@@ -23,7 +23,7 @@ from .place import link_frame
 HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
 
 
-@kernel
+@inner
 def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
     """Add force (fx, fy) and tangent k at a point of a link: pivot + (bx, by) on body `base` + (wx, wy) on `link`."""
     g[0] += fx
@@ -44,7 +44,7 @@ def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
     h[link, link] += wx * link_y - wy * link_x - (wx * fx + wy * fy)
 
 
-@kernel
+@inner
 def _add_closure(joint, linkage, z, head, g, h):
     """Closure of pin Q and the forces its multiplier puts on the four bodies."""
     lx, ly = z[joint.z + 3], z[joint.z + 4]
@@ -70,7 +70,7 @@ def _add_closure(joint, linkage, z, head, g, h):
         h[LAMBDA + 1, link] += sign * ux
 
 
-@kernel
+@inner
 def _add_links(t, joint, linkage, z, head, motion, position, g, h):
     """Inertia and weight of the links that have mass."""
     for k in range(joint.first_link, joint.first_link + joint.links):
@@ -89,7 +89,7 @@ def _add_links(t, joint, linkage, z, head, motion, position, g, h):
         h[link, link] += row.inertia * motion.gain
 
 
-@kernel
+@inner
 def _add_cylinder(t, state, index, head, motion, position, drive, drive_rate, own_g, own_h, g, h):
     """The cylinder between pin C and the rod pin on its link."""
     joint, linkage, cylinder, pins, z = t.joints[index], t.linkages[index], t.cylinders[index], state.pins[index], state.z
@@ -125,7 +125,7 @@ def _add_cylinder(t, state, index, head, motion, position, drive, drive_rate, ow
     h[FORCE, link] += wx * ey - wy * ex
 
 
-@kernel
+@inner
 def close_loop(t, state, work, motion, drive, drive_rate, index, operation, head):
     """Condense joint B `index`: the cut of section i (3 slots) becomes the cut at the head with C carried (5 slots).
 
@@ -148,7 +148,7 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, head
     return _condense_loop(work, index, operation)
 
 
-@kernel
+@inner
 def _condense_loop(work, index, operation):
     """Solve the six inner unknowns for the five outer ones; gains and block are kept, the cut is rewritten."""
     s, p, g, h, right = work.s, work.p, work.g, work.h, work.right

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..physics.beam import transfer_beam
-from ..physics.jit import kernel
+from ..physics.jit import inner, kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
 from .substructure_a import close_base, join_rod
@@ -16,7 +16,7 @@ SWEPT, SINGULAR = 0, 2
 SLOTS, CARRIED = np.int64(3), np.int64(5)
 
 
-@kernel
+@inner
 def transfer_body(t, work, motion, row, c, sn):
     """Add body `row`, with its weight and inertia, to the cut at its frame (cos c, sin sn of its orientation)."""
     body, i = t.bodies[row], t.bodies[row].history
@@ -28,7 +28,7 @@ def transfer_body(t, work, motion, row, c, sn):
     add_body(work.s, work.p, body.mass, body.inertia, bx, by, fx, fy, torque, gain)
 
 
-@kernel
+@inner
 def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
     tables = (t.psi[row], t.weights[row], t.stiffness[row], t.point_mass[row], t.point_rotary[row])
@@ -116,7 +116,7 @@ def sweep_out(t, state, work):
             m = SLOTS + 1
 
 
-@kernel
+@inner
 def out_beam(beam, psi, rho, drho, gains, free, c, sn, m, cut, dz):
     """Increments of a beam part's coordinates, and of its output end."""
     end = beam.points

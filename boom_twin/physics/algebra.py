@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .jit import kernel
+from .jit import inner
 
 SMALLEST_PIVOT = 1e-300
 
 
-@kernel
+@inner
 def condense(s, p, coupling, block, force, m, n):
     """Eliminate n unknowns z from a symmetric system by L D L^T without pivoting.
 
@@ -61,7 +61,7 @@ def condense(s, p, coupling, block, force, m, n):
     return negative
 
 
-@kernel
+@inner
 def solve(a, b, n, columns):
     """Solve a x = b in place by LU with row pivoting; a is (n, n), b is (n, columns) and becomes x. False if singular."""
     for k in range(n):

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from .algebra import condense
-from .jit import kernel
+from .jit import inner
 
 BEAM = np.dtype(
     [
@@ -36,7 +36,7 @@ BEAM = np.dtype(
 )
 
 
-@kernel
+@inner
 def beam_shape(row, psi, weights, z, rho, drho, turn):
     """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), and turn (P, 2): cos and sin; returns the end's turn.
 
@@ -71,7 +71,7 @@ def beam_shape(row, psi, weights, z, rho, drho, turn):
     return angle
 
 
-@kernel
+@inner
 def place_beam(row, psi, rho, z, x, y, theta, c, s, position):
     """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
     for i in range(row.points):
@@ -85,7 +85,7 @@ def place_beam(row, psi, rho, z, x, y, theta, c, s, position):
         position[row.history + 2 * row.points + i] = angle
 
 
-@kernel
+@inner
 def transfer_beam(row, tables, scratch, z, c, sn, motion, gravity, position, s, p, m, gains, force):
     """Carry a cut (s, p) with m slots from the output to the input end, condensing q.
 
@@ -108,7 +108,7 @@ def transfer_beam(row, tables, scratch, z, c, sn, motion, gravity, position, s, 
     return condense(s, p, gains, block, force, m, size)
 
 
-@kernel
+@inner
 def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, block, force):
     """Pull (s, p) at the output end back to (e_I, carried slots) in place and to q in coupling, block, force."""
     ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
@@ -134,7 +134,7 @@ def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, bl
     s[2, 2] -= bend
 
 
-@kernel
+@inner
 def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force):
     """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`.
 
@@ -189,7 +189,7 @@ def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, posit
     s[2, 2] += turning
 
 
-@kernel
+@inner
 def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stretch, block):
     """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
     n, points = row.bending, row.points
@@ -208,7 +208,7 @@ def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stret
             block[n, a] += across * psi[j, a]
 
 
-@kernel
+@inner
 def _add_stiffness(row, stiffness, z, motion, block, force):
     """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
     n = row.bending

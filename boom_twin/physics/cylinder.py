@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from .jit import kernel
+from .jit import inner
 
 BARREL, ROD = 0, 1
 
@@ -41,13 +41,13 @@ CYLINDER_PART = np.dtype(
 )
 
 
-@kernel
+@inner
 def near(angle, other):
     """The value of `angle` modulo 2 pi that is nearest to `other`."""
     return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
 
 
-@kernel
+@inner
 def place_cylinder(row, parts, cx, cy, rx, ry, position):
     """Write length, centres and angles into `position`."""
     dx, dy = rx - cx, ry - cy
@@ -64,7 +64,7 @@ def place_cylinder(row, parts, cx, cy, rx, ry, position):
         position[part.history + 2] = near(math.atan2(dy, dx), position[part.history + 2])
 
 
-@kernel
+@inner
 def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion, gravity, position, g, h):
     """Gradient g, shape (5,), and tangent h, shape (5, 5), over (x_C, y_C, x_R, y_R, N).
 
@@ -119,7 +119,7 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
     h[0, 4], h[1, 4], h[2, 4], h[3, 4] = -ex, -ey, ex, ey
 
 
-@kernel
+@inner
 def _fill(h, i, j, ex, ey, ee, en, nn):
     """Write a symmetric 2x2 block given in the axes e, n at rows i, columns j in the model axes."""
     mixed = (ee - nn) * ex * ey + en * (ex * ex - ey * ey)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .jit import kernel
+from .jit import inner
 
 
 class Scheme(NamedTuple):
@@ -33,7 +33,7 @@ class Scheme(NamedTuple):
     rate: float
 
 
-@kernel
+@inner
 def generalised_alpha(step, rho):
     """Coefficients for `step` (s) and spectral radius `rho` in [0, 1]."""
     am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
@@ -42,7 +42,7 @@ def generalised_alpha(step, rho):
     return Scheme(step, am, af, beta, gamma, (1.0 - am) / ((1.0 - af) * beta * step * step), gamma / (beta * step))
 
 
-@kernel
+@inner
 def start_step(scheme, history, hat, offset):
     """Fill x_hat and D, both shape (n,), from `history`, shape (n, 4): columns x, v, a, p."""
     h = scheme.step
@@ -54,7 +54,7 @@ def start_step(scheme, history, hat, offset):
         offset[i] = v + h * (1.0 - scheme.gamma) * p - scheme.rate * ahead
 
 
-@kernel
+@inner
 def finish_step(scheme, position, hat, offset, history):
     """Write the new x, v, a, p of all scalars at their new `position`, shape (n,)."""
     for i in range(history.shape[0]):

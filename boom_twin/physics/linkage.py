@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from .jit import kernel
+from .jit import inner
 
 DIRECT, LINK_L, LINK_R = 0, 1, 2
 
@@ -34,14 +34,14 @@ LINKAGE = np.dtype(
 )  # fmt: skip
 
 
-@kernel
+@inner
 def turned(x, y, phi):
     """Vector (x, y) turned by phi (rad)."""
     c, s = math.cos(phi), math.sin(phi)
     return c * x - s * y, s * x + c * y
 
 
-@kernel
+@inner
 def joint_pin(dx, dy, ex, ey, length_l, length_r):
     """Pin Q left of D->E at distance length_l from D and length_r from E; NaN if the circles do not meet."""
     vx, vy = ex - dx, ey - dy
@@ -54,7 +54,7 @@ def joint_pin(dx, dy, ex, ey, length_l, length_r):
     return dx + foot * vx - height * vy, dy + foot * vy + height * vx
 
 
-@kernel
+@inner
 def link_angles(row, phi):
     """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
     ex, ey = turned(row.ex, row.ey, phi)
@@ -62,7 +62,7 @@ def link_angles(row, phi):
     return math.atan2(qy - row.dy, qx - row.dx), math.atan2(qy - ey, qx - ex)
 
 
-@kernel
+@inner
 def cylinder_length(row, phi):
     """Pin-to-pin length of the cylinder (m) and its derivative by phi (m/rad); NaN if the links do not close."""
     ex, ey = turned(row.ex, row.ey, phi)
@@ -91,7 +91,7 @@ def cylinder_length(row, phi):
     return length, (px * drx + py * dry) / length
 
 
-@kernel
+@inner
 def angle_of_length(row, length, phi, low, high):
     """Angle next to `phi` at which the cylinder has `length`: Newton steps kept inside [low, high]; NaN if none."""
     for _ in range(50):

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import math
 
-from .jit import kernel
+from .jit import inner
 
 
-@kernel
+@inner
 def turned_by(theta, bx, by):
     """Body vector (bx, by) in the model frame."""
     c, s = math.cos(theta), math.sin(theta)
     return c * bx - s * by, s * bx + c * by
 
 
-@kernel
+@inner
 def pull_back(s, p, m, x_of, y_of, bx, by):
     """Let slots x_of, y_of be a point at (bx, by) from the frame in slots 0..2: add what it does to slot 2, turning.
 
@@ -34,7 +34,7 @@ def pull_back(s, p, m, x_of, y_of, bx, by):
     s[2, 2] -= bend
 
 
-@kernel
+@inner
 def add_body(s, p, mass, inertia, dx, dy, fx, fy, torque, gain):
     """Mass at (dx, dy) from the frame: force -(fx, fy) = -m (a - g) and -torque = -J alpha on it, tangents m A and J A."""
     inertial = mass * gain
@@ -50,7 +50,7 @@ def add_body(s, p, mass, inertia, dx, dy, fx, fy, torque, gain):
     s[2, 2] += inertial * (dx * dx + dy * dy) - (dx * fx + dy * fy) + inertia * gain
 
 
-@kernel
+@inner
 def merge_outlet(s, p, m, bx, by):
     """Slots 3, 4 are a point at (bx, by) of the frame: fold them into slots 0..2 and close the gap; returns m - 2."""
     pull_back(s, p, m, 3, 4, bx, by)
