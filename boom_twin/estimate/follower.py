@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..chain.newton import OK, newton
-from ..chain.program import Motion, State, Work
+from ..chain.program import Motion
 from ..chain.step import advance, observe, rest
 from ..physics.integrators import generalised_alpha
 from ..physics.jit import kernel
@@ -208,6 +208,3 @@ def rigid_tip(t, track):
         x += track.lengths[i] * math.cos(heading)
         y += track.lengths[i] * math.sin(heading)
     return x, y
-
-
-__all__ = ["NODES", "State", "Track", "Tuning", "Work", "begin", "follow", "new_track"]
