@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .deviations import specific_force
 from .records import Array, Residuals, Stream
 from .replay import Recording, Replay
+from .scene.kinematics import gravity_in_base
 from .scene.parts import Scene
 from .truth import TipTruth
 from .view import History, ImuTrace, Truth, replay_pictures
@@ -32,7 +34,8 @@ def history_of(recording: Recording, scene: Scene) -> History:
     force = [residuals for residuals in recording.residuals if residuals.stream is Stream.IMU]
     stamps = _seconds([prediction.stamp for prediction in predictions], first)
     acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
-    turns = np.array([prediction.tip_angle for prediction in predictions])
+    gravity = gravity_in_base(scene)
+    felt = np.array([specific_force(prediction, gravity) for prediction in predictions])
     names, times, values, sigmas = _channels([angles, force], first)
     return History(
         stamps_s=stamps,
@@ -46,7 +49,7 @@ def history_of(recording: Recording, scene: Scene) -> History:
         residual_names=names,
         residual_values=values,
         residual_sigmas=sigmas,
-        imu=_imu(force, stamps, _specific_force(scene, acceleration, turns), first),
+        imu=_imu(force, stamps, felt, first),
         shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
     )
@@ -70,15 +73,6 @@ def _channels(groups: list[list[Residuals]], first: int) -> tuple[tuple[str, ...
         sigmas[block] = [residuals.sigmas for residuals in group]
         row, column = row + len(group), column + len(group[0].names)
     return names, times, values, sigmas
-
-
-def _specific_force(scene: Scene, acceleration: Array, turns: Array) -> Array:
-    """Along the axes of the tip, shape (m, 2)."""
-    c, s = np.cos(scene.base.inclination), np.sin(scene.base.inclination)
-    gx, gy = scene.gravity
-    felt = acceleration - np.array([c * gx + s * gy, c * gy - s * gx])
-    c, s = np.cos(turns), np.sin(turns)
-    return np.column_stack([c * felt[:, 0] + s * felt[:, 1], c * felt[:, 1] - s * felt[:, 0]])
 
 
 def _imu(force: list[Residuals], stamps: Array, felt: Array, first: int) -> ImuTrace | None:

@@ -5,7 +5,6 @@ Only what the scene names gets rows. Section axes: x from the inboard pivot; the
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -16,7 +15,7 @@ from ..chain.program import State, Tables, Work
 from ..physics import cylinder, modes
 from ..physics.linkage import LINK_L, LINK_R, LINKAGE
 from ..records import Array
-from ..scene.kinematics import linkage
+from ..scene.kinematics import gravity_in_base, linkage
 from ..scene.parts import Cylinder, RigidPart, Scene
 from ..scene.splits import SAME_PLACE, flexible_parts
 from .layout import Layout
@@ -107,10 +106,7 @@ class _Builder:
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
         self.outline: list[tuple[int, int]] = []
         self.scale: list[float] = []
-        turn = -scene.base.inclination
-        gx, gy = scene.gravity
-        c, s = math.cos(turn), math.sin(turn)
-        self.gravity = np.array([c * gx - s * gy, s * gx + c * gy])
+        self.gravity = gravity_in_base(scene)
 
     # -- joints ---------------------------------------------------------------------------------------------------
 

@@ -88,3 +88,10 @@ def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = N
                 f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a stroke inside."
             )
     return angles
+
+
+def gravity_in_base(scene: Scene) -> Array:
+    """Gravity (m/s^2), shape (2,), in the axes of the base, which an inclination turns."""
+    gx, gy = scene.gravity
+    c, s = math.cos(scene.base.inclination), math.sin(scene.base.inclination)
+    return np.array([c * gx + s * gy, c * gy - s * gx])
