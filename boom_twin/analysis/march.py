@@ -1,0 +1,149 @@
+"""A boom stepped along a smooth drive by a chosen method, timed: what every comparison of methods is made of."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..chain.newton import OK
+from ..chain.status import SENTENCES
+from ..chain.step import observe, rest, run
+from ..errors import UsageError
+from ..plan.compile import BasisName, compile_scene
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.parts import Scene
+from .simulate import PASSES, RHO, TOLERANCE
+from .statics import settle
+
+Drive = Callable[[Array], tuple[Array, Array]]
+"""Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s; the rates are zero at t = 0."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a step is made.
+
+    Attributes
+    ----------
+    integrator : str
+        "generalised-alpha", "newmark", "wilson", "houbolt" or "park".
+    parameter : float
+        rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none.
+    passes : int
+        Most Newton passes in a step; 1 is the papers' single linearised pass.
+    tolerance : float
+        rad, see `chain.newton`.
+    product : str
+        "riccati" or "plain", the papers' product of transfer matrices.
+    """
+
+    integrator: str = "generalised-alpha"
+    parameter: float = RHO
+    passes: int = int(PASSES)
+    tolerance: float = TOLERANCE
+    product: str = "riccati"
+
+
+@dataclass(frozen=True)
+class March:
+    """Rows of a motion. Rows after a failure are NaN.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        s, from 0.
+    tip, tip_acceleration : ndarray, shape (m, 2)
+        m, m/s^2.
+    joints, cylinder_forces : ndarray, shape (m, n)
+        rad, N.
+    seconds : float
+        Wall time of the stepping alone, median of the repeats.
+    steps : int
+    passes : float
+        Newton passes per step, mean.
+    status : str
+        "ok", or why the motion ended.
+    """
+
+    times: Array
+    tip: Array
+    tip_acceleration: Array
+    joints: Array
+    cylinder_forces: Array
+    seconds: float
+    steps: int
+    passes: float
+    status: str
+
+
+def march(
+    scene: Scene,
+    drive: Drive,
+    duration: float,
+    step: float,
+    every: int = 1,
+    method: Method | None = None,
+    basis: BasisName = "end-shapes",
+    angles: Array | None = None,
+    repeats: int = 1,
+) -> March:
+    """Start at rest in the equilibrium of the drive at t = 0 and follow it in equal steps.
+
+    Parameters
+    ----------
+    duration, step : float
+        s; a row after every `every` steps.
+    angles : ndarray, shape (n,), optional
+        Joint angles (rad) next to which the equilibrium is looked for.
+    repeats : int
+        How often the motion is stepped, for the time.
+
+    Raises
+    ------
+    UsageError
+        Duration is not a multiple of `every` steps.
+    SolverError
+        No equilibrium at t = 0. A step that fails is a status, not an error.
+    """
+    method = method or Method()
+    rows = round(duration / (step * every))
+    if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
+        raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
+    plan = compile_scene(scene, basis)
+    strokes, rates = drive(step * np.arange(1, rows * every + 1))
+    first = drive(np.zeros(1))[0][0]
+    start, work = plan.state(), plan.work()
+    settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
+    rest(start, work)
+    steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
+    seconds = []
+    for _ in range(repeats):
+        state = type(start)(*(array.copy() for array in start))
+        out = np.full((rows + 1, 2 * plan.joints + 9), np.nan)
+        observe(plan.tables, state, out[0])
+        begun = time.perf_counter()
+        status, row, total = run(
+            plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, method.parameter, method.tolerance,
+            np.int64(method.passes), out[1:],
+        )  # fmt: skip
+        seconds.append(time.perf_counter() - begun)
+    n, done = plan.joints, max(int(row), 1) * every
+    tip = out[:, 2 * n :].reshape(-1, 3, 3)
+    return March(
+        times=step * every * np.arange(rows + 1),
+        tip=tip[:, 0, :2],
+        tip_acceleration=tip[:, 2, :2],
+        joints=out[:, :n],
+        cylinder_forces=out[:, n : 2 * n],
+        seconds=statistics.median(seconds),
+        steps=rows * every,
+        passes=total / done,
+        status="ok" if status == OK else SENTENCES[status],
+    )
+
+
