@@ -20,7 +20,7 @@ from ..scene.parts import Scene
 from .statics import checked_strokes, settle
 
 RHO = 0.8
-TOLERANCE = 1e-7  # rad in the last pass of a step; what is left is its square
+TOLERANCE = 1e-6  # rad in the last pass of a step; what is left is about 1 to 50 times its square
 PASSES = np.int64(20)
 
 
