@@ -46,7 +46,6 @@ def test_a_faulty_scene_is_refused_without_a_compiler(tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
     path.write_text("sections: []\n", encoding="utf-8")
     assert imported_by("check", str(path)) == (1, set())
-    assert imported_by("statics", str(path), "--posture", "arch") == (1, set())
 
 
 def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
