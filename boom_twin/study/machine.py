@@ -8,9 +8,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from .. import __version__
-
-PACKAGES = ("numpy", "scipy", "numba", "exudyn")
+PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 
 
 def machine() -> dict[str, str | int | None]:
@@ -23,7 +21,6 @@ def machine() -> dict[str, str | int | None]:
         "system": platform.system(),
         "python": platform.python_version(),
         **versions,
-        "boom_twin": __version__,
     }
 
 

@@ -2,7 +2,7 @@
 
 The default boom in its posture `arch` moves as everywhere in the documentation: stroke 1 by 50 mm, stroke 3 by 30 mm. On any
 other boom every second cylinder turns its joint by `TURN`, up and down in turn so that a long boom does not curl up: the other
-way where that does not fit into the joint's range and the cylinder's travel, by half as much (and half again) where neither fits.
+way where that does not fit into the joint's range and the cylinder's travel, by half (and half again) where neither fits.
 """
 
 from __future__ import annotations
