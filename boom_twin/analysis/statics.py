@@ -119,7 +119,7 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
     if share < 1.0:
         where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
         raise SolverError(
-            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight; more moves it on and on, or folds "
+            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or folds "
             "a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's range."
         )
 
@@ -141,7 +141,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     motion, still = motion_at_rest(len(plan.masses)), np.zeros(plan.joints)
-    status, _, _ = newton(loaded.tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT)
+    status, _, _ = newton(loaded.tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return bool(status == OK and is_stable(loaded, state, work))
 
 
