@@ -119,8 +119,8 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
     if share < 1.0:
         where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
         raise SolverError(
-            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or folds "
-            "a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's range."
+            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
+            "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's range."
         )
 
 
