@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..chain.newton import OK, newton
 from ..chain.program import State, Work
-from ..chain.step import motion_at_rest, observe
+from ..chain.status import OK
+from ..chain.step import advance, observe
 from ..errors import SolverError, UsageError
+from ..physics.integrators import REST, prepare
 from ..plan.compile import Plan, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
@@ -108,7 +109,7 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then gradually. Histories are left as they were.
+    The full load at once is tried first, then gradually. Histories are left without motion.
     """
     drive = plan.closed_lengths + strokes
     set_undeformed(plan, state, angles)
@@ -128,11 +129,11 @@ def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float
     """Follow the equilibrium from no gravity towards all of it; returns the share that was reached."""
     share, step = 0.0, FIRST_LOAD
     while share < 1.0 and step >= LEAST_LOAD:
-        before, aim = state.z.copy(), min(share + step, 1.0)
+        z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
         if _rests(plan, state, work, drive, aim):
             share, step = aim, 2.0 * step
         else:
-            state.z[:] = before
+            state.z[:], state.history[:] = z, history
             step *= 0.5
     return share
 
@@ -140,8 +141,8 @@ def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float
 def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> bool:
     """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
-    motion, still = motion_at_rest(len(plan.masses)), np.zeros(plan.joints)
-    status, _, _ = newton(loaded.tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+    scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return bool(status == OK and is_stable(loaded, state, work))
 
 

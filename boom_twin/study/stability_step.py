@@ -12,11 +12,11 @@ from scipy import linalg
 
 from ..analysis.march import FAMILIES
 from ..analysis.posture import set_undeformed
-from ..chain.newton import riccati_in, riccati_out
 from ..chain.place import place
 from ..chain.plain import new_product, plain_pass
 from ..chain.program import Motion, State, Work
-from ..chain.sweep import SWEPT
+from ..chain.status import OK
+from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..physics.integrators import prepare
 from ..plan.compile import Plan, compile_scene
 from ..records import Array
@@ -85,9 +85,11 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> Step:
 
 
 def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
-    status, _ = riccati_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
-    riccati_out(plan.tables, state, work)
-    return bool(status == SWEPT)
+    clear_cut(work, FREE)
+    last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE)
+    sweep_out(plan.tables, state, work, ROOT, last, FREE)
+    return bool(status == OK)
 
 
 def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
