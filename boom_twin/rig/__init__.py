@@ -8,12 +8,15 @@ from .motion import Move, Programme
 from .programmes import BUNDLED_DURATION, bundled, random_programme
 from .sensors import Sensors, noise_free
 from .session import Session, observe, record
-from .solve import simulate, statics
+from .solve import simulate, simulate_timed, statics
+from .stepping import Effort, Scheme
 
 __all__ = [
     "BUNDLED_DURATION",
+    "Effort",
     "Move",
     "Programme",
+    "Scheme",
     "Sensors",
     "Session",
     "bundled",
@@ -22,5 +25,6 @@ __all__ = [
     "random_programme",
     "record",
     "simulate",
+    "simulate_timed",
     "statics",
 ]
