@@ -8,7 +8,7 @@ from .motion import Move, Programme
 from .programmes import BUNDLED_DURATION, bundled, random_programme
 from .sensors import Sensors, noise_free
 from .session import Session, observe, record
-from .solve import simulate, simulate_timed, statics
+from .solve import at_rest, move, simulate, statics
 from .stepping import Effort, Scheme
 
 __all__ = [
@@ -19,12 +19,13 @@ __all__ = [
     "Scheme",
     "Sensors",
     "Session",
+    "at_rest",
     "bundled",
+    "move",
     "noise_free",
     "observe",
     "random_programme",
     "record",
     "simulate",
-    "simulate_timed",
     "statics",
 ]

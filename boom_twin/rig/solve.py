@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..scene.parts import Scene
 from .assembly import section_frames
 from .equilibrium import find_equilibrium
 from .exudyn_boom import build
-from .probes import attach, read
+from .probes import Probes, attach, read
 from .stepping import Effort, Scheme, step_through
 from .system import Boom
 
@@ -65,30 +66,38 @@ def simulate(
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
         ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``; each of shape (rows,).
     """
-    return simulate_timed(scene, drive, t_end, step, output_step, elements)[0]
+    first = drive(np.zeros(1))[0][0]
+    return move(at_rest(scene, first, elements), drive, t_end, step, output_step)[0]
 
 
-def simulate_timed(
-    scene: Scene,
-    drive: Drive,
-    t_end: float,
-    step: float,
-    output_step: float,
-    elements: int,
-    scheme: Scheme | None = None,
+@dataclass(frozen=True)
+class Resting:
+    """A boom in equilibrium, which may be moved from there any number of times; cylinder forces (n,) in N."""
+
+    boom: Boom
+    probes: Probes
+    forces: Array
+
+
+def at_rest(scene: Scene, strokes: Array, elements: int) -> Resting:
+    """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest."""
+    boom = build(scene, strokes, elements)
+    probes = attach(boom)
+    settle(boom, strokes)
+    return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])
+
+
+def move(
+    resting: Resting, drive: Drive, t_end: float, step: float, output_step: float, scheme: Scheme | None = None
 ) -> tuple[dict[str, Array], Effort]:
-    """`simulate` by a chosen scheme, and what its stepping took."""
+    """`simulate` from a boom at rest by a chosen scheme, and what its stepping took."""
     every = _ratio("output_step", output_step, step)
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
     strokes, rates = drive(times)
-    boom = build(scene, strokes[0], elements)
-    probes = attach(boom)
-    settle(boom, strokes[0])
-    rest = read(boom, probes, at_rest=True)["forces"][-1]
-    effort = step_through(boom, strokes, rates, step, output_step, scheme or Scheme())
-    found = read(boom, probes, at_rest=False)
-    found["forces"][0] = rest  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
+    effort = step_through(resting.boom, strokes, rates, step, output_step, scheme or Scheme())
+    found = read(resting.boom, resting.probes, at_rest=False)
+    found["forces"][0] = resting.forces  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
     return _columns(found, strokes[::every], times[::every]), effort
 
 

@@ -98,24 +98,30 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 
 
 def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
-    """Before every step, hand the drives that move their lengths and rates at its end; returns the seconds it takes."""
+    """Before every step, hand the drives that move their lengths and rates at its end; returns the seconds it takes.
+
+    All drives get those of the start at once.
+    """
     closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
     lengths, speeds = (strokes + closed).tolist(), rates.tolist()
     last = [[float("nan")] * 2 for _ in boom.drives]
     spent = [0.0]
 
-    def before_step(system: Any, at: float) -> bool:
-        begun = time.perf_counter()
-        row = round(at / step)
+    def hand_over(row: int) -> None:
         for i, (drive, name) in enumerate(boom.drives):
             now = [lengths[row][i], speeds[row][i]]
             if now != last[i]:
                 last[i] = now
-                system.SetObjectParameter(drive, name, now[0])
+                boom.system.SetObjectParameter(drive, name, now[0])
                 if name == "referenceLength":
-                    system.SetObjectParameter(drive, "velocityOffset", now[1])
+                    boom.system.SetObjectParameter(drive, "velocityOffset", now[1])
+
+    def before_step(_: Any, at: float) -> bool:
+        begun = time.perf_counter()
+        hand_over(round(at / step))
         spent[0] += time.perf_counter() - begun
         return True
 
+    hand_over(0)
     boom.system.SetPreStepUserFunction(before_step)
     return spent
