@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle.jets import coordinates, cos, sin
 
 from boom_twin.chain.program import Motion
+from boom_twin.peers.jets import coordinates, cos, sin
 from boom_twin.physics import algebra, beam, cylinder, modes, rigid
 from boom_twin.physics.rotation import turned
 
