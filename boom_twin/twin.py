@@ -12,7 +12,7 @@ from .chain.newton import OK
 from .chain.status import SENTENCES
 from .deviations import Deviations, specific_force
 from .errors import BoomTwinError
-from .estimate.follower import Tuning, begin, follow, new_track
+from .estimate.follower import Tuning, follow, new_track
 from .memory import Expected, Memory
 from .plan.compile import compile_scene
 from .records import Array, Prediction, Report, Residuals, Sample, Stream
@@ -139,11 +139,9 @@ class Twin:
         except BoomTwinError as error:
             return self._refuse(sample, "model", *events, status=str(error))
         self._track.angles[:] = angles
+        self._track.nodes[0] = 0
         self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp))
-        status = begin(
-            self.plan.tables, self._anchor, self._live, self._work, self._track, self._tuning, sample.values, self._row
-        )
-        return self._finish(self._run, sample, events, status)
+        return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
         time = (sample.stamp - run.epoch) * NANO

@@ -17,7 +17,8 @@ import numpy as np
 from ..chain.place import place
 from ..chain.program import JOINT_A, Motion, State, Work
 from ..chain.step import observe
-from ..chain.sweep import SWEPT, sweep_in, sweep_out
+from ..chain.newton import riccati_in, riccati_out
+from ..chain.sweep import SWEPT
 from ..plan.compile import Plan
 from ..records import Array
 
@@ -57,7 +58,7 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     place(plan.tables, state, work)
     motion = Motion(-omega * omega, 0.0, work.position.copy(), np.zeros_like(work.position))
     drive = _drive(plan, state, work)
-    status, negative = sweep_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
+    status, negative = riccati_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
     if status != SWEPT:
         return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
     sizes = [2 if kind == JOINT_A else 6 for kind in plan.tables.operations.kind if kind <= 1]
@@ -142,8 +143,8 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     drive, sides = _drive(plan, state, work), []
     for size in (LOAD, -LOAD):
         motion = Motion(-omega * omega, 0.0, position + size * load, still)
-        sweep_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
-        sweep_out(plan.tables, state, work)
+        riccati_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
+        riccati_out(plan.tables, state, work)
         sides.append(work.dz.copy())
     return np.asarray(sides[0] - sides[1])
 

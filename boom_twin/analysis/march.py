@@ -13,6 +13,8 @@ from ..chain.newton import OK
 from ..chain.status import SENTENCES
 from ..chain.step import observe, rest, run
 from ..errors import UsageError
+from ..chain.plain import new_product
+from ..physics import integrators
 from ..plan.compile import BasisName, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
@@ -20,13 +22,21 @@ from ..scene.parts import Scene
 from .simulate import PASSES, RHO, TOLERANCE
 from .statics import settle
 
+FAMILIES = {
+    "generalised-alpha": integrators.GENERALISED_ALPHA,
+    "newmark": integrators.NEWMARK,
+    "wilson": integrators.WILSON,
+    "houbolt": integrators.HOUBOLT,
+    "park": integrators.PARK,
+}
+
 Drive = Callable[[Array], tuple[Array, Array]]
 """Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s; the rates are zero at t = 0."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """How a step is made.
+    """How a step is made; UsageError if there is no such method.
 
     Attributes
     ----------
@@ -47,6 +57,17 @@ class Method:
     passes: int = int(PASSES)
     tolerance: float = TOLERANCE
     product: str = "riccati"
+
+    def __post_init__(self) -> None:
+        if self.integrator not in FAMILIES:
+            raise UsageError(f"integrator = {self.integrator!r}: not known. Take one of {', '.join(FAMILIES)}.")
+        if self.product not in ("riccati", "plain"):
+            raise UsageError(f"product = {self.product!r}: not known. Take riccati or plain.")
+
+    @property
+    def reach(self) -> float:
+        """Steps from the start of a step to the instant it solves for."""
+        return self.parameter if self.integrator == "wilson" else 1.0
 
 
 @dataclass(frozen=True)
@@ -115,9 +136,12 @@ def march(
     if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
         raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
     plan = compile_scene(scene, basis)
-    strokes, rates = drive(step * np.arange(1, rows * every + 1))
+    family = FAMILIES[method.integrator]
+    depth = integrators.depth_of(family)
+    strokes, rates = drive(step * (np.arange(rows * every) + method.reach))
     first = drive(np.zeros(1))[0][0]
-    start, work = plan.state(), plan.work()
+    start, work = plan.state(depth), plan.work(depth)
+    product = new_product(plan.tables) if method.product == "plain" else None
     settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
     rest(start, work)
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
@@ -128,8 +152,8 @@ def march(
         observe(plan.tables, state, out[0])
         begun = time.perf_counter()
         status, row, total = run(
-            plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, method.parameter, method.tolerance,
-            np.int64(method.passes), out[1:],
+            plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
+            method.tolerance, np.int64(method.passes), product, out[1:],
         )  # fmt: skip
         seconds.append(time.perf_counter() - begun)
     n, done = plan.joints, max(int(row), 1) * every

@@ -13,6 +13,7 @@ from ..chain.newton import OK
 from ..chain.status import SENTENCES
 from ..chain.step import observe, rest, run
 from ..errors import SolverError, UsageError
+from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import Plan, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
@@ -95,7 +96,7 @@ def simulate(
     observe(plan.tables, state, rows[0])
     steps, counts, drives, rates = _drive(plan, times, strokes, dt)
     status, row, passes = run(
-        plan.tables, state, work, steps, counts, drives, rates, rho, TOLERANCE, PASSES, rows[1:]
+        plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     if status != OK:
         raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")

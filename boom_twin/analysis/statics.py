@@ -137,7 +137,7 @@ def _solve(plan: Plan, state: State, work: Work, drive: Array, load: float) -> i
     tables = plan.tables._replace(gravity=load * plan.tables.gravity)
     motion = motion_at_rest(len(plan.masses))
     still = np.zeros(plan.joints)
-    status, _, _ = newton(tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT)
+    status, _, _ = newton(tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return int(status)
 
 

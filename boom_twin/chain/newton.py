@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..physics.jit import inner, kernel
 from .place import place
-from .sweep import SWEPT, sweep_in, sweep_out
+from .plain import plain_pass
+from .sweep import FREE, SWEPT, clear_cut, sweep_in, sweep_out
 
-OK, NOT_CONVERGED, SINGULAR, NOT_FINITE = 0, 1, 2, 3
+OK, NOT_CONVERGED, NOT_FINITE = 0, 1, 3  # 2 and 4: see `chain.sweep`, `chain.plain`
+ROOT = np.int64(0)  # the first operation
 
 
 @inner
@@ -23,7 +27,24 @@ def largest(scale, dz):
 
 
 @kernel
-def newton(t, state, work, motion, drive, drive_rate, tolerance, passes, longest):
+def riccati_in(t, state, work, motion, drive, drive_rate):
+    """Condense the whole boom from the free tip to the base.
+
+    Returns status, and the number of negative pivots in the beams (joints: see `Work.blocks`).
+    """
+    clear_cut(work, FREE)
+    status, negative, _ = sweep_in(t, state, work, motion, drive, drive_rate, ROOT, t.operations.shape[0], FREE)
+    return status, negative
+
+
+@kernel
+def riccati_out(t, state, work):
+    """Increments of all unknowns into `work.dz`."""
+    sweep_out(t, state, work, ROOT, t.operations.shape[0], FREE)
+
+
+@kernel
+def newton(t, state, work, motion, drive, drive_rate, tolerance, passes, longest, product):
     """Solve the boom's equations for `state.z`, starting from the values there.
 
     Parameters
@@ -34,6 +55,8 @@ def newton(t, state, work, motion, drive, drive_rate, tolerance, passes, longest
         At most so many; a single pass is the papers' linearised step and counts as converged.
     longest : float
         Increments are shortened so that none exceeds this (rad).
+    product : Product or None
+        None for the Riccati sweep; else room for the plain product of transfer matrices (see `chain.plain`).
 
     Returns
     -------
@@ -42,10 +65,14 @@ def newton(t, state, work, motion, drive, drive_rate, tolerance, passes, longest
     size = 0.0
     place(t, state, work)
     for k in range(passes):
-        status, _ = sweep_in(t, state, work, motion, drive, drive_rate)
+        if product is None:
+            status, _ = riccati_in(t, state, work, motion, drive, drive_rate)
+            if status == SWEPT:
+                riccati_out(t, state, work)
+        else:
+            status = plain_pass(t, state, work, motion, drive, drive_rate, product)
         if status != SWEPT:
-            return SINGULAR, k + 1, size
-        sweep_out(t, state, work)
+            return status, k + 1, size
         size = largest(t.scale, work.dz)
         if not math.isfinite(size):
             return NOT_FINITE, k + 1, size

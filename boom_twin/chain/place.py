@@ -8,33 +8,35 @@ from ..physics.beam import beam_shape, place_beam
 from ..physics.cylinder import place_cylinder
 from ..physics.jit import inner, kernel
 from ..physics.linkage import LINK_L
-from ..physics.rigid import turned_by
+from ..physics.rotation import rotated
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
 
 
 @inner
-def link_frame(side, joint, linkage, z, head, theta):
-    """Pin on the body (from the pivot) and angle of link L (pin D on the head) or R (pin E on the section)."""
+def link_frame(side, linkage, turns):
+    """Pin on the body (from the pivot), and cosine and sine, of link L (pin D on the head) or R (pin E on the section)."""
     if side == LINK_L:
-        x, y = turned_by(head, linkage.dx, linkage.dy)
-        return x, y, z[joint.z + 1]
-    x, y = turned_by(theta, linkage.ex, linkage.ey)
-    return x, y, z[joint.z + 2]
+        x, y = rotated(turns[0], turns[1], linkage.dx, linkage.dy)
+        return x, y, turns[4], turns[5]
+    x, y = rotated(turns[2], turns[3], linkage.ex, linkage.ey)
+    return x, y, turns[6], turns[7]
 
 
 @inner
-def place_linkage(t, state, work, index, x, y, head):
-    """Links and cylinder of joint B `index` (row of all joint tables), whose pivot is (x, y) on a head turned by `head`."""
-    joint, linkage, z = t.joints[index], t.linkages[index], state.z
-    theta = z[joint.z]
+def place_linkage(t, state, work, index, x, y, c, s):
+    """Links and cylinder of joint B `index` (row of all joint tables), whose pivot is (x, y) on a head turned by (c, s)."""
+    joint, linkage, z, turns = t.joints[index], t.linkages[index], state.z, state.turns[index]
+    turns[0], turns[1] = c, s
+    for k in range(3):
+        turns[2 + 2 * k], turns[3 + 2 * k] = math.cos(z[joint.z + k]), math.sin(z[joint.z + k])
     for k in range(joint.first_link, joint.first_link + joint.links):
         link = t.links[k]
-        bx, by, alpha = link_frame(link.side, joint, linkage, z, head, theta)
-        work.position[link.history] = x + bx + link.middle * math.cos(alpha)
-        work.position[link.history + 1] = y + by + link.middle * math.sin(alpha)
-        work.position[link.history + 2] = alpha
-    bx, by, alpha = link_frame(linkage.mount, joint, linkage, z, head, theta)
-    wx, wy = turned_by(alpha, linkage.along, linkage.left)
+        bx, by, cl, sl = link_frame(link.side, linkage, turns)
+        work.position[link.history] = x + bx + link.middle * cl
+        work.position[link.history + 1] = y + by + link.middle * sl
+        work.position[link.history + 2] = z[joint.z + 1 + (link.side != LINK_L)]
+    bx, by, cl, sl = link_frame(linkage.mount, linkage, turns)
+    wx, wy = rotated(cl, sl, linkage.along, linkage.left)
     pins = state.pins[index]
     pins[2], pins[3] = x + bx + wx, y + by + wy
     place_cylinder(t.cylinders[index], t.parts, pins[0], pins[1], pins[2], pins[3], work.position)
@@ -52,8 +54,8 @@ def place(t, state, work):
         frames[k, 0], frames[k, 1], frames[k, 2], frames[k, 3], frames[k, 4] = x, y, theta, c, s
         if kind == BEAM:
             beam, rho = t.beams[row], work.rho[row]
-            end = beam_shape(beam, t.psi[row], t.weights[row], z, rho, work.drho[row], work.turn[row])
-            place_beam(beam, t.psi[row], rho, z, x, y, theta, c, s, position)
+            end = beam_shape(beam, t.psi[row], t.weights[row], z, rho, work.drho[row], work.angles, work.turn[row])
+            place_beam(beam, rho, work.angles, x, y, theta, c, s, position)
             bx, by = rho[beam.points, 0], rho[beam.points, 1]
             x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
             c, s = math.cos(theta), math.sin(theta)
@@ -75,9 +77,8 @@ def place(t, state, work):
             pins[2], pins[3] = x + c * outlet.x - s * outlet.y, y + s * outlet.x + c * outlet.y
             place_cylinder(t.cylinders[0], t.parts, pins[0], pins[1], pins[2], pins[3], position)
         elif kind == JOINT_B:
-            place_linkage(t, state, work, row, x, y, theta)
-            theta = z[t.joints[row].z]
-            c, s = math.cos(theta), math.sin(theta)
+            place_linkage(t, state, work, row, x, y, c, s)
+            theta, c, s = z[t.joints[row].z], state.turns[row, 2], state.turns[row, 3]
         elif kind == JOINT_A:
             x, y, theta = t.joints[row].x, t.joints[row].y, z[t.joints[row].z]
             c, s = math.cos(theta), math.sin(theta)

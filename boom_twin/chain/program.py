@@ -12,6 +12,8 @@ import numpy as np
 
 from ..records import Array
 
+SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
+
 JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN, TIP = range(8)
 
 OPERATION = np.dtype([("kind", np.int64), ("row", np.int64)])
@@ -85,14 +87,16 @@ class State(NamedTuple):
     """What the boom remembers from step to step.
 
     z : (unknowns,) coordinates and forces, see the tables.
-    history : (histories, 4) x, v, a, p of every unknown and then of every mass point; see `physics.integrators`.
+    history : (depth, histories) of every unknown and then of every mass point; rows: see `physics.integrators`.
     frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
+    turns : (joints, 8) cosine and sine of a six-bar's head, section, link L, link R.
     pins : (cylinders, 4) pins C and R of every cylinder, m.
     """
 
     z: Array
     history: Array
     frames: Array
+    turns: Array
     pins: Array
 
 
@@ -102,18 +106,23 @@ class Work(NamedTuple):
     position: Array  # (histories,)
     hat: Array
     offset: Array
-    s: Array  # (6, 6)
-    p: Array  # (6,)
-    g: Array  # (size,)
+    weights: Array  # of the scheme, see `physics.integrators`
+    s: Array  # (SLOTS, SLOTS)
+    p: Array  # (SLOTS,)
+    g: Array  # (size,) of a six-bar's system
     h: Array  # (size, size)
-    right: Array  # (6, 6)
-    gains: Array  # (operations, rows, 6): decrements of the condensed unknowns by increments of the cut ..
+    own_g: Array  # (5,) of a cylinder
+    own_h: Array  # (5, 5)
+    matrix: Array  # (6, 6)
+    right: Array  # (6, SLOTS)
+    gains: Array  # (operations, rows, SLOTS): decrements of the condensed unknowns by increments of the cut ..
     free: Array  # (operations, rows): .. and those that do not depend on it
     block: Array  # (rows, rows): H_qq of a beam part
     blocks: Array  # (cylinders, 6, 6) what a joint condenses, kept for counting natural frequencies
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
-    turn: Array  # (beams, P, 2)
+    angles: Array  # (P+1,)
+    turn: Array  # (beams, P, 4)
     local: Array  # (P, 2)
     dz: Array  # (unknowns,)
-    cut: Array  # (6,)
+    cut: Array  # (SLOTS,)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from .newton import NOT_CONVERGED, NOT_FINITE, OK, SINGULAR
+from .newton import NOT_CONVERGED, NOT_FINITE, OK
+from .plain import DIGITS_LOST
+from .sweep import SINGULAR
 
 SENTENCES = {
     OK: "ok",
     NOT_CONVERGED: "the equations did not converge; take a smaller step or a smoother stroke",
     SINGULAR: "the equations are singular: a linkage stands at its dead centre, or a part is neither held nor has mass",
     NOT_FINITE: "the equations gave a value that is not finite; check the strokes and take a smaller step",
+    DIGITS_LOST: "the plain product of transfer matrices lost its digits; take the Riccati form or a larger step",
 }

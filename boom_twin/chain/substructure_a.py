@@ -16,7 +16,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); the cut gains the column N. Returns m + 1."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
-    g, h = work.g, work.h
+    g, h = work.own_g, work.own_h
     cylinder_terms(
         cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[0], drive_rate[0],
         motion, t.gravity, work.position, g, h,
@@ -49,7 +49,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
 @inner
 def close_base(work, operation):
     """Solve increments of theta and N of joint A into the gains of `operation`; False if singular."""
-    s, p, a, b = work.s, work.p, work.h, work.right
+    s, p, a, b = work.s, work.p, work.matrix, work.right
     for i in range(2):
         b[i, 0] = p[2 + i]
         for j in range(2):

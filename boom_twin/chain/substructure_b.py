@@ -12,15 +12,18 @@ B1, B2, B3 differ in the numbers of the rod pin only (see `physics.linkage`).
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..physics.algebra import solve
 from ..physics.cylinder import cylinder_terms
 from ..physics.jit import inner
 from ..physics.linkage import LINK_L
-from ..physics.rigid import turned_by
+from ..physics.rotation import rotated
 from .place import link_frame
 
 # places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
 HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
+INNER = np.int64(6)  # typed, because numba compiles once more for every literal
 
 
 @inner
@@ -45,19 +48,16 @@ def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
 
 
 @inner
-def _add_closure(joint, linkage, z, head, g, h):
+def _add_closure(joint, linkage, z, turns, g, h):
     """Closure of pin Q and the forces its multiplier puts on the four bodies."""
     lx, ly = z[joint.z + 3], z[joint.z + 4]
     for side in range(2):
         sign = 1.0 - 2.0 * side
-        if side == 0:
-            bx, by = turned_by(head, linkage.dx, linkage.dy)
-            ux, uy = turned_by(z[joint.z + 1], linkage.length_l, 0.0)
-            base, link = HEAD, ALPHA_L
-        else:
-            bx, by = turned_by(z[joint.z], linkage.ex, linkage.ey)
-            ux, uy = turned_by(z[joint.z + 2], linkage.length_r, 0.0)
-            base, link = SECTION, ALPHA_R
+        bx, by, c, s = link_frame(LINK_L + side, linkage, turns)
+        length, base, link = linkage.length_l, HEAD, ALPHA_L
+        if side == 1:
+            length, base, link = linkage.length_r, SECTION, ALPHA_R
+        ux, uy = length * c, length * s
         g[LAMBDA] += sign * (bx + ux)
         g[LAMBDA + 1] += sign * (by + uy)
         g[base] += sign * (bx * ly - by * lx)
@@ -71,13 +71,13 @@ def _add_closure(joint, linkage, z, head, g, h):
 
 
 @inner
-def _add_links(t, joint, linkage, z, head, motion, position, g, h):
+def _add_links(t, joint, linkage, turns, motion, position, g, h):
     """Inertia and weight of the links that have mass."""
     for k in range(joint.first_link, joint.first_link + joint.links):
         row = t.links[k]
         i = row.history
-        bx, by, alpha = link_frame(row.side, joint, linkage, z, head, z[joint.z])
-        wx, wy = turned_by(alpha, row.middle, 0.0)
+        bx, by, c, s = link_frame(row.side, linkage, turns)
+        wx, wy = row.middle * c, row.middle * s
         inertial = row.mass * motion.gain
         fx = inertial * (position[i] - motion.hat[i]) - row.mass * t.gravity[0]
         fy = inertial * (position[i + 1] - motion.hat[i + 1]) - row.mass * t.gravity[1]
@@ -90,15 +90,16 @@ def _add_links(t, joint, linkage, z, head, motion, position, g, h):
 
 
 @inner
-def _add_cylinder(t, state, index, head, motion, position, drive, drive_rate, own_g, own_h, g, h):
+def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     """The cylinder between pin C and the rod pin on its link."""
-    joint, linkage, cylinder, pins, z = t.joints[index], t.linkages[index], t.cylinders[index], state.pins[index], state.z
+    linkage, cylinder, pins = t.linkages[index], t.cylinders[index], state.pins[index]
+    own_g, own_h = work.own_g, work.own_h
     cylinder_terms(
-        cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], z[cylinder.z], drive[index], drive_rate[index],
-        motion, t.gravity, position, own_g, own_h,
+        cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[index], drive_rate[index],
+        motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
-    bx, by, alpha = link_frame(linkage.mount, joint, linkage, z, head, z[joint.z])
-    wx, wy = turned_by(alpha, linkage.along, linkage.left)
+    bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
+    wx, wy = rotated(c, s, linkage.along, linkage.left)
     base, link = SECTION, ALPHA_R
     if linkage.mount == LINK_L:
         base, link = HEAD, ALPHA_L
@@ -113,7 +114,7 @@ def _add_cylinder(t, state, index, head, motion, position, drive, drive_rate, ow
         else:
             h[PIN_C + j, base] += turn
         h[link, PIN_C + j] += wx * own_h[3, j] - wy * own_h[2, j]
-        for i in range(2):
+        for i in range(j, 2):
             h[PIN_C + i, PIN_C + j] += own_h[i, j]
         h[FORCE, PIN_C + j] += own_h[4, j]
     g[FORCE] += own_g[4]
@@ -126,58 +127,58 @@ def _add_cylinder(t, state, index, head, motion, position, drive, drive_rate, ow
 
 
 @inner
-def close_loop(t, state, work, motion, drive, drive_rate, index, operation, head):
-    """Condense joint B `index`: the cut of section i (3 slots) becomes the cut at the head with C carried (5 slots).
+def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
+    """Condense joint B `index`: the cut of section i (m slots) becomes the cut at the head, pin C carried as slots 3 and 4.
 
     Returns False if the loop's system is singular (a linkage at its dead centre, no inertia).
     """
-    joint, linkage, s, p, g, h = t.joints[index], t.linkages[index], work.s, work.p, work.g, work.h
-    for i in range(SIZE):
+    joint, linkage, turns, g, h = t.joints[index], t.linkages[index], state.turns[index], work.g, work.h
+    size = SIZE + m - 3
+    for i in range(size):
         g[i] = 0.0
-        for j in range(SIZE):
-            h[i, j] = 0.0
-    own_g, own_h = g[SIZE:], h[SIZE:, SIZE:]
-    for i in range(3):
-        a = i if i < 2 else SECTION
-        g[a] += p[i]
         for j in range(i + 1):
-            h[a, j if j < 2 else SECTION] += s[i, j]
-    _add_closure(joint, linkage, state.z, head, g, h)
-    _add_links(t, joint, linkage, state.z, head, motion, work.position, g, h)
-    _add_cylinder(t, state, index, head, motion, work.position, drive, drive_rate, own_g, own_h, g, h)
-    return _condense_loop(work, index, operation)
+            h[i, j] = 0.0
+    for i in range(m):  # slots: x, y of the pivot, the section's angle, and what is carried already
+        a = i if i < 2 else SECTION if i == 2 else SIZE + i - 3
+        g[a] = work.p[i]
+        for j in range(i + 1):
+            h[a, j if j < 2 else SECTION if j == 2 else SIZE + j - 3] = work.s[i, j]
+    _add_closure(joint, linkage, state.z, turns, g, h)
+    _add_links(t, joint, linkage, turns, motion, work.position, g, h)
+    _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
+    return _condense_loop(work, index, operation, size)
 
 
 @inner
-def _condense_loop(work, index, operation):
-    """Solve the six inner unknowns for the five outer ones; gains and block are kept, the cut is rewritten."""
-    s, p, g, h, right = work.s, work.p, work.g, work.h, work.right
-    block, gains, free, inner = work.blocks[index], work.gains[operation], work.free[operation], SIZE - 5
-    matrix = h[:inner, SIZE : SIZE + inner]
-    for i in range(inner):
-        right[i, 5] = g[5 + i]
+def _condense_loop(work, index, operation, size):
+    """Solve the six inner unknowns for all others; gains and block are kept, the cut is rewritten."""
+    s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
+    block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - INNER
+    for i in range(INNER):
         for j in range(5):
             right[i, j] = h[5 + i, j]
+        for j in range(SIZE, size):
+            right[i, j - INNER] = h[j, 5 + i]
+        right[i, others] = g[5 + i]
         for j in range(i + 1):
-            block[i, j] = h[5 + i, 5 + j]
-            block[j, i] = h[5 + i, 5 + j]
-    for i in range(inner):
-        for j in range(inner):
-            matrix[i, j] = block[i, j]
-    if not solve(matrix, right, inner, 6):
+            block[i, j], matrix[i, j] = h[5 + i, 5 + j], h[5 + i, 5 + j]
+            block[j, i], matrix[j, i] = h[5 + i, 5 + j], h[5 + i, 5 + j]
+    if not solve(matrix, right, INNER, others + 1):
         return False
-    for i in range(5):
-        p[i] = g[i]
-        for k in range(inner):
-            p[i] -= h[5 + k, i] * right[k, 5]
-        for j in range(i + 1):
-            value = h[i, j]
-            for k in range(inner):
-                value -= h[5 + k, i] * right[k, j]
-            s[i, j] = value
-            s[j, i] = value
-    for i in range(inner):
-        for j in range(5):
+    for i in range(INNER):
+        for j in range(others):
             gains[i, j] = right[i, j]
-        free[i] = right[i, 5]
+        free[i] = right[i, others]
+    for i in range(others):
+        a = i if i < 5 else i + INNER
+        p[i] = g[a]
+        for j in range(i + 1):
+            s[i, j] = h[a, j if j < 5 else j + INNER]
+        for k in range(INNER):
+            coupling = h[5 + k, a] if a < 5 else h[a, 5 + k]
+            p[i] -= coupling * free[k]
+            for j in range(i + 1):
+                s[i, j] -= coupling * gains[k, j]
+        for j in range(i):
+            s[j, i] = s[i, j]
     return True

@@ -1,4 +1,4 @@
-"""The two Riccati sweeps of one Newton pass: forces in, tip to base; increments out, base to tip."""
+"""The two sweeps of one Newton pass: forces in, tip to base; increments out, base to tip."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from .substructure_a import close_base, join_rod
 from .substructure_b import close_loop
 
 SWEPT, SINGULAR = 0, 2
-# Slots of a cut with nothing carried, and with pin C; typed, because numba compiles once more for every literal.
-SLOTS, CARRIED = np.int64(3), np.int64(5)
+FREE = np.int64(3)  # slots of a cut with nothing carried: x, y, theta; typed, because numba compiles once more for literals
 
 
 @inner
@@ -39,26 +38,31 @@ def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     )  # fmt: skip
 
 
+@inner
+def clear_cut(work, m):
+    """Nothing outboard: S = 0, p = 0 in m slots."""
+    for i in range(m):
+        work.p[i] = 0.0
+        for j in range(m):
+            work.s[i, j] = 0.0
+
+
 @kernel
-def sweep_in(t, state, work, motion, drive, drive_rate):
-    """Condense all forces and tangents towards the base.
+def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
+    """Carry the cut in `work`, m slots wide, from the end of operation `last - 1` inwards through operation `first`.
 
     Returns
     -------
-    status, negative : int
-        SWEPT or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`).
+    status, negative, m : int
+        SWEPT or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`); slots of the cut now.
     """
-    s, p, m, negative = work.s, work.p, SLOTS, 0
-    for i in range(3):
-        p[i] = 0.0
-        for j in range(3):
-            s[i, j] = 0.0
-    for k in range(t.operations.shape[0] - 1, -1, -1):
+    s, p, negative = work.s, work.p, 0
+    for k in range(last - 1, first - 1, -1):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, 3], state.frames[k, 4]
         if kind == BEAM:
             count = beam_operation(t, state, work, motion, row, k, c, sn, m)
             if count < 0:
-                return SINGULAR, negative
+                return SINGULAR, negative, m
             negative += count
         elif kind == BODY:
             transfer_body(t, work, motion, row, c, sn)
@@ -71,19 +75,22 @@ def sweep_in(t, state, work, motion, drive, drive_rate):
         elif kind == ROD_PIN:
             m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:
-            if not close_loop(t, state, work, motion, drive, drive_rate, row, k, state.frames[k, 2]):
-                return SINGULAR, negative
-            m = CARRIED
+            if not close_loop(t, state, work, motion, drive, drive_rate, row, k, m):
+                return SINGULAR, negative, m
+            m += 2
         elif kind == JOINT_A and not close_base(work, k):
-            return SINGULAR, negative
-    return SWEPT, negative
+            return SINGULAR, negative, m
+    return SWEPT, negative, m
 
 
 @kernel
-def sweep_out(t, state, work):
-    """Increments of all unknowns from the gains that `sweep_in` kept; fills `work.dz` with what to ADD to the unknowns."""
-    cut, dz, m = work.cut, work.dz, SLOTS
-    for k in range(t.operations.shape[0]):
+def sweep_out(t, state, work, first, last, m):
+    """Increments of the unknowns of operations `first` .. `last - 1` from the cut before them, m slots in `work.cut`.
+
+    Uses the gains that `sweep_in` kept; writes what to ADD to the unknowns into `work.dz`.
+    """
+    cut, dz = work.cut, work.dz
+    for k in range(first, last):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, 3], state.frames[k, 4]
         gains, free = work.gains[k], work.free[k]
         if kind == BEAM:
@@ -94,26 +101,28 @@ def sweep_out(t, state, work):
             cut[1] += (c * bx - sn * by) * cut[2]
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
-            if m == 4:
-                cut[5] = cut[3]
+            for i in range(m - 1, 2, -1):
+                cut[i + 2] = cut[i]
             cut[3], cut[4] = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
             m += 2
         elif kind == ROD_PIN:
             m -= 1
         elif kind == JOINT_B:
-            first = t.joints[row].z
+            at = t.joints[row].z
             for i in range(6):
                 value = -free[i]
-                for j in range(5):
+                for j in range(m):
                     value -= gains[i, j] * cut[j]
-                dz[first + i] = value
-            cut[2] = dz[first]
-            m = SLOTS
+                dz[at + i] = value
+            cut[2] = dz[at]
+            for i in range(5, m):
+                cut[i - 2] = cut[i]
+            m -= 2
         elif kind == JOINT_A:
-            first = t.joints[row].z
-            dz[first], dz[first + 1] = -free[0], -free[1]
-            cut[0], cut[1], cut[2], cut[3] = 0.0, 0.0, dz[first], dz[first + 1]
-            m = SLOTS + 1
+            at = t.joints[row].z
+            dz[at], dz[at + 1] = -free[0], -free[1]
+            cut[0], cut[1], cut[2], cut[3] = 0.0, 0.0, dz[at], dz[at + 1]
+            m = FREE + 1
 
 
 @inner

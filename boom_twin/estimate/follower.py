@@ -17,8 +17,8 @@ import numpy as np
 from ..chain.newton import OK, newton
 from ..chain.program import Motion
 from ..chain.step import advance, observe, rest
-from ..physics.integrators import generalised_alpha
-from ..physics.jit import kernel
+from ..physics.integrators import GENERALISED_ALPHA, prepare
+from ..physics.jit import inner, kernel
 from ..physics.linkage import angle_of_length
 from ..plan.compile import Plan
 from ..records import Array
@@ -76,31 +76,17 @@ def new_track(plan: Plan, lengths: Array) -> Track:
 
 
 @kernel
-def begin(t, anchor, live, work, track, tuning, y, out):
-    """First sample, at time 0: strokes y (m), shape (n,), at rest in equilibrium; `out` as in `follow`."""
-    track.nodes[0], track.moved[0], track.times[0] = 1, 0, 0.0
-    start_node(track.x, track.c, y, tuning.variance)
-    status = settle_anchor(t, anchor, work, track)
-    copy_state(anchor, live)
-    report(t, live, track, out)
-    return status
-
-
-@kernel
 def follow(t, anchor, live, work, track, tuning, time, y, out):
     """Take strokes y (m; NaN = missing) measured at `time` (s) and write the prediction for it.
+
+    The first sample of a track without nodes is taken as rest, in equilibrium; `anchor` holds a first guess of it.
 
     out : ndarray, shape (4 n + 11,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
     variances, tip of the rigid boom (2).
 
     Returns a status of `chain.newton`.
     """
-    for j in range(track.nodes[0], 0, -1):
-        track.times[j] = track.times[j - 1]
-    add_node(track.x, track.c, track.nodes[0], time - track.times[1], tuning.density)
-    track.times[0] = time
-    track.nodes[0] += 1
-    measure(track.x, track.c, track.nodes[0], y, tuning.variance)
+    add_sample(track, tuning, time, y)
     status = move_anchor(t, anchor, work, track, tuning)
     if status != OK:
         return status
@@ -112,7 +98,22 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     return OK
 
 
-@kernel
+@inner
+def add_sample(track, tuning, time, y):
+    """Take the sample into the smoother's window."""
+    for j in range(track.nodes[0], 0, -1):
+        track.times[j] = track.times[j - 1]
+    track.times[0] = time
+    if track.nodes[0] == 0:
+        track.moved[0] = 0
+        start_node(track.x, track.c, y, tuning.variance)
+    else:
+        add_node(track.x, track.c, track.nodes[0], time - track.times[1], tuning.density)
+        measure(track.x, track.c, track.nodes[0] + 1, y, tuning.variance)
+    track.nodes[0] += 1
+
+
+@inner
 def report(t, live, track, out):
     """Write what is predicted now; see `follow`."""
     n = t.joints.shape[0]
@@ -123,7 +124,7 @@ def report(t, live, track, out):
     out[at + 2 * n], out[at + 2 * n + 1] = rigid_tip(t, track)
 
 
-@kernel
+@inner
 def move_anchor(t, anchor, work, track, tuning):
     """Step the anchor to the youngest node that is older than the lag, and drop the nodes behind it."""
     count = track.nodes
@@ -133,7 +134,7 @@ def move_anchor(t, anchor, work, track, tuning):
         status = glide(t, anchor, work, track, tuning, track.anchor, track.x[new], span, tuning.step, TOLERANCE)
         if status != OK:
             return status
-        track.anchor[:] = track.x[new]
+        copy_node(track.x[new], track.anchor)
         track.moved[0] = 1
         count[0] -= 1
     if track.moved[0] == 0:
@@ -141,15 +142,15 @@ def move_anchor(t, anchor, work, track, tuning):
     return OK
 
 
-@kernel
+@inner
 def settle_anchor(t, anchor, work, track):
     """Equilibrium at the strokes of the oldest node, until the anchor moves."""
-    track.anchor[:] = track.x[track.nodes[0] - 1]
+    copy_node(track.x[track.nodes[0] - 1], track.anchor)
     for i in range(track.drive.shape[0]):
         track.anchor[i, 1], track.anchor[i, 2] = 0.0, 0.0
         track.drive[i], track.rate[i] = track.closed[i] + track.anchor[i, 0], 0.0
     still = Motion(0.0, 0.0, track.zeros, track.zeros)
-    status, _, _ = newton(t, anchor, work, still, track.drive, track.rate, TOLERANCE, REST_PASSES, 0.1)
+    status, _, _ = newton(t, anchor, work, still, track.drive, track.rate, TOLERANCE, REST_PASSES, 0.1, None)
     rest(anchor, work)
     return status
 
@@ -158,18 +159,18 @@ def settle_anchor(t, anchor, work, track):
 def glide(t, state, work, track, tuning, old, new, span, longest, tolerance):
     """Follow the quintic between two nodes (n, 3), `span` s apart, in steps of at most `longest` s."""
     steps = max(1, math.ceil(span / longest - 1e-6))
-    scheme = generalised_alpha(span / steps, tuning.rho)
+    scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
     for k in range(steps):
         for i in range(track.drive.shape[0]):
             position, velocity = drive_between(old[i], new[i], span, (k + 1) / steps)
             track.drive[i], track.rate[i] = track.closed[i] + position, velocity
-        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, tolerance, PASSES)
+        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, tolerance, PASSES, None)
         if status != OK:
             return status
     return OK
 
 
-@kernel
+@inner
 def look_ahead(t, live, work, track, tuning):
     """Run the copy from the anchor's node to the newest one, skipping nodes as long as steps stay below `look_step`."""
     old = track.nodes[0] - 1
@@ -186,16 +187,34 @@ def look_ahead(t, live, work, track, tuning):
     return OK
 
 
+@inner
+def copy_node(source, target):
+    """Copy position, velocity and acceleration of all strokes, (n, 3)."""
+    for i in range(target.shape[0]):
+        for a in range(3):
+            target[i, a] = source[i, a]
+
+
 @kernel
 def copy_state(source, target):
     """Copy everything a boom remembers."""
-    target.z[:] = source.z
-    target.history[:] = source.history
-    target.frames[:] = source.frames
-    target.pins[:] = source.pins
+    for i in range(source.z.shape[0]):
+        target.z[i] = source.z[i]
+    copy_rows(source.history, target.history)
+    copy_rows(source.frames, target.frames)
+    copy_rows(source.turns, target.turns)
+    copy_rows(source.pins, target.pins)
 
 
-@kernel
+@inner
+def copy_rows(source, target):
+    """Copy an array of two dimensions."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@inner
 def rigid_tip(t, track):
     """Tip (m) of the undeformed boom at the newest strokes; a stroke out of reach leaves its joint where it was."""
     x, y, heading = t.joints[0].x, t.joints[0].y, 0.0

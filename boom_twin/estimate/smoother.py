@@ -15,14 +15,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ..physics.jit import kernel
+from ..physics.jit import inner
 
 QUIET = 1e-12  # variance of velocity and acceleration at the start: the boom starts at rest
 
 
-@kernel
+@inner
 def start_node(x, c, y, variance):
     """First node: strokes at rest at y, shape (n,); x is (nodes, n, 3), c (nodes, n, 3, 3)."""
     for i in range(y.shape[0]):
@@ -33,12 +31,15 @@ def start_node(x, c, y, variance):
         c[0, i, 0, 0], c[0, i, 1, 1], c[0, i, 2, 2] = variance, QUIET, QUIET
 
 
-@kernel
+@inner
 def add_node(x, c, count, h, density):
     """Shift `count` nodes back by one, and predict a new node 0 at h seconds later."""
     for j in range(count, 0, -1):
-        x[j] = x[j - 1]
-        c[j] = c[j - 1]
+        for i in range(x.shape[1]):
+            for a in range(3):
+                x[j, i, a] = x[j - 1, i, a]
+                for b in range(3):
+                    c[j, i, a, b] = c[j - 1, i, a, b]
     f, g = h, 0.5 * h * h
     for i in range(x.shape[1]):
         x[0, i, 0] = x[1, i, 0] + f * x[1, i, 1] + g * x[1, i, 2]
@@ -64,16 +65,14 @@ def add_node(x, c, count, h, density):
         new[2, 2] += density * h
 
 
-@kernel
+@inner
 def measure(x, c, count, y, variance):
     """Correct all `count` nodes by strokes y, shape (n,); NaN = not measured."""
-    gain = np.empty(3)
     for i in range(y.shape[0]):
         if not math.isfinite(y[i]):
             continue
         surprise, spread = y[i] - x[0, i, 0], c[0, i, 0, 0] + variance
-        for a in range(3):
-            gain[a] = c[0, i, a, 0] / spread
+        gain = (c[0, i, 0, 0] / spread, c[0, i, 1, 0] / spread, c[0, i, 2, 0] / spread)
         for j in range(count):
             for a in range(3):
                 first = c[j, i, a, 0]
@@ -82,7 +81,7 @@ def measure(x, c, count, y, variance):
                     c[j, i, a, b] -= first * gain[b]
 
 
-@kernel
+@inner
 def drive_between(old, new, span, share):
     """Position and velocity on the quintic through two nodes of one stroke, (3,) each, `span` s apart; share in [0, 1]."""
     v, a = old[1] * span, 0.5 * old[2] * span * span

@@ -76,16 +76,21 @@ def solve(a, b, n, columns):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
             for j in range(columns):
                 b[k, j], b[best, j] = b[best, j], b[k, j]
+        inverse = 1.0 / a[k, k]
+        a[k, k] = inverse
         for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k]
+            factor = a[i, k] * inverse
             if factor != 0.0:
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
                 for j in range(columns):
                     b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):
+        for i in range(k + 1, n):
+            factor = a[k, i]
+            for j in range(columns):
+                b[k, j] -= factor * b[i, j]
+        inverse = a[k, k]
         for j in range(columns):
-            for i in range(k + 1, n):
-                b[k, j] -= a[k, i] * b[i, j]
-            b[k, j] /= a[k, k]
+            b[k, j] *= inverse
     return True

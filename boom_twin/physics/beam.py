@@ -8,18 +8,17 @@ rotation. Positions follow by integration along the axis with the cosines and si
     r(s) = r_I + Rot(theta) rho(s),     theta(s) = theta + psi(s).q .
 
 Foreshortening, and with it the stiffness that axial load gives or takes (geometric stiffness), is in the cosines; nothing is
-added for it. Masses sit at the Gauss points. Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.notation`; the
-integrated form is derived here.
+added for it. A part without geometric stiffness has (1, psi.q) in place of cosine and sine. Masses sit at the Gauss points.
+Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.notation`; the integrated form is derived here.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from .algebra import condense
 from .jit import inner
+from .rotation import cosines
 
 BEAM = np.dtype(
     [
@@ -27,6 +26,7 @@ BEAM = np.dtype(
         ("bending", np.int64),  # n
         ("axial", np.int64),  # 1 or 0
         ("points", np.int64),  # P
+        ("finite", np.int64),  # P if cosine and sine of the rotations are taken, 0 if they are small: no geometric stiffness
         ("rotary", np.int64),  # P if cross-sections have rotary inertia, else 0
         ("damped", np.int64),  # number of coordinates if there is material damping, else 0
         ("history", np.int64),  # place of x, y of each point among the histories; then theta of each, if rotary
@@ -37,52 +37,59 @@ BEAM = np.dtype(
 
 
 @inner
-def beam_shape(row, psi, weights, z, rho, drho, turn):
-    """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), and turn (P, 2): cos and sin; returns the end's turn.
-
-    `psi` is (P+1, n), `weights` (P+1, P); their last row belongs to the output end.
-    """
-    stretch = 1.0
-    if row.axial:
-        stretch += z[row.z + row.bending]
-    angle = 0.0
+def turn_points(row, psi, z, angles, turn):
+    """Fill turn (P, 4): cosine, sine and their derivatives by the angle, at every point; returns the end's turn."""
+    end = 0.0
     for j in range(row.points + 1):
-        angle = 0.0
+        end = 0.0
         for k in range(row.bending):
-            angle += psi[j, k] * z[row.z + k]
-        if j < row.points:
-            turn[j, 0] = math.cos(angle)
-            turn[j, 1] = math.sin(angle)
-    for i in range(row.points + 1):
-        x, y = 0.0, 0.0
-        for k in range(row.bending):
-            drho[i, k, 0] = 0.0
-            drho[i, k, 1] = 0.0
-        for j in range(row.points):
-            wx, wy = weights[i, j] * turn[j, 0], weights[i, j] * turn[j, 1]
-            x += wx
-            y += wy
-            for k in range(row.bending):
-                drho[i, k, 0] -= stretch * wy * psi[j, k]
-                drho[i, k, 1] += stretch * wx * psi[j, k]
-        rho[i, 0], rho[i, 1] = stretch * x, stretch * y
-        if row.axial:
-            drho[i, row.bending, 0], drho[i, row.bending, 1] = x, y
-    return angle
+            end += psi[j, k] * z[row.z + k]
+        angles[j] = end
+    for j in range(row.points):
+        turn[j, 0], turn[j, 1], turn[j, 2], turn[j, 3] = 1.0, angles[j], 0.0, 1.0
+    cosines(angles, row.finite, turn)
+    for j in range(row.finite):
+        turn[j, 2], turn[j, 3] = -turn[j, 1], turn[j, 0]
+    return end
 
 
 @inner
-def place_beam(row, psi, rho, z, x, y, theta, c, s, position):
+def beam_shape(row, psi, weights, z, rho, drho, angles, turn):
+    """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), angles (P+1,), `turn`; returns the end's turn.
+
+    `psi` is (P+1, n), `weights` (P+1, P); their last row belongs to the output end.
+    """
+    n, stretch = row.bending, 1.0
+    if row.axial:
+        stretch += z[row.z + n]
+    end = turn_points(row, psi, z, angles, turn)
+    for i in range(row.points + 1):
+        x, y = 0.0, 0.0
+        for k in range(n):
+            drho[i, k, 0], drho[i, k, 1] = 0.0, 0.0
+        for j in range(row.points):
+            weight = weights[i, j]
+            x += weight * turn[j, 0]
+            y += weight * turn[j, 1]
+            dx, dy = stretch * weight * turn[j, 2], stretch * weight * turn[j, 3]
+            for k in range(n):
+                drho[i, k, 0] += dx * psi[j, k]
+                drho[i, k, 1] += dy * psi[j, k]
+        rho[i, 0], rho[i, 1] = stretch * x, stretch * y
+        if row.axial:
+            drho[i, n, 0], drho[i, n, 1] = x, y
+    return end
+
+
+@inner
+def place_beam(row, rho, angles, x, y, theta, c, s, position):
     """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
     for i in range(row.points):
         at = row.history + 2 * i
         position[at] = x + c * rho[i, 0] - s * rho[i, 1]
         position[at + 1] = y + s * rho[i, 0] + c * rho[i, 1]
     for i in range(row.rotary):
-        angle = theta
-        for k in range(row.bending):
-            angle += psi[i, k] * z[row.z + k]
-        position[row.history + 2 * row.points + i] = angle
+        position[row.history + 2 * row.points + i] = theta + angles[i]
 
 
 @inner
@@ -198,12 +205,13 @@ def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stret
         for i in range(points):
             fx += weights[i, j] * local[i, 0]
             fy += weights[i, j] * local[i, 1]
-        along = stretch * (fx * turn[j, 0] + fy * turn[j, 1])
-        across = fy * turn[j, 0] - fx * turn[j, 1]
-        for a in range(n):
-            share = along * psi[j, a]
-            for b in range(a + 1):
-                block[a, b] -= share * psi[j, b]
+        if j < row.finite:
+            along = stretch * (fx * turn[j, 0] + fy * turn[j, 1])
+            for a in range(n):
+                share = along * psi[j, a]
+                for b in range(a + 1):
+                    block[a, b] -= share * psi[j, b]
+        across = fx * turn[j, 2] + fy * turn[j, 3]
         for a in range(n * row.axial):
             block[n, a] += across * psi[j, a]
 

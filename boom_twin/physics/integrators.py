@@ -1,66 +1,156 @@
-"""Generalised-alpha: acceleration and velocity of a scalar as affine functions of its new position.
+"""Time integrators as tables of weights: acceleration and velocity of a scalar as affine functions of its new position.
 
-With the auxiliary acceleration p (source: [AB] in `boom_twin.notation`; coefficients of Chung and Hulbert 1993)
+    a' = A (x' - x_hat),   v' = C x' + D,   x_hat and D linear in the scalar's history,
+
+a prime marking the time that is solved for. Every scheme here is that pattern; it is written down once, as weights, and the
+loops over all scalars do not know which scheme they run. A history is a column of
+
+    [ x, v two steps ago; x, v one step ago; ]  x, v, p, a  now            (the last four are X, V, P, A)
+
+and a step makes every row of it from the new x', v', a' and the old rows at or behind its own place, in that order.
+
+Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.notation`)
 
     x' = x + h v + h^2 ((1/2 - beta) p + beta p'),   v' = v + h ((1 - gamma) p + gamma p'),
-    (1 - am) p' + am p = (1 - af) a' + af a,
+    (1 - am) p' + am p = (1 - af) a' + af a;
 
-a prime marking the new time. Solved for the new acceleration and velocity:
-
-    a' = A (x' - x_hat),   x_hat = x* - (am p - af a) / ((1 - af) A),   x* = x + h v + h^2 (1/2 - beta) p,
-    v' = C x' + D,         D = v + h (1 - gamma) p - C x*.
-
-rho is the spectral radius at infinite frequency: 1 keeps every frequency, 0 kills the highest within one step. Positions
-of constrained points are integrated directly (index 3), which needs rho < 1.
+rho is the spectral radius at infinite frequency: 1 keeps every frequency, 0 kills the highest within one step. Positions of
+constrained points are integrated directly (index 3), which needs rho < 1. Newmark is am = af = 0, beta = (gamma + 1/2)^2/4.
+Wilson-theta takes the acceleration as linear up to t + theta h, solves there, and falls back to t + h. Houbolt: cubic through
+four positions; Park 1975: mean of the two- and three-step backward differences, for x and again for v.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
+from ..records import Array
 from .jit import inner
+
+GENERALISED_ALPHA, NEWMARK, WILSON, HOUBOLT, PARK = range(5)
+X, V, P, A = -4, -3, -2, -1  # rows of a history, from its end
+NEW_X, NEW_V, NEW_A, OLD = 0, 1, 2, 3  # columns of weights: new x', v', a', then the old history
+HAT, OFFSET, ROWS = 0, 1, 2  # rows of weights: x_hat, D, then the new history
+DEPTH, LONG_DEPTH = 4, 8
 
 
 class Scheme(NamedTuple):
-    """Coefficients for one step size; see the module's equations. `gain` is A (1/s^2), `rate` is C (1/s)."""
+    """One scheme at one step size.
 
-    step: float
-    am: float
-    af: float
-    beta: float
-    gamma: float
+    reach : time from the newest history to the instant that is solved for, s.
+    gain, rate : A (1/s^2) and C (1/s).
+    weights : (2 + depth, 3 + depth), see the module's constants.
+    """
+
+    reach: float
     gain: float
     rate: float
+    weights: Array
+
+
+def depth_of(family: int) -> int:
+    """Rows of a history that the family needs."""
+    return LONG_DEPTH if family in (HOUBOLT, PARK) else DEPTH
+
+
+def new_weights(depth: int) -> Array:
+    """Room for a scheme's weights."""
+    return np.zeros((ROWS + depth, OLD + depth))
 
 
 @inner
-def generalised_alpha(step, rho):
-    """Coefficients for `step` (s) and spectral radius `rho` in [0, 1]."""
-    am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
-    gamma = 0.5 + af - am
+def prepare(family, parameter, step, weights):
+    """Scheme of `family` for `step` (s); `parameter` is rho, Newmark's gamma, or theta. Fills `weights`."""
+    for k in range(weights.shape[0]):
+        for j in range(weights.shape[1]):
+            weights[k, j] = 0.0
+    weights[X, NEW_X], weights[V, NEW_V], weights[A, NEW_A] = 1.0, 1.0, 1.0
+    if family == GENERALISED_ALPHA:
+        am, af = (2.0 * parameter - 1.0) / (parameter + 1.0), parameter / (parameter + 1.0)
+        return one_step(am, af, 0.5 + af - am, step, weights)
+    if family == NEWMARK:
+        return one_step(0.0, 0.0, parameter, step, weights)
+    if family == WILSON:
+        return wilson(parameter, step, weights)
+    for k in range(4):  # x, v of two steps ago, and of one step ago
+        weights[ROWS + k, OLD + k + 2] = 1.0
+    if family == HOUBOLT:
+        return houbolt(step, weights)
+    return park(step, weights)
+
+
+@inner
+def one_step(am, af, gamma, h, weights):
+    """Generalised-alpha with its four coefficients."""
     beta = 0.25 * (gamma + 0.5) ** 2
-    return Scheme(step, am, af, beta, gamma, (1.0 - am) / ((1.0 - af) * beta * step * step), gamma / (beta * step))
+    gain, rate = (1.0 - am) / ((1.0 - af) * beta * h * h), gamma / (beta * h)
+    share = 1.0 / ((1.0 - af) * gain)
+    weights[HAT, X], weights[HAT, V] = 1.0, h
+    weights[HAT, P], weights[HAT, A] = h * h * (0.5 - beta) - am * share, af * share
+    weights[OFFSET, X], weights[OFFSET, V] = -rate, 1.0 - rate * h
+    weights[OFFSET, P] = h * (1.0 - gamma) - rate * h * h * (0.5 - beta)
+    weights[P, NEW_A], weights[P, A], weights[P, P] = (1.0 - af) / (1.0 - am), af / (1.0 - am), -am / (1.0 - am)
+    return Scheme(h, gain, rate, weights)
+
+
+@inner
+def wilson(theta, h, weights):
+    """Wilson-theta, theta >= 1.37 for unconditional stability on an oscillator."""
+    reach, part = theta * h, 1.0 / theta
+    weights[HAT, X], weights[HAT, V], weights[HAT, A] = 1.0, reach, reach * reach / 3.0
+    weights[OFFSET, X], weights[OFFSET, V], weights[OFFSET, A] = -3.0 / reach, -2.0, -0.5 * reach
+    weights[X, NEW_X], weights[X, X], weights[X, V] = 0.0, 1.0, h
+    weights[X, NEW_A], weights[X, A] = h * h / 6.0 * part, h * h / 6.0 * (3.0 - part)
+    weights[V, NEW_V], weights[V, V] = 0.0, 1.0
+    weights[V, NEW_A], weights[V, A] = 0.5 * h * part, 0.5 * h * (2.0 - part)
+    weights[A, NEW_A], weights[A, A] = part, 1.0 - part
+    return Scheme(reach, 6.0 / (reach * reach), 3.0 / reach, weights)
+
+
+@inner
+def houbolt(h, weights):
+    """Houbolt's backward differences."""
+    weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 2.5, -2.0, 0.5
+    weights[OFFSET, X], weights[OFFSET, OLD + 2], weights[OFFSET, OLD] = -3.0 / h, 1.5 / h, -1.0 / (3.0 * h)
+    return Scheme(h, 2.0 / (h * h), 11.0 / (6.0 * h), weights)
+
+
+@inner
+def park(h, weights):
+    """Park's stiffly stable backward differences."""
+    weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 1.5, -0.6, 0.1
+    weights[HAT, V], weights[HAT, OLD + 3], weights[HAT, OLD + 1] = 0.9 * h, -0.36 * h, 0.06 * h
+    weights[OFFSET, X], weights[OFFSET, OLD + 2], weights[OFFSET, OLD] = -2.5 / h, 1.0 / h, -1.0 / (6.0 * h)
+    rate = 10.0 / (6.0 * h)
+    return Scheme(h, rate * rate, rate, weights)
 
 
 @inner
 def start_step(scheme, history, hat, offset):
-    """Fill x_hat and D, both shape (n,), from `history`, shape (n, 4): columns x, v, a, p."""
-    h = scheme.step
-    share = 1.0 / ((1.0 - scheme.af) * scheme.gain)
-    for i in range(history.shape[0]):
-        x, v, a, p = history[i, 0], history[i, 1], history[i, 2], history[i, 3]
-        ahead = x + h * v + h * h * (0.5 - scheme.beta) * p
-        hat[i] = ahead - (scheme.am * p - scheme.af * a) * share
-        offset[i] = v + h * (1.0 - scheme.gamma) * p - scheme.rate * ahead
+    """Fill x_hat and D, both shape (n,), from `history`, shape (depth, n)."""
+    for i in range(hat.shape[0]):
+        hat[i], offset[i] = 0.0, 0.0
+    for k in range(history.shape[0]):
+        row, for_hat, for_offset = history[k], scheme.weights[HAT, OLD + k], scheme.weights[OFFSET, OLD + k]
+        if for_hat != 0.0 or for_offset != 0.0:
+            for i in range(hat.shape[0]):
+                hat[i] += for_hat * row[i]
+                offset[i] += for_offset * row[i]
 
 
 @inner
 def finish_step(scheme, position, hat, offset, history):
-    """Write the new x, v, a, p of all scalars at their new `position`, shape (n,)."""
-    for i in range(history.shape[0]):
-        a_old, p_old = history[i, 2], history[i, 3]
-        a = scheme.gain * (position[i] - hat[i])
-        history[i, 0] = position[i]
-        history[i, 1] = scheme.rate * position[i] + offset[i]
-        history[i, 2] = a
-        history[i, 3] = ((1.0 - scheme.af) * a + scheme.af * a_old - scheme.am * p_old) / (1.0 - scheme.am)
+    """Write the new history of all scalars from their `position`, shape (n,), at the instant solved for."""
+    for k in range(history.shape[0]):
+        row, weights = history[k], scheme.weights[ROWS + k]
+        for_x, for_v, for_a, keep = weights[NEW_X], weights[NEW_V], weights[NEW_A], weights[OLD + k]
+        for i in range(position.shape[0]):
+            v, a = scheme.rate * position[i] + offset[i], scheme.gain * (position[i] - hat[i])
+            row[i] = for_x * position[i] + for_v * v + for_a * a + keep * row[i]
+        for j in range(k + 1, history.shape[0]):
+            share, older = weights[OLD + j], history[j]
+            if share != 0.0:
+                for i in range(position.shape[0]):
+                    row[i] += share * older[i]

@@ -1,18 +1,24 @@
-"""The one place that compiles: the decorator every kernel wears.
+"""The one place that compiles: the decorators that every kernel wears.
 
-numba's cache does not see that a kernel in another file has changed. The cache folder is therefore named after a hash
-of all kernel sources, so an edit anywhere gives a new folder. ``fastmath`` stays off: it turns isfinite(nan) into True.
+numba is imported, and a kernel compiled, when Python first calls one: geometry that is only read stays plain Python. The
+compiled code is kept in a cache. numba's cache does not see that a kernel in another file has changed, so the cache folder
+is named after a hash of all kernel sources, and an edit anywhere gives a new folder. ``fastmath`` stays off: it turns
+isfinite(nan) into True. Kernels do not own memory (``_nrt=False``), so none can allocate, and passing a part of an array on
+costs no reference counting, which was nearly half of a step.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FOLDERS = ("physics", "chain", "estimate")
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 
 
 def _source_hash() -> str:
@@ -25,30 +31,57 @@ def _source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _use_keyed_cache() -> None:
-    """Point numba at a cache folder of this source state, unless the user chose one."""
+def cache_folder() -> Path:
+    """Where compiled kernels of this source state are kept: NUMBA_CACHE_DIR, or a folder of our own."""
     if "NUMBA_CACHE_DIR" in os.environ:
-        return
+        return Path(os.environ["NUMBA_CACHE_DIR"])
     home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    os.environ["NUMBA_CACHE_DIR"] = str(home / "boom_twin" / _source_hash())
+    return home / "boom_twin" / _source_hash()
 
 
-_use_keyed_cache()
+def _numba() -> Any:
+    """numba, its cache pointed at our folder."""
+    folder = str(cache_folder())
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    import numba
 
-import numba  # noqa: E402 - numba reads its cache folder when it is imported
-
-numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
-
-
-def kernel(function: Any) -> Any:
-    """Compile `function` (nopython, cached on disk, without the interpreter's lock, no exceptions for division)."""
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    numba.config.CACHE_DIR = folder
+    return numba
 
 
-def inner(function: Any) -> Any:
-    """Compile as `kernel` does, and inline wherever it is called.
+class Kernel:
+    """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""
 
-    For what is called from within a step: handing over tables of arrays costs more than many an element does. A step of the
-    default boom became 35 % faster by it, for 3 s more of compiling.
-    """
-    return numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function)
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._options = function, options
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """numba's object, made on first use."""
+        return _numba().njit(**OPTIONS, **self._options)(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this object for when it meets it in a kernel."""
+        return self.dispatcher._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
+
+
+class Inner(Kernel):
+    """A kernel that exists compiled only inside others; called from Python it runs as Python."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.py_func(*arguments)
+
+
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Compile `function`: nopython, cached on disk, without the interpreter's lock, no exceptions for division."""
+    return Kernel(function)
+
+
+def inner(function: Callable[..., Any]) -> Inner:
+    """Compile as `kernel` does, inlined wherever a kernel calls it; Python runs it as it stands."""
+    return Inner(function, forceinline=True, no_cpython_wrapper=True)

@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from .jit import inner
+from .rotation import turned
 
 DIRECT, LINK_L, LINK_R = 0, 1, 2
 
@@ -32,13 +33,6 @@ LINKAGE = np.dtype(
         ("along", float), ("left", float),  # place of the rod pin on its link, m
     ]
 )  # fmt: skip
-
-
-@inner
-def turned(x, y, phi):
-    """Vector (x, y) turned by phi (rad)."""
-    c, s = math.cos(phi), math.sin(phi)
-    return c * x - s * y, s * x + c * y
 
 
 @inner
@@ -57,7 +51,7 @@ def joint_pin(dx, dy, ex, ey, length_l, length_r):
 @inner
 def link_angles(row, phi):
     """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
-    ex, ey = turned(row.ex, row.ey, phi)
+    ex, ey = turned(phi, row.ex, row.ey)
     qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
     return math.atan2(qy - row.dy, qx - row.dx), math.atan2(qy - ey, qx - ex)
 
@@ -65,7 +59,7 @@ def link_angles(row, phi):
 @inner
 def cylinder_length(row, phi):
     """Pin-to-pin length of the cylinder (m) and its derivative by phi (m/rad); NaN if the links do not close."""
-    ex, ey = turned(row.ex, row.ey, phi)
+    ex, ey = turned(phi, row.ex, row.ey)
     if row.mount == DIRECT:
         rx, ry, drx, dry = ex, ey, -ey, ex
     else:

@@ -7,16 +7,7 @@ Body vector b turned by the orientation theta is (X, Y). With r_O = r_I + (X, Y)
 
 from __future__ import annotations
 
-import math
-
 from .jit import inner
-
-
-@inner
-def turned_by(theta, bx, by):
-    """Body vector (bx, by) in the model frame."""
-    c, s = math.cos(theta), math.sin(theta)
-    return c * bx - s * by, s * bx + c * by
 
 
 @inner

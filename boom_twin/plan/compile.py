@@ -11,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..chain import program
-from ..chain.program import State, Tables, Work
+from ..chain.program import SLOTS, State, Tables, Work
 from ..physics import cylinder, modes
+from ..physics.integrators import DEPTH, new_weights
 from ..physics.linkage import LINK_L, LINK_R, LINKAGE
 from ..records import Array
 from ..scene.kinematics import gravity_in_base, linkage
@@ -22,7 +23,7 @@ from .layout import Layout
 
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
-LOOP = 17  # rows of the system of a six-bar and, beside it, of its cylinder
+LOOP = 14  # most rows of the system of a six-bar
 
 
 @dataclass(frozen=True)
@@ -53,29 +54,30 @@ class Plan:
         """Number of joints, and of sections."""
         return len(self.tables.joints)
 
-    def state(self) -> State:
-        """A fresh state, all zero but the pins in the base."""
+    def state(self, depth: int = DEPTH) -> State:
+        """A fresh state, all zero but the pins in the base; `depth` rows of history."""
         histories, n = len(self.masses), self.joints
         state = State(
-            z=np.zeros(len(self.names)), history=np.zeros((histories, 4)),
-            frames=np.zeros((len(self.tables.operations) + 1, 5)), pins=np.zeros((n, 4)),
+            z=np.zeros(len(self.names)), history=np.zeros((depth, histories)),
+            frames=np.zeros((len(self.tables.operations) + 1, 5)), turns=np.zeros((n, 8)), pins=np.zeros((n, 4)),
         )  # fmt: skip
         first = self.tables.linkages[0]
         state.pins[0, :2] = self.tables.joints[0].x + first.cx, self.tables.joints[0].y + first.cy
         return state
 
-    def work(self) -> Work:
-        """Scratch arrays of the right sizes."""
+    def work(self, depth: int = DEPTH) -> Work:
+        """Scratch arrays of the right sizes, for schemes of `depth`."""
         t, histories = self.tables, len(self.masses)
         points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
         beams, operations = len(t.beams), len(t.operations)
         return Work(
-            position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories),
-            s=np.zeros((6, 6)), p=np.zeros(6), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)), right=np.zeros((6, 6)),
-            gains=np.zeros((operations, max(6, shapes), 6)), free=np.zeros((operations, max(6, shapes))),
+            position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
+            s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
+            own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((6, 6)), right=np.zeros((6, SLOTS)),
+            gains=np.zeros((operations, max(6, shapes), SLOTS)), free=np.zeros((operations, max(6, shapes))),
             block=np.zeros((shapes, shapes)), blocks=np.zeros((len(t.joints), 6, 6)),
-            rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
-            turn=np.zeros((beams, points, 2)), local=np.zeros((points, 2)), dz=np.zeros(len(self.names)), cut=np.zeros(6),
+            rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)), angles=np.zeros(points),
+            turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
         )  # fmt: skip
 
 
@@ -238,8 +240,9 @@ class _Builder:
         turning = (section.rho_I or 0.0) * length * share
         elastic = self.scene.material.E
         part = len(self.beam_tables) + 1
-        z = self.layout.unknowns([f"q{k + 1}_part{part}" for k in range(n)] + [f"eps_part{part}"])
-        self.scale += [1.0] * n + [length]
+        axial = int(self.scene.has_axial(index))
+        z = self.layout.unknowns([f"q{k + 1}_part{part}" for k in range(n)] + [f"eps_part{part}"] * axial)
+        self.scale += [1.0] * n + [length] * axial
         history = self.layout.histories(
             [m for m in mass for _ in range(2)], [m * g for m in mass for g in self.gravity]
         )
@@ -249,10 +252,11 @@ class _Builder:
             "beams",
             z=z,
             bending=n,
-            axial=1,
+            axial=axial,
             points=points,
+            finite=points if self.scene.has_geometric(index) else 0,
             rotary=points if section.rho_I else 0,
-            damped=n + 1 if section.beta else 0,
+            damped=n + axial if section.beta else 0,
             history=history,
             beta=section.beta or 0.0,
             axial_stiffness=elastic * section.A * length,

@@ -51,7 +51,8 @@ class RigidPart(Part):
 class Section(Part):
     """One boom section, pivot to pivot; lengths in m from the inboard pivot.
 
-    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s).
+    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s). ``modes``,
+    ``axial`` and ``geometric`` take the boom's where the section does not name them.
     """
 
     length: Positive
@@ -62,6 +63,8 @@ class Section(Part):
     rho_I: NotNegative | None = None
     beta: NotNegative | None = None
     modes: Modes | None = None
+    axial: bool | None = None
+    geometric: bool | None = None
     root: RigidPart | None = None
     head: RigidPart | None = None
     rod_pin: Point | None = None
@@ -113,13 +116,19 @@ class Tip(Part):
 
 
 class Scene(Part):
-    """A whole boom with its base, its gravity (m/s^2) and its named postures (deg to the base's x axis)."""
+    """A whole boom with its base, its gravity (m/s^2) and its named postures (deg to the base's x axis).
+
+    ``modes``: bending coordinates per flexible part. ``axial``: whether flexible parts stretch. ``geometric``: whether they
+    turn finitely, which gives them the stiffness of axial loads; else bending is linear.
+    """
 
     description: str = ""
     gravity: Point
     material: Material
     base: Base
     modes: Modes = 3
+    axial: bool = True
+    geometric: bool = True
     sections: Annotated[tuple[Section, ...], Field(min_length=1)]
     joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
     tip: Tip | None = None
@@ -130,6 +139,16 @@ class Scene(Part):
         """Bending coordinates per flexible part of section `index` (0-based)."""
         own = self.sections[index].modes
         return self.modes if own is None else own
+
+    def has_axial(self, index: int) -> bool:
+        """Whether the flexible parts of section `index` (0-based) stretch."""
+        own = self.sections[index].axial
+        return self.axial if own is None else own
+
+    def has_geometric(self, index: int) -> bool:
+        """Whether the flexible parts of section `index` (0-based) have geometric stiffness."""
+        own = self.sections[index].geometric
+        return self.geometric if own is None else own
 
     def is_flexible(self, index: int) -> bool:
         """Whether section `index` (0-based) bends."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..physics.linkage import LINK_L, link_angles, turned
+from ..physics.linkage import LINK_L, link_angles
+from ..physics.rotation import turned
 from ..records import Array
 from ..scene.kinematics import linkage
 from ..scene.parts import Scene
@@ -62,7 +63,7 @@ class Skeleton:
 
 def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
     """`point` of a frame at `origin` turned by `heading` (rad), shape (2,)."""
-    return np.asarray(origin + np.array(turned(point[0], point[1], heading)))
+    return np.asarray(origin + np.array(turned(heading, point[0], point[1])))
 
 
 def skeleton(scene: Scene, angles: Array) -> Skeleton:
