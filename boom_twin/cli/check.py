@@ -111,7 +111,7 @@ def _section_words(section: SectionAccount) -> str:
     if not section.parts:
         return "rigid (no beam), all of it described by root"
     x0, x1 = section.parts[0][0], section.parts[-1][1]
-    coordinates = f"{section.bending} bending + 1 axial coordinates"
+    coordinates = f"{section.bending} bending + {section.axial} axial coordinates"
     words = f"flexible from {x0:g} to {x1:g} m"
     if section.splits:
         words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
@@ -148,7 +148,7 @@ def _unknowns(account: Account) -> list[str]:
         rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.kind == "A" else SIZE_B])
         if section.parts:
             parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
-            words = f"{parts} x ({section.bending} bending + 1 axial)"
+            words = f"{parts} x ({section.bending} bending + {section.axial} axial)"
             rows.append([f"section {section.number}", str(section.unknowns), words])
     rows.append(["total", str(account.unknowns), ""])
     width = max(len(row[1]) for row in rows)

@@ -12,7 +12,7 @@ from ..records import Array
 from ..scene.parts import Scene
 from .deviation import Course
 
-MASS_SHARE = 0.05  # of a coordinate of a mass, in unknowns; measured on the default boom (`boom_twin study parts`)
+SHARE = 0.05  # of a coordinate of a mass, or of a point that turns finitely, in unknowns; measured on the default boom
 
 
 def unknowns(scene: Scene) -> int:
@@ -23,7 +23,8 @@ def unknowns(scene: Scene) -> int:
 def size(scene: Scene) -> float:
     """Cost of a step, counted in unknowns: the same on every machine and at any load, so that choices can be made by it."""
     plan = compile_scene(scene)
-    return len(plan.names) + MASS_SHARE * (len(plan.masses) - len(plan.names))
+    masses, finite = len(plan.masses) - len(plan.names), int(plan.tables.beams.finite.sum())
+    return len(plan.names) + SHARE * (masses + finite)
 
 
 def step_times(scenes: Sequence[Scene], course: Course, rounds: int) -> Array:

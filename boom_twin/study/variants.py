@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from ..scene.parts import Scene, Section
+from ..scene.parts import Scene
 from .edits import Edit, edited
 
 MOST_MODES = 6  # bending coordinates per flexible part that are tried
@@ -33,11 +33,11 @@ def _rigid(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 
 def _axial(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _switched_off(scene, i, "axial")
+    return _section(i, "axial", False) if scene.is_flexible(i) and scene.has_axial(i) else ()
 
 
 def _geometric(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _switched_off(scene, i, "geometric")
+    return _section(i, "geometric", False) if scene.is_flexible(i) and scene.has_geometric(i) else ()
 
 
 def _rotary(scene: Scene, i: int) -> tuple[Edit, ...]:
@@ -71,13 +71,6 @@ def _rod(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 def _section(i: int, key: str, value: bool | int | None) -> tuple[Edit, ...]:
     return (Edit(("sections", i, key), value),)
-
-
-def _switched_off(scene: Scene, i: int, key: str) -> tuple[Edit, ...]:
-    if key not in Section.model_fields or not scene.is_flexible(i):
-        return ()
-    own = getattr(scene.sections[i], key)
-    return _section(i, key, False) if (getattr(scene, key) if own is None else own) else ()
 
 
 def _cylinder(scene: Scene, i: int, *keys: str) -> tuple[Edit, ...]:

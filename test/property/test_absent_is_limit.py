@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin.analysis.statics import statics
 from boom_twin.scene.parts import Scene
 from boom_twin.study.deviation import Answer, answer, course_of
 from boom_twin.study.variants import KINDS, without
@@ -66,6 +67,7 @@ EVERYWHERE = range(4)
 # kind: (keys that go to their limit, the block they are in, factors on the way there)
 WAYS = {
     "bending": (BEAM_KEYS, "sections", (1e1, 1e2, 1e3, 1e4)),
+    "axial coordinate": (("A",), "sections", (1e1, 1e2, 1e3, 1e4)),
     "cylinder compliance": (("cylinder.k",), "joints", (1e1, 1e2, 1e3, 1e4)),
     "rotary inertia": (("rho_I",), "sections", (1e-1, 1e-2, 1e-3)),
     "beam damping": (("beta",), "sections", (1e-1, 1e-2, 1e-3)),
@@ -89,6 +91,17 @@ def test_the_limit_is_the_part_left_out(name):
         assert np.all(rest < 1e-12)
     else:
         assert orders(rest, factors) == pytest.approx(sign, abs=0.01)
+
+
+def test_geometric_stiffness_goes_with_the_square_of_the_load():
+    """The sag goes with the load, what bending finitely adds to it with its square."""
+    factors = (0.2, 0.1, 0.05, 0.025)
+    off = []
+    for factor in factors:
+        scene = DEFAULT.model_copy(update={"gravity": (0.0, -9.81 * factor)})
+        tips = [statics(one, posture="arch", modes=0).tip for one in (scene, left_out(scene, "geometric stiffness", EVERYWHERE))]
+        off.append(np.linalg.norm(tips[0] - tips[1]))
+    assert orders(off, factors) == pytest.approx(2.0, abs=0.05)
 
 
 @pytest.mark.parametrize("section", [0, 2, 4])
