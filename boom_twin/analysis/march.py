@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..chain.newton import OK
-from ..chain.status import SENTENCES
-from ..chain.step import observe, rest, run
-from ..errors import UsageError
 from ..chain.plain import new_product
+from ..chain.status import OK, SENTENCES
+from ..chain.step import observe, run
+from ..errors import UsageError
 from ..physics import integrators
 from ..plan.compile import BasisName, compile_scene
 from ..records import Array
@@ -47,7 +46,7 @@ class Method:
     passes : int
         Most Newton passes in a step; 1 is the papers' single linearised pass.
     tolerance : float
-        rad, see `chain.newton`.
+        rad, see `chain.step.advance`.
     product : str
         "riccati" or "plain", the papers' product of transfer matrices.
     """
@@ -143,7 +142,6 @@ def march(
     start, work = plan.state(depth), plan.work(depth)
     product = new_product(plan.tables) if method.product == "plain" else None
     settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
-    rest(start, work)
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
     seconds = []
     for _ in range(repeats):

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from ..chain.newton import OK
-from ..chain.status import SENTENCES
-from ..chain.step import observe, rest, run
+from ..chain.status import OK, SENTENCES
+from ..chain.step import observe, run
 from ..errors import SolverError, UsageError
 from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import Plan, compile_scene
@@ -90,7 +89,6 @@ def simulate(
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-    rest(state, work)
     n = plan.joints
     rows = np.empty((len(times), 2 * n + 9))
     observe(plan.tables, state, rows[0])

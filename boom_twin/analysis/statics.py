@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..chain.newton import OK, newton
 from ..chain.program import State, Work
-from ..chain.step import motion_at_rest, observe
+from ..chain.status import OK
+from ..chain.step import advance, observe
 from ..errors import SolverError, UsageError
+from ..physics.integrators import REST, prepare
 from ..plan.compile import Plan, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
@@ -108,7 +109,7 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then in steps. Histories are left as they were.
+    The full load at once is tried first, then in steps. Histories are left without motion.
     """
     drive = plan.closed_lengths + strokes
     for loads in ((1.0,), LOAD_STEPS):
@@ -135,9 +136,9 @@ def is_stable(plan: Plan, state: State, work: Work) -> bool:
 
 def _solve(plan: Plan, state: State, work: Work, drive: Array, load: float) -> int:
     tables = plan.tables._replace(gravity=load * plan.tables.gravity)
-    motion = motion_at_rest(len(plan.masses))
     still = np.zeros(plan.joints)
-    status, _, _ = newton(tables, state, work, motion, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+    scheme = prepare(REST, 0.0, 0.0, work.weights)
+    status, _, _ = advance(tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return int(status)
 
 
