@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "play": ("play", "publish the inputs of a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
     "scene": ("scene", "print the default scene file"),
+    "urdf": ("urdf", "print a scene as a URDF, for robot_state_publisher"),
     "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),
     "simulate": ("simulate", "the boom's answer to a stroke history"),
     "replay": ("replay", "a recorded session through the twin"),
