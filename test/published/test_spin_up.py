@@ -1,8 +1,8 @@
 """A beam that is turned from rest to 6 rad/s within 15 s.
 
 J. C. Simo, L. Vu-Quoc: On the dynamics of flexible beams under large overall motions, the plane case, part II. J. Applied
-Mechanics 53, 1986. L. Vu-Quoc, J. C. Simo: The role of non-linear theories in transient dynamic analysis of flexible structures,
-J. Sound and Vibration 119, 1987. The tip lags by 0.574 m at most, and in the end stands out by 5.14e-4 m, which is
+Mechanics 53, 1986. L. Vu-Quoc, J. C. Simo: The role of non-linear theories in transient dynamic analysis of flexible
+structures, J. Sound and Vibration 119, 1987. The tip lags by 0.574 m at most, and in the end stands out by 5.14e-4 m, which is
 rho_A omega^2 L^3/(3 EA). Single moments, to 1e-4 m: 16 cable elements of Exudyn 1.13, steps of 2.5 ms. Shear, which they have
 (GA = 1e7 N) and the boom has not, makes 2e-5 m.
 
