@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .analysis.statics import outline, settle
-from .chain.newton import OK
-from .chain.status import SENTENCES
+from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
 from .errors import BoomTwinError
 from .estimate.follower import Tuning, follow, new_track

@@ -16,9 +16,9 @@ import numpy as np
 
 from ..chain.place import place
 from ..chain.program import Motion, State, Work
+from ..chain.status import OK
 from ..chain.step import observe
-from ..chain.newton import riccati_in, riccati_out
-from ..chain.sweep import SWEPT
+from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..plan.compile import Plan
 from ..records import Array
 
@@ -58,12 +58,20 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     place(plan.tables, state, work)
     motion = Motion(-omega * omega, 0.0, work.position.copy(), np.zeros_like(work.position))
     drive = _drive(plan, state, work)
-    status, negative = riccati_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
-    if status != SWEPT:
+    status, negative = _condense(plan, state, work, motion, drive)
+    if status != OK:
         return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
     blocks = work.blocks.copy()
     blocks[0, 2:, 2:] = np.eye(4)  # joint A, always the first, condenses two unknowns only
     return int(negative) + _negative_eigenvalues(blocks)
+
+
+def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int]:
+    """Sweep the whole boom in; status and negative pivots."""
+    clear_cut(work, FREE)
+    operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
+    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE)
+    return int(status), int(negative)
 
 
 def _drive(plan: Plan, state: State, work: Work) -> Array:
@@ -143,8 +151,8 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     drive, sides = _drive(plan, state, work), []
     for size in (LOAD, -LOAD):
         motion = Motion(-omega * omega, 0.0, position + size * load, still)
-        riccati_in(plan.tables, state, work, motion, drive, np.zeros(plan.joints))
-        riccati_out(plan.tables, state, work)
+        _condense(plan, state, work, motion, drive)
+        sweep_out(plan.tables, state, work, ROOT, np.int64(len(plan.tables.operations)), FREE)
         sides.append(work.dz.copy())
     return np.asarray(sides[0] - sides[1])
 

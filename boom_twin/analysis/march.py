@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..chain.newton import OK
-from ..chain.status import SENTENCES
-from ..chain.step import observe, rest, run
-from ..errors import UsageError
 from ..chain.plain import new_product
+from ..chain.status import OK, SENTENCES
+from ..chain.step import observe, run
+from ..errors import UsageError
 from ..physics import integrators
 from ..plan.compile import BasisName, compile_scene
 from ..records import Array
@@ -47,7 +46,7 @@ class Method:
     passes : int
         Most Newton passes in a step; 1 is the papers' single linearised pass.
     tolerance : float
-        rad, see `chain.newton`.
+        rad, see `chain.step.advance`.
     product : str
         "riccati" or "plain", the papers' product of transfer matrices.
     """
@@ -138,12 +137,11 @@ def march(
     plan = compile_scene(scene, basis)
     family = FAMILIES[method.integrator]
     depth = integrators.depth_of(family)
-    strokes, rates = drive(step * (np.arange(rows * every) + method.reach))
+    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
     first = drive(np.zeros(1))[0][0]
     start, work = plan.state(depth), plan.work(depth)
     product = new_product(plan.tables) if method.product == "plain" else None
     settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
-    rest(start, work)
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
     seconds = []
     for _ in range(repeats):
@@ -151,7 +149,7 @@ def march(
         out = np.full((rows + 1, 2 * plan.joints + 9), np.nan)
         observe(plan.tables, state, out[0])
         begun = time.perf_counter()
-        status, row, total = run(
+        status, row, total, _ = run(
             plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
             method.tolerance, np.int64(method.passes), product, out[1:],
         )  # fmt: skip
@@ -159,7 +157,7 @@ def march(
     n, done = plan.joints, max(int(row), 1) * every
     tip = out[:, 2 * n :].reshape(-1, 3, 3)
     return March(
-        times=step * every * np.arange(rows + 1),
+        times=np.asarray(step * every * np.arange(rows + 1), float),
         tip=tip[:, 0, :2],
         tip_acceleration=tip[:, 2, :2],
         joints=out[:, :n],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..chain.program import State
+from ..physics.integrators import X
 from ..physics.linkage import link_angles
 from ..plan.compile import Plan
 from ..records import Array
@@ -12,7 +13,7 @@ from ..scene.parts import Scene
 
 
 def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
-    """Write the undeformed boom at relative joint `angles` (rad), shape (n,), into `state.z`; all forces zero."""
+    """Write the undeformed boom at relative joint `angles` (rad), shape (n,), into the state; all forces zero."""
     state.z[:] = 0.0
     heading = 0.0
     for i, angle in enumerate(angles):
@@ -22,6 +23,7 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
             state.z[z + 1], state.z[z + 2] = heading + left, heading + right
         heading += angle
         state.z[z] = heading
+    state.history[X, : len(state.z)] = state.z
 
 
 def rigid_tip(scene: Scene, angles: Array) -> Array:

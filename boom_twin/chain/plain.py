@@ -20,12 +20,11 @@ from ..physics.algebra import solve
 from ..physics.jit import inner
 from ..records import Array
 from .program import JOINT_B, ROD_PIN, STATION, Tables
-from .sweep import FREE, SINGULAR, SWEPT, clear_cut, sweep_in, sweep_out
+from .status import DIGITS_LOST, OK, SINGULAR
+from .sweep import clear_cut, sweep_in, sweep_out
 
-DIGITS_LOST = 4
 LOST = 1e-6  # force left at the free tip over the largest in the boom, at which a pass counts as lost
 THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)
-AFTER_BASE = np.int64(1)  # the first operation behind joint A
 
 
 class Product(NamedTuple):
@@ -138,7 +137,7 @@ def close_root(work, product):
 
 @inner
 def plain_pass(t, state, work, motion, drive, drive_rate, product):
-    """Increments of all unknowns into `work.dz`; returns SWEPT, SINGULAR or DIGITS_LOST."""
+    """Increments of all unknowns into `work.dz`; returns OK, SINGULAR or DIGITS_LOST."""
     bounds, u, force, total, other, z = product.bounds, product.u, product.force, product.total, product.other, product.z
     units = force.shape[0]
     for i in range(6):
@@ -146,8 +145,8 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(units - 1, -1, -1):
         open_end(work, force[k])
-        status, _, m = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
-        if status != SWEPT:
+        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
+        if status != OK:
             return SINGULAR
         if k > 0:
             if not transfer_matrix(work.s, work.p, force[k], product.a, product.right, u[k]):
@@ -195,4 +194,4 @@ def multiply_out(t, state, work, product):
             force[k, i] = z[3 + i]
         sweep_out(t, state, work, bounds[k], bounds[k + 1], SIX)
     left = max(abs(z[3]), abs(z[4]), abs(z[5]))
-    return SWEPT if left <= LOST * largest else DIGITS_LOST
+    return OK if left <= LOST * largest else DIGITS_LOST

@@ -1,10 +1,8 @@
-"""What a kernel's status code means, in one sentence with its remedy."""
+"""Status codes of kernels, and what each means, in one sentence with its remedy."""
 
 from __future__ import annotations
 
-from .newton import NOT_CONVERGED, NOT_FINITE, OK
-from .plain import DIGITS_LOST
-from .sweep import SINGULAR
+OK, NOT_CONVERGED, SINGULAR, NOT_FINITE, DIGITS_LOST = range(5)
 
 SENTENCES = {
     OK: "ok",

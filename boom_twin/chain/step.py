@@ -2,14 +2,66 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from ..physics.integrators import A, V, X, finish_step, prepare, start_step
 from ..physics.jit import inner, kernel
-from .newton import OK, newton
+from .place import place
+from .plain import plain_pass
 from .program import JOINT_A, JOINT_B, Motion
+from .status import NOT_CONVERGED, NOT_FINITE, OK
+from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
+
+
+@kernel
+def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product):
+    """Step the boom to drive lengths (m) and rates (m/s), both shape (n,), at the instant that `scheme` solves for.
+
+    Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Kept in one function,
+    because every kernel that calls this one costs seconds of compiling.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        See `physics.integrators`; the scheme of rest gives static equilibrium next to the history's positions.
+    tolerance : float
+        Done once the largest increment (rad) is below it; convergence is quadratic, so the error left is about its square.
+    passes : int
+        At most so many; a single pass is the papers' linearised step and counts as converged.
+    longest : float
+        Increments are shortened so that none exceeds this (rad).
+    product : Product or None
+        None for the Riccati form; else room for the plain product of transfer matrices (see `chain.plain`).
+
+    Returns
+    -------
+    status, passes, last increment (rad)
+        On failure the histories stay as they were.
+    """
+    start_step(scheme, state.history, work.hat, work.offset)
+    predict(t, state, scheme.reach)
+    motion, operations, size = Motion(scheme.gain, scheme.rate, work.hat, work.offset), t.operations.shape[0], 0.0
+    place(t, state, work)
+    for k in range(passes):
+        if product is None:
+            clear_cut(work, FREE)
+            status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, ROOT, operations, FREE)
+            if status == OK:
+                sweep_out(t, state, work, ROOT, operations, FREE)
+        else:
+            status = plain_pass(t, state, work, motion, drive, drive_rate, product)
+        if status != OK:
+            return reason(work, status), k + 1, size
+        size = add_increments(t, state, work, longest)
+        if not math.isfinite(size):
+            return NOT_FINITE, k + 1, size
+        place(t, state, work)
+        if size < tolerance or passes == 1:
+            finish_step(scheme, work.position, work.hat, work.offset, state.history)
+            return OK, k + 1, size
+    return NOT_CONVERGED, passes, size
 
 
 @inner
@@ -21,30 +73,29 @@ def predict(t, state, reach):
             state.z[i] = x[i] + reach * (v[i] + 0.5 * reach * a[i])
 
 
-@kernel
-def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, product):
-    """Step the boom by `scheme` to drive lengths (m) and rates (m/s), both shape (n,), at the instant it solves for.
-
-    Returns status, passes, last increment (rad). On failure the histories stay as they were.
-    """
-    start_step(scheme, state.history, work.hat, work.offset)
-    predict(t, state, scheme.reach)
-    motion = Motion(scheme.gain, scheme.rate, work.hat, work.offset)
-    status, count, size = newton(t, state, work, motion, drive, drive_rate, tolerance, passes, LONGEST_INCREMENT, product)
-    if status == OK:
-        finish_step(scheme, work.position, work.hat, work.offset, state.history)
-    return status, count, size
+@inner
+def reason(work, status):
+    """NOT_FINITE in place of `status` if the force at the cut where a sweep stopped is not finite."""
+    for i in range(3):
+        if not math.isfinite(work.p[i]):
+            return NOT_FINITE
+    return status
 
 
-@kernel
-def rest(state, work):
-    """Let the boom be at rest where it is: histories hold the present positions, no velocity, no acceleration."""
-    for k in range(state.history.shape[0]):
-        for i in range(state.history.shape[1]):
-            state.history[k, i] = 0.0
-    for k in range(0, state.history.shape[0] - 2, 2):  # x now, and x of earlier steps where they are kept
-        for i in range(state.history.shape[1]):
-            state.history[k, i] = work.position[i]
+@inner
+def add_increments(t, state, work, longest):
+    """Add increments to the unknowns; returns the largest as an angle (rad), NaN if any of them is not finite."""
+    z, dz, size = state.z, work.dz, 0.0
+    for i in range(z.shape[0]):
+        if not math.isfinite(dz[i]):
+            return math.nan
+        size = max(size, t.scale[i] * abs(dz[i]))
+    share = 1.0
+    if size > longest:
+        share = longest / size
+    for i in range(z.shape[0]):
+        z[i] += share * dz[i]
+    return size
 
 
 @kernel
@@ -78,7 +129,7 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     family, parameter : int, float
         See `physics.integrators.prepare`.
     product : Product or None
-        See `newton`.
+        See `advance`.
     out : ndarray, shape (rows, 2 n + 9)
         See `observe`.
 
@@ -86,20 +137,21 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     -------
     status, row, passes : int
         Status of the last step and the row it belongs to; total of Newton passes.
+    jolt : float
+        Sum over all steps of h^2 |a' - a| of the tip, m: what the error of a step is measured by, see `Simulation`.
     """
-    at, total = 0, 0
+    at, total, jolt, a = 0, 0, 0.0, state.history[A]
     for row in range(steps.shape[0]):
         scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
-            status, count, _ = advance(t, state, work, scheme, drives[at], rates[at], tolerance, passes, product)
+            ax, ay = a[t.tip], a[t.tip + 1]
+            status, count, _ = advance(
+                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product
+            )
             total += count
             at += 1
             if status != OK:
-                return status, row, total
+                return status, row, total, jolt
+            jolt += steps[row] * steps[row] * math.hypot(a[t.tip] - ax, a[t.tip + 1] - ay)
         observe(t, state, out[row])
-    return OK, steps.shape[0], total
-
-
-def motion_at_rest(size: int) -> Motion:
-    """No inertia, no damping: the equations are statics. Work arrays of `size` histories."""
-    return Motion(0.0, 0.0, np.zeros(size), np.zeros(size))
+    return OK, steps.shape[0], total, jolt

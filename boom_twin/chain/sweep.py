@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..physics.beam import transfer_beam
+from ..physics.beam import USUAL, Sizes, is_usual, transfer_beam
 from ..physics.jit import inner, kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from .status import OK, SINGULAR
 from .substructure_a import close_base, join_rod
 from .substructure_b import close_loop
 
-SWEPT, SINGULAR = 0, 2
-FREE = np.int64(3)  # slots of a cut with nothing carried: x, y, theta; typed, because numba compiles once more for literals
+# The first operation; slots of a cut with nothing carried: x, y, theta. Typed, because numba compiles once more for literals.
+ROOT, FREE = np.int64(0), np.int64(3)
 
 
 @inner
@@ -32,8 +33,15 @@ def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
     tables = (t.psi[row], t.weights[row], t.stiffness[row], t.point_mass[row], t.point_rotary[row])
     scratch = (work.rho[row], work.drho[row], work.turn[row], work.local, work.block)
+    beam = t.beams[row]
+    if is_usual(beam):
+        return transfer_beam(
+            beam, USUAL, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
+            work.gains[operation], work.free[operation],
+        )  # fmt: skip
+    sizes = Sizes(beam.bending, beam.axial, beam.points)
     return transfer_beam(
-        t.beams[row], tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
+        beam, sizes, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
         work.gains[operation], work.free[operation],
     )  # fmt: skip
 
@@ -54,7 +62,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
     Returns
     -------
     status, negative, m : int
-        SWEPT or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`); slots of the cut now.
+        OK or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`); slots of the cut now.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
@@ -80,7 +88,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
             m += 2
         elif kind == JOINT_A and not close_base(work, k):
             return SINGULAR, negative, m
-    return SWEPT, negative, m
+    return OK, negative, m
 
 
 @kernel

@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..chain.newton import OK, newton
-from ..chain.program import Motion
-from ..chain.step import advance, observe, rest
-from ..physics.integrators import GENERALISED_ALPHA, prepare
+from ..chain.status import OK
+from ..chain.step import LONGEST_INCREMENT, advance, observe
+from ..physics.integrators import GENERALISED_ALPHA, REST, prepare
 from ..physics.jit import inner, kernel
 from ..physics.linkage import angle_of_length
 from ..plan.compile import Plan
@@ -28,7 +27,7 @@ TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left i
 LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
-REST_PASSES = np.int64(60)
+REST_PASSES, REST_INCREMENT = np.int64(60), 0.1
 WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
 
 
@@ -48,7 +47,7 @@ class Track(NamedTuple):
 
     nodes : (1,) number of nodes in the window. moved : (1,) whether the anchor has left its first equilibrium.
     times : (NODES,) s. x, c : nodes of the smoother. anchor : (n, 3) drive where the anchor stands.
-    angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch. zeros : (histories,)
+    angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch.
     """
 
     nodes: np.ndarray
@@ -60,7 +59,6 @@ class Track(NamedTuple):
     angles: Array
     drive: Array
     rate: Array
-    zeros: Array
     closed: Array
     lengths: Array
 
@@ -71,7 +69,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     return Track(
         nodes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES), x=np.zeros((NODES, n, 3)),
         c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n), drive=np.zeros(n), rate=np.zeros(n),
-        zeros=np.zeros(len(plan.masses)), closed=plan.closed_lengths, lengths=lengths,
+        closed=plan.closed_lengths, lengths=lengths,
     )  # fmt: skip
 
 
@@ -84,18 +82,77 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     out : ndarray, shape (4 n + 11,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
     variances, tip of the rigid boom (2).
 
-    Returns a status of `chain.newton`.
+    Returns a status of `chain.status`.
     """
     add_sample(track, tuning, time, y)
-    status = move_anchor(t, anchor, work, track, tuning)
-    if status != OK:
-        return status
-    copy_state(anchor, live)
-    status = look_ahead(t, live, work, track, tuning)
-    if status != OK:
-        return status
-    report(t, live, track, out)
-    return OK
+    ahead, old = False, track.nodes[0] - 1
+    boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
+    while True:
+        if not ahead and not left_behind(track, tuning, old):
+            track.nodes[0] = old + 1
+            if track.moved[0] == 0:
+                hold(track, track.x[old])
+                scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
+                status, _, _ = advance(
+                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None
+                )
+                if status != OK:
+                    return status
+            copy_state(anchor, live)
+            ahead, boom, longest, tolerance = True, live, tuning.look_step, LOOK_TOLERANCE
+        if old == 0:
+            report(t, live, track, out)
+            return OK
+        new = old - 1
+        if ahead:
+            new = next_node(track, old, longest)
+        span = track.times[new] - track.times[old]
+        steps = max(1, math.ceil(span / longest - 1e-6))
+        scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
+        for k in range(steps):
+            drive_to(track, start, track.x[new], span, (k + 1) / steps)
+            status, _, _ = advance(
+                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None
+            )
+            if status != OK:
+                return status
+        if not ahead:
+            copy_node(track.x[new], track.anchor)
+            track.moved[0] = 1
+        else:
+            start = track.x[new]
+        old = new
+
+
+@inner
+def left_behind(track, tuning, old):
+    """Whether the anchor, at the oldest node, has to go on: the node before it is older than the lag, or room runs out."""
+    return old > 1 and (track.times[0] - track.times[old - 1] >= tuning.lag or old == NODES - 1)
+
+
+@inner
+def next_node(track, old, longest):
+    """The youngest node within one long step ahead of `old`, at least the next one."""
+    new = old - 1
+    while new > 0 and track.times[new - 1] - track.times[old] <= longest:
+        new -= 1
+    return new
+
+
+@inner
+def hold(track, node):
+    """Take a node (n, 3) as rest: the anchor's drive, without rates."""
+    for i in range(track.drive.shape[0]):
+        track.anchor[i, 0], track.anchor[i, 1], track.anchor[i, 2] = node[i, 0], 0.0, 0.0
+        track.drive[i], track.rate[i] = track.closed[i] + node[i, 0], 0.0
+
+
+@inner
+def drive_to(track, old, new, span, share):
+    """Drive on the quintic between two nodes (n, 3), `span` s apart; share in [0, 1]."""
+    for i in range(track.drive.shape[0]):
+        position, velocity = drive_between(old[i], new[i], span, share)
+        track.drive[i], track.rate[i] = track.closed[i] + position, velocity
 
 
 @inner
@@ -122,69 +179,6 @@ def report(t, live, track, out):
     for i in range(n):
         out[at + i], out[at + n + i] = track.x[0, i, 0], track.c[0, i, 0, 0]
     out[at + 2 * n], out[at + 2 * n + 1] = rigid_tip(t, track)
-
-
-@inner
-def move_anchor(t, anchor, work, track, tuning):
-    """Step the anchor to the youngest node that is older than the lag, and drop the nodes behind it."""
-    count = track.nodes
-    while count[0] > 2 and (track.times[0] - track.times[count[0] - 2] >= tuning.lag or count[0] == NODES):
-        old, new = count[0] - 1, count[0] - 2
-        span = track.times[new] - track.times[old]
-        status = glide(t, anchor, work, track, tuning, track.anchor, track.x[new], span, tuning.step, TOLERANCE)
-        if status != OK:
-            return status
-        copy_node(track.x[new], track.anchor)
-        track.moved[0] = 1
-        count[0] -= 1
-    if track.moved[0] == 0:
-        return settle_anchor(t, anchor, work, track)
-    return OK
-
-
-@inner
-def settle_anchor(t, anchor, work, track):
-    """Equilibrium at the strokes of the oldest node, until the anchor moves."""
-    copy_node(track.x[track.nodes[0] - 1], track.anchor)
-    for i in range(track.drive.shape[0]):
-        track.anchor[i, 1], track.anchor[i, 2] = 0.0, 0.0
-        track.drive[i], track.rate[i] = track.closed[i] + track.anchor[i, 0], 0.0
-    still = Motion(0.0, 0.0, track.zeros, track.zeros)
-    status, _, _ = newton(t, anchor, work, still, track.drive, track.rate, TOLERANCE, REST_PASSES, 0.1, None)
-    rest(anchor, work)
-    return status
-
-
-@kernel
-def glide(t, state, work, track, tuning, old, new, span, longest, tolerance):
-    """Follow the quintic between two nodes (n, 3), `span` s apart, in steps of at most `longest` s."""
-    steps = max(1, math.ceil(span / longest - 1e-6))
-    scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
-    for k in range(steps):
-        for i in range(track.drive.shape[0]):
-            position, velocity = drive_between(old[i], new[i], span, (k + 1) / steps)
-            track.drive[i], track.rate[i] = track.closed[i] + position, velocity
-        status, _, _ = advance(t, state, work, scheme, track.drive, track.rate, tolerance, PASSES, None)
-        if status != OK:
-            return status
-    return OK
-
-
-@inner
-def look_ahead(t, live, work, track, tuning):
-    """Run the copy from the anchor's node to the newest one, skipping nodes as long as steps stay below `look_step`."""
-    old = track.nodes[0] - 1
-    while old > 0:
-        new = old - 1
-        while new > 0 and track.times[new - 1] - track.times[old] <= tuning.look_step:
-            new -= 1
-        span = track.times[new] - track.times[old]
-        start = track.anchor if old == track.nodes[0] - 1 else track.x[old]
-        status = glide(t, live, work, track, tuning, start, track.x[new], span, tuning.look_step, LOOK_TOLERANCE)
-        if status != OK:
-            return status
-        old = new
-    return OK
 
 
 @inner

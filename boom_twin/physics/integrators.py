@@ -17,7 +17,8 @@ Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of 
 rho is the spectral radius at infinite frequency: 1 keeps every frequency, 0 kills the highest within one step. Positions of
 constrained points are integrated directly (index 3), which needs rho < 1. Newmark is am = af = 0, beta = (gamma + 1/2)^2/4.
 Wilson-theta takes the acceleration as linear up to t + theta h, solves there, and falls back to t + h. Houbolt: cubic through
-four positions; Park 1975: mean of the two- and three-step backward differences, for x and again for v.
+four positions; Park 1975: mean of the two- and three-step backward differences, for x and again for v. The scheme of rest has
+A = C = 0, which is statics, and leaves a history without motion.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ import numpy as np
 from ..records import Array
 from .jit import inner
 
-GENERALISED_ALPHA, NEWMARK, WILSON, HOUBOLT, PARK = range(5)
+GENERALISED_ALPHA, NEWMARK, WILSON, HOUBOLT, PARK, REST = range(6)
 X, V, P, A = -4, -3, -2, -1  # rows of a history, from its end
 NEW_X, NEW_V, NEW_A, OLD = 0, 1, 2, 3  # columns of weights: new x', v', a', then the old history
 HAT, OFFSET, ROWS = 0, 1, 2  # rows of weights: x_hat, D, then the new history
@@ -66,6 +67,10 @@ def prepare(family, parameter, step, weights):
     for k in range(weights.shape[0]):
         for j in range(weights.shape[1]):
             weights[k, j] = 0.0
+    if family == REST:
+        for k in range(ROWS, weights.shape[0] - 3, 2):
+            weights[k, NEW_X] = 1.0
+        return Scheme(0.0, 0.0, 0.0, weights)
     weights[X, NEW_X], weights[V, NEW_V], weights[A, NEW_A] = 1.0, 1.0, 1.0
     if family == GENERALISED_ALPHA:
         am, af = (2.0 * parameter - 1.0) / (parameter + 1.0), parameter / (parameter + 1.0)

@@ -10,15 +10,17 @@ costs no reference counting, which was nearly half of a step.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FOLDERS = ("physics", "chain", "estimate")
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+COMPILING = "compiling the model, about half a minute; done once for this version and kept in %s"
 
 
 def _source_hash() -> str:
@@ -39,18 +41,40 @@ def cache_folder() -> Path:
     return home / "boom_twin" / _source_hash()
 
 
+@cache
 def _numba() -> Any:
-    """numba, its cache pointed at our folder."""
-    folder = str(cache_folder())
-    os.environ["NUMBA_CACHE_DIR"] = folder
+    """numba, its cache pointed at our folder; says so if that is empty."""
+    folder = cache_folder()
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
     import numba
 
-    numba.config.CACHE_DIR = folder
+    numba.config.CACHE_DIR = str(folder)
+    if not numba.config.DISABLE_JIT and not any(folder.glob("**/*.nbi")):
+        logging.getLogger("boom_twin").warning(COMPILING, folder)
     return numba
+
+
+def _cache(function: Callable[..., Any]) -> Any:
+    """A cache on disk that loads compiled code without first filling numba's tables of types and of BLAS.
+
+    Filling them takes 0.25 s, most of it an import of scipy.linalg, and only compiling needs them: it fills them itself.
+    """
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime import rtsys
+
+    class Quick(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)  # the symbols that loaded code refers to
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+
+    return Quick(function)
 
 
 class Kernel:
     """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""
+
+    _cached = True
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)
@@ -59,7 +83,10 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """numba's object, made on first use."""
-        return _numba().njit(**OPTIONS, **self._options)(self.py_func)
+        dispatcher = _numba().njit(**OPTIONS, **self._options)(self.py_func)
+        if self._cached and hasattr(dispatcher, "enable_caching"):  # not where numba is told not to compile
+            dispatcher._cache = _cache(self.py_func)
+        return dispatcher
 
     @property
     def _numba_type_(self) -> Any:
@@ -72,6 +99,8 @@ class Kernel:
 
 class Inner(Kernel):
     """A kernel that exists compiled only inside others; called from Python it runs as Python."""
+
+    _cached = False
 
     def __call__(self, *arguments: Any) -> Any:
         return self.py_func(*arguments)

@@ -23,6 +23,9 @@ from .layout import Layout
 
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
+# Gauss points beyond the number of shapes: polynomials, or functions that grow exponentially. The error of the quadrature
+# then stays below that of leaving out further shapes.
+MORE_POINTS = {"end-shapes": 1, "cantilever": 3}
 LOOP = 14  # most rows of the system of a six-bar
 
 
@@ -104,7 +107,7 @@ class _Builder:
     """Walks a scene from the base to the tip."""
 
     def __init__(self, scene: Scene, basis: BasisName) -> None:
-        self.scene, self.basis, self.layout = scene, BASES[basis], Layout()
+        self.scene, self.basis, self.more_points, self.layout = scene, BASES[basis], MORE_POINTS[basis], Layout()
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
         self.outline: list[tuple[int, int]] = []
         self.scale: list[float] = []
@@ -126,7 +129,7 @@ class _Builder:
         z = self.layout.unknowns([f"{name}_{n}" for name in names])
         first_link = len(self.layout.rows["links"])
         for side, length, mass in ((LINK_L, joint.lL, joint.mL), (LINK_R, joint.lR, joint.mR)):
-            if mass is not None and length is not None:
+            if mass and length is not None:
                 inertia = mass * length**2 / 12
                 history = self._point(mass, inertia)
                 self.layout.add("links", side=side, history=history, middle=length / 2, mass=mass, inertia=inertia)
@@ -139,7 +142,7 @@ class _Builder:
     def _cylinder(self, part: Cylinder, z: int) -> None:
         first_part = len(self.layout.rows["parts"])
         for end, own in ((cylinder.BARREL, part.barrel), (cylinder.ROD, part.rod)):
-            if own is not None:
+            if own is not None and (own.mass or own.inertia):
                 history = self._point(own.mass, own.inertia)
                 self.layout.add("parts", end=end, history=history, com=own.com, mass=own.mass, inertia=own.inertia)
         self.layout.add(
@@ -233,7 +236,7 @@ class _Builder:
         """A flexible part of section `index`."""
         section, n = self.scene.sections[index], self.scene.modes_of(index)
         assert section.A is not None and section.I is not None and section.rho_A is not None
-        points = n + 2
+        points = max(3, n + self.more_points)
         basis = self.basis(n, points)
         _, share = modes.gauss_points(points)
         mass = (section.rho_A + (self.scene.line_fill or 0.0)) * length * share

@@ -1,0 +1,67 @@
+"""Tables and files of a report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .machine import machine
+
+__all__ = ["machine", "provenance", "table", "write_json"]
+
+SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig."
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; floats with 3 significant digits, None and NaN as a dash. Ends with a newline."""
+    lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def provenance(**more: object) -> str:
+    """One paragraph: when, where and with which versions; `more` follows, then that the parameters are surrogates."""
+    told = {**machine(), **more}
+    return ", ".join(f"{name} {value}" for name, value in told.items() if value is not None) + f". {SYNTHETIC}\n"
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write a mapping or list as JSON, one line per innermost block; numbers that are not finite become null."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(_lines(_plain(content), "") + "\n", encoding="utf-8")
+
+
+def _text(value: object) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return (f"{value:.3g}" if isinstance(value, float) else str(value)).replace("|", "\\|")
+
+
+def _plain(value: Any) -> Any:
+    """Only dict, list, str, int, finite float, bool and None."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = dataclasses.asdict(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _lines(value: Any, indent: str) -> str:
+    """JSON text; a dict or list that holds no other on one line."""
+    inner = list(value.values() if isinstance(value, dict) else value) if isinstance(value, dict | list) else []
+    if not any(isinstance(item, dict | list) for item in inner):
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    deeper = indent + " "
+    if isinstance(value, dict):
+        parts = [f"{deeper}{json.dumps(key)}: {_lines(item, deeper)}" for key, item in value.items()]
+        return "{\n" + ",\n".join(parts) + f"\n{indent}}}"
+    return "[\n" + ",\n".join(deeper + _lines(item, deeper) for item in value) + f"\n{indent}]"

@@ -1,0 +1,62 @@
+"""Motions of several scenes: smooth, inside the ranges, with a rule that anyone can follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import booms
+from oracle.conftest import random_scene
+
+from boom_twin.errors import UsageError
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.study.motion import TURN, motion_of
+
+
+def test_default_boom_moves_as_in_the_documentation():
+    scene = load_scene()
+    motion = motion_of(scene)
+    strokes, rates = motion(np.array([0.0, 0.75, 1.5, 4.0]))
+    assert motion.duration == 4.0 and "arch" in motion.label
+    assert strokes[0] == pytest.approx(strokes_of_posture(scene, "arch"), abs=1e-12)
+    assert strokes[1] - strokes[0] == pytest.approx([0.025, 0.0, 0.015, 0.0])
+    assert strokes[3] - strokes[0] == pytest.approx([0.05, 0.0, 0.03, 0.0])
+    assert not rates[[0, 2, 3]].any()
+
+
+def test_changed_modes_change_no_motion():
+    scene = load_scene()
+    assert np.array_equal(motion_of(scene.model_copy(update={"modes": 6})).travel, motion_of(scene).travel)
+
+
+SCENES = [*(booms.random_boom(seed) for seed in range(10)), *(random_scene(seed) for seed in range(10))]
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=[f"booms{i}" for i in range(10)] + [f"scene{i}" for i in range(10)])
+def test_motion_stays_inside(scene):
+    motion = motion_of(scene)
+    moved = np.flatnonzero(motion.travel)
+    assert len(moved) and not np.any(moved % 2)
+    strokes, _ = motion(np.linspace(0.0, motion.duration, 50))
+    for i, joint in enumerate(scene.joints):
+        assert strokes[0, i] == motion.first[i]
+        assert strokes[:, i].min() >= -1e-9 and strokes[:, i].max() <= joint.cylinder.max_stroke + 1e-9
+    turned = joint_angles_of_strokes(scene, strokes[-1], near=motion.angles) - motion.angles
+    assert np.all(np.abs(turned[motion.travel == 0.0]) < 1e-7)
+    halvings = np.log2(TURN / np.abs(turned[moved]))
+    assert halvings == pytest.approx(np.round(halvings), abs=1e-4) and np.all(halvings < 3.5)
+
+
+def test_derivatives_are_derivatives():
+    motion, times, h = motion_of(load_scene()), np.linspace(0.01, 2.0, 37), 1e-5
+    (ahead, rate_ahead), (behind, rate_behind) = motion(times + h), motion(times - h)
+    assert (ahead - behind) / (2 * h) == pytest.approx(motion(times)[1], abs=1e-8)
+    one = [motion.at(time) for time in times]
+    assert np.array([row[0] for row in one]) == pytest.approx(motion(times)[0], abs=1e-15)
+    assert np.array([row[1] for row in one]) == pytest.approx(motion(times)[1], abs=1e-15)
+    assert (rate_ahead - rate_behind) / (2 * h) == pytest.approx(np.array([row[2] for row in one]), abs=1e-5)
+
+
+def test_posture_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match="posture = 'nowhere'"):
+        motion_of(load_scene(), "nowhere")
