@@ -99,7 +99,7 @@ def _why(row: Row) -> str:
 
 def feeding_share(rows: Sequence[Row]) -> float | None:
     """Largest share of Exudyn's run time that its drives' Python function takes."""
-    return max((row.feeding / row.seconds for row in of(rows, Peer) if row.good and row.feeding), default=None)
+    return max((row.feeding for row in of(rows, Peer) if row.good and row.feeding), default=None)
 
 
 def _or_none(row: Row | None) -> str:
