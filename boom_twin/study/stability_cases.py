@@ -55,12 +55,12 @@ class Case:
     quick: bool = False
 
 
-def cases(scene: Scene, soak: bool = False) -> tuple[Case, ...]:
-    """All cases of a scene; those that need a geometry of their own take the default boom. `soak` adds the holds of a day."""
+def cases(scene: Scene) -> tuple[Case, ...]:
+    """All cases of a scene but the holds of a day; those that need a geometry of their own take the default boom."""
     found = (
         Case("scene", "as it is", "nothing", partial(smooth, scene), quick=True),
         *_stiffness(scene), *_masses(scene), *_steps(scene), *_sections(), *_geometry(scene),
-        *_dead_centres(), *_stops(scene), *_holds(scene), *_payload_and_modes(scene), *(_soak(scene) if soak else ()),
+        *_dead_centres(), *_stops(scene), *_holds(scene), *_payload_and_modes(scene),
     )  # fmt: skip
     return tuple(found)
 
@@ -167,13 +167,13 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
         yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODES[-1])
 
 
-def _soak(scene: Scene) -> Iterator[Case]:
-    for name, boom, truth in _DAYS:
-        make = partial(smooth, boom(scene), None, 1.0, 1.5, DAY, STEP, 50)
-        yield Case("hold", name, "dt 20 ms, after the move", make, truth)
-
-
-_DAYS: tuple[tuple[str, Callable[[Scene], Scene], Truth], ...] = (
-    ("24 h", lambda scene: scene, "equilibrium"),
-    ("24 h, undamped", made.undamped, "swing"),
-)
+def days(scene: Scene) -> tuple[Case, ...]:
+    """Holds of 24 simulated hours."""
+    booms: tuple[tuple[str, Scene, Truth], ...] = (
+        ("24 h", scene, "equilibrium"),
+        ("24 h, undamped", made.undamped(scene), "swing"),
+    )
+    return tuple(
+        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, STEP, 50), truth)
+        for name, boom, truth in booms
+    )
