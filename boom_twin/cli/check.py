@@ -11,27 +11,38 @@ from ..scene import Scene
 from ..scene.explain import Account, JointAccount, SectionAccount, explain
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.splits import LEAST
-from .common import add_json, add_scene, print_json
+from . import need
+from .common import add_json, add_scene, open_scene, print_json
 
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Scene and ``--json``."""
+    """Scene, ``--json``, what a search for the leanest model takes."""
     add_scene(parser)
     add_json(parser)
+    need.add_arguments(parser)
 
 
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
+    need.refuse_alone(args)
     scene, oddities = examine(args.scene)
     account = explain(scene)
     name = args.scene or DEFAULT_NAME
+    values, lines = summary(name, account, oddities), report(name, scene, account, oddities)
+    if args.need is not None:
+        found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
+        values |= need.summary(found, args.need)
+        lines += need.report(scene, found, args.need)
+        if args.out is not None:
+            need.write(args.scene, scene, found, args.need, args.out)
+            lines.append(f"Written: {args.out}")
     if args.json:
-        print_json(summary(name, account, oddities))
+        print_json(values)
     else:
-        print("\n".join(report(name, scene, account, oddities)))
+        print("\n".join(lines))
     return 0
 
 
@@ -100,7 +111,7 @@ def _section_words(section: SectionAccount) -> str:
     if not section.parts:
         return "rigid (no beam), all of it described by root"
     x0, x1 = section.parts[0][0], section.parts[-1][1]
-    coordinates = f"{section.bending} bending + 1 axial coordinates"
+    coordinates = f"{section.bending} bending + {section.axial} axial coordinates"
     words = f"flexible from {x0:g} to {x1:g} m"
     if section.splits:
         words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
@@ -137,7 +148,7 @@ def _unknowns(account: Account) -> list[str]:
         rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.kind == "A" else SIZE_B])
         if section.parts:
             parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
-            words = f"{parts} x ({section.bending} bending + 1 axial)"
+            words = f"{parts} x ({section.bending} bending + {section.axial} axial)"
             rows.append([f"section {section.number}", str(section.unknowns), words])
     rows.append(["total", str(account.unknowns), ""])
     width = max(len(row[1]) for row in rows)

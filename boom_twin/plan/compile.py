@@ -126,7 +126,7 @@ class _Builder:
         z = self.layout.unknowns([f"{name}_{n}" for name in names])
         first_link = len(self.layout.rows["links"])
         for side, length, mass in ((LINK_L, joint.lL, joint.mL), (LINK_R, joint.lR, joint.mR)):
-            if mass is not None and length is not None:
+            if mass and length is not None:
                 inertia = mass * length**2 / 12
                 history = self._point(mass, inertia)
                 self.layout.add("links", side=side, history=history, middle=length / 2, mass=mass, inertia=inertia)
@@ -139,7 +139,7 @@ class _Builder:
     def _cylinder(self, part: Cylinder, z: int) -> None:
         first_part = len(self.layout.rows["parts"])
         for end, own in ((cylinder.BARREL, part.barrel), (cylinder.ROD, part.rod)):
-            if own is not None:
+            if own is not None and (own.mass or own.inertia):
                 history = self._point(own.mass, own.inertia)
                 self.layout.add("parts", end=end, history=history, com=own.com, mass=own.mass, inertia=own.inertia)
         self.layout.add(

@@ -11,7 +11,7 @@ from .glossary import MEANING
 from .parts import Joint, Point, Section
 
 BEAM_NEEDS = ("A", "I", "rho_A")
-BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "head")
+BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
 LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "R", "mL", "mR")
 

@@ -20,6 +20,8 @@ class Draft:
     material: Material | None = None
     base: Base | None = None
     modes: Modes = 3
+    axial: bool = True
+    geometric: bool = True
     sections: tuple[Section | None, ...] = ()
     joints: tuple[Joint | None, ...] = ()
     tip: Tip | None = None

@@ -18,8 +18,8 @@ UNKNOWNS_A, UNKNOWNS_B = 2, 6
 class SectionAccount:
     """Section `number` (from 1). Lengths in m, masses in kg.
 
-    ``parts`` are the ends of its flexible parts, ``bending`` the bending coordinates of each, ``unknowns`` those of all
-    its parts together (each has one axial coordinate besides). ``beam_mass`` counts without the line fill.
+    ``parts`` are the ends of its flexible parts, ``bending`` and ``axial`` the bending and axial coordinates of each,
+    ``unknowns`` those of all its parts together. ``beam_mass`` counts without the line fill.
     """
 
     number: int
@@ -28,6 +28,7 @@ class SectionAccount:
     parts: tuple[tuple[float, float], ...]
     splits: tuple[Split, ...]
     bending: int
+    axial: int
     beam_mass: float
     root_mass: float
     head_mass: float
@@ -109,6 +110,7 @@ def _section(scene: Scene, i: int) -> SectionAccount:
     section = scene.sections[i]
     parts = flexible_parts(scene, i)
     bending = scene.modes_of(i) if parts else 0
+    axial = int(bool(parts) and scene.has_axial(i))
     beam = section.beam or (0.0, 0.0)
     return SectionAccount(
         number=i + 1,
@@ -117,11 +119,12 @@ def _section(scene: Scene, i: int) -> SectionAccount:
         parts=parts,
         splits=splits(scene, i),
         bending=bending,
+        axial=axial,
         beam_mass=(section.rho_A or 0.0) * (beam[1] - beam[0]),
         root_mass=section.root.mass if section.root is not None else 0.0,
         head_mass=section.head.mass if section.head is not None else 0.0,
         fill_mass=(scene.line_fill or 0.0) * section.length,
-        unknowns=len(parts) * (bending + 1),
+        unknowns=len(parts) * (bending + axial),
     )
 
 

@@ -37,6 +37,8 @@ def _absent_in_section(scene: Scene, i: int) -> dict[str, str]:
     else:
         absent = {} if section.beta else {"beta": "no damping of the beam"}
         absent |= {} if section.rho_I else {"rho_I": "no rotary inertia of the beam"}
+        absent |= {} if scene.has_axial(i) else {"axial": "false, so the beam does not stretch"}
+        absent |= {} if scene.has_geometric(i) else {"geometric": "false, so bending is linear, without geometric stiffness"}
     for key, end in (("root", "inboard"), ("head", "outboard")):
         if getattr(section, key) is None:
             absent[key] = f"the rigid {end} part has no mass"

@@ -21,6 +21,7 @@ BOUNDS = {
     "literal_error": "it must be {expected}",
     "string_type": "text is needed, not {what}",
     "tuple_type": "a list is needed, not {what}",
+    "bool_type": "true or false is needed, not {what}",
     "dict_type": "a block of keys is needed, not {what}",
     "model_type": "a block of keys is needed, not {what}",
 }

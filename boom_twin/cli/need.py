@@ -1,0 +1,151 @@
+"""`boom_twin check --need tip=1mm`: the leanest model that keeps the tip, in words, as a flat object and as a scene file."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UsageError
+from ..scene import Scene
+from ..scene.load import default_text
+from ..scene.read import read_text
+
+if TYPE_CHECKING:  # at run time only when --need is given: they import the compiler
+    from ..study.edits import Edit
+    from ..study.need import Proposal
+
+UNITS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}  # in m
+FORM = "give the error that the tip may have, like tip=1mm, tip=0.5cm or tip=0.001 (m)"
+NEED = re.compile(r"\s*(?P<what>\w*)\s*=\s*(?P<number>[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>[^\W\d]*)\s*")
+ANOTHER = "Another motion may differ: an error holds for the motion on which it was measured."
+FREE = "Damping and the compliance of cylinders cost no time, so they stay."
+MEANING = {
+    "axial": "no axial coordinate",
+    "geometric": "no geometric stiffness",
+    "rho_I": "no rotary inertia of the beam",
+    "mL": "massless link L",
+    "mR": "massless link R",
+    "barrel": "massless barrel",
+    "rod": "massless rod",
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """``--need``, and the options that go with it."""
+    purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
+    parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
+    parser.add_argument("--out", type=Path, metavar="LEAN", help="with --need: write the lean scene file here")
+    purpose = "with --need: measure against this scene of the same boom, not against SCENE itself"
+    parser.add_argument("--against", metavar="FULL", help=purpose)
+
+
+def refuse_alone(args: Namespace) -> None:
+    """UsageError for an option that goes with ``--need``, without it."""
+    for option in ("out", "against"):
+        if args.need is None and getattr(args, option) is not None:
+            raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
+
+
+def tip_error(text: str) -> float:
+    """The value of ``--need`` in m; ArgumentTypeError if it is not of the form ``tip=1mm``."""
+    match = NEED.fullmatch(text)
+    if match is None:
+        raise ArgumentTypeError(f"{text!r}: {FORM}")
+    if match["what"] != "tip":
+        raise ArgumentTypeError(f"{text!r}: only the error of the tip can be stated; {FORM}")
+    if match["unit"] not in UNITS:
+        raise ArgumentTypeError(f"{text!r}: the unit {match['unit']!r} is none of mm, cm, m; {FORM}")
+    value = float(match["number"]) * UNITS[match["unit"]]
+    if not (math.isfinite(value) and value > 0.0):
+        raise ArgumentTypeError(f"{text!r}: the error must be positive and finite; {FORM}")
+    return value
+
+
+def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
+    """Look for the leanest model, telling on stderr how it goes."""
+    from ..study.need import propose
+
+    shown = sys.stderr.isatty()
+
+    def tell(what: str) -> None:
+        if shown:
+            print(f"\r{what:70s}", end="", file=sys.stderr, flush=True)
+
+    found = propose(against or scene, most, scene, tell)
+    tell("")
+    if shown:
+        print("\r", end="", file=sys.stderr)
+    return found
+
+
+def summary(found: Proposal, most: float) -> dict[str, Any]:
+    """Keys that ``--need`` adds to the flat object of ``check``."""
+    return {
+        "need_tip_m": most,
+        "lean_edits": [str(edit) for edit in found.edits],
+        "lean_tip_error_m": found.deviation.worst,
+        "lean_rest_error_m": found.deviation.rest,
+        "lean_rest_error_at": found.deviation.where,
+        "lean_move_error_rms_m": found.deviation.rms,
+        "lean_move_error_max_m": found.deviation.most,
+        "measured_at_rest_in": list(found.course.names),
+        "measured_in_move": found.course.motion.label,
+        "note": ANOTHER,
+        "step_s": found.course.step,
+        "full_step_time_s": found.seconds[0],
+        "lean_step_time_s": found.seconds[1],
+        "full_unknowns": found.unknowns[0],
+        "lean_unknowns": found.unknowns[1],
+        "next": None if found.next is None else found.next[0],
+        "next_tip_error_m": None if found.next is None else found.next[1],
+    }
+
+
+def report(scene: Scene, found: Proposal, most: float) -> list[str]:
+    """Lines of text for a reader."""
+    off, course, (full, lean) = found.deviation, found.course, found.seconds
+    lines = ["", f"Leanest model found that keeps the tip within {_length(most)}"]
+    width = max((len(str(edit)) for edit in found.edits), default=0)
+    lines += [f"  {edit!s:{width}}  {_meaning(scene, edit)}" for edit in found.edits] or ["  this one: nothing can be left out"]
+    if found.next is not None:
+        lines.append(f"  not: {found.next[0]}, the tip would be {_length(found.next[1])} off")
+    lines += [f"  {FREE}", "", "Its tip against the full model's"]
+    lines.append(f"  at rest    {_length(off.rest)} at most, in {off.where} (of: {', '.join(course.names)})")
+    lines.append(f"  in a move  {_length(off.rms)} rms, {_length(off.most)} at most; {course.motion.label}")
+    lines += [f"  {ANOTHER}", "", f"Run time of a step of {1e3 * course.step:g} ms, least of interleaved runs"]
+    lines.append(f"  full  {1e6 * full:6.1f} us  {found.unknowns[0]:4d} unknowns")
+    lines.append(f"  lean  {1e6 * lean:6.1f} us  {found.unknowns[1]:4d} unknowns, {full / lean:.2f} times as fast")
+    return lines
+
+
+def write(source: str | None, scene: Scene, found: Proposal, most: float, out: Path) -> None:
+    """The lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
+    from ..study.rewrite import rewritten
+
+    text = default_text() if source is None else read_text(Path(source))
+    head = [
+        f"# Lean model of {source or 'the default scene'}, by boom_twin check --need tip={most:g}:",
+        *(f"#   {edit}" for edit in found.edits),
+        f"# Tip at most {_length(found.deviation.worst)} from the full model's, at rest in the postures and in a move",
+        f"# ({found.course.motion.label}).",
+        f"# {ANOTHER}",
+    ]
+    out.write_text("\n".join(head) + "\n\n" + rewritten(text, scene, found.edits), encoding="utf-8")
+
+
+def _meaning(scene: Scene, edit: Edit) -> str:
+    block, number, key = str(edit.place[0]).removesuffix("s"), int(edit.place[1]), str(edit.place[-1])
+    what = MEANING.get(key, "")
+    if key == "modes":
+        several = f"{edit.value} bending coordinate{'s' * (edit.value != 1)} a part, not {scene.modes_of(number)}"
+        what = several if edit.value else "rigid"
+    return f"{block} {number + 1}: {what}"
+
+
+def _length(value: float) -> str:
+    """In mm, with three digits."""
+    return f"{1e3 * value:.3g} mm"

@@ -1,0 +1,177 @@
+"""The leanest model of a boom that keeps its tip within a stated distance of the full model's.
+
+Parts are left out one after another, first what adds the least error for what it saves, and after each the error of all that
+is left out together is measured anew; errors of single parts are never added up. What costs nothing (damping, compliance of
+cylinders) stays. The search ends when no part that is left could go as well, so a second search finds nothing more.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SolverError, UsageError
+from ..scene.parts import Scene
+from .cost import size, step_times, unknowns
+from .deviation import Answer, Course, Deviation, answer, course_of, deviation
+from .edits import Edit, edited, merged
+from .variants import FEWER_MODES, KINDS, Kind, Variant, without
+
+GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
+ROUNDS = 7
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What was found.
+
+    Attributes
+    ----------
+    scene : Scene
+        The lean one.
+    edits : tuple of Edit
+        From the scene that the search started from to the lean one.
+    deviation : Deviation
+        Of the tip from the full model's, all together.
+    course : Course
+        On which it was measured.
+    unknowns : tuple of int
+        Of a step of the full and of the lean model.
+    seconds : tuple of float
+        A step of either takes, s; the least of interleaved runs of the move.
+    next : tuple of str and float, or None
+        What would have to go next, and the error (m) that this would lead to.
+    """
+
+    scene: Scene
+    edits: tuple[Edit, ...]
+    deviation: Deviation
+    course: Course
+    unknowns: tuple[int, int]
+    seconds: tuple[float, float]
+    next: tuple[str, float] | None
+
+
+def propose(full: Scene, most: float, start: Scene | None = None, progress: Progress = lambda _: None) -> Proposal:
+    """Look for the leanest model whose tip stays within `most` (m) of that of the scene `full`.
+
+    Parameters
+    ----------
+    start : Scene, optional
+        A model of the same boom to start from, by default `full` itself.
+    progress : callable, optional
+        Told in words what is being done.
+
+    Raises
+    ------
+    UsageError
+        `most` is not positive; `start` is another boom, or is further off than `most` already.
+    SolverError
+        The full model itself has no equilibrium or fails in the move.
+    """
+    if not (math.isfinite(most) and most > 0.0):
+        raise UsageError(f"need = {most!r} m: must be positive. Give for example 0.001.")
+    search = _Search(full, start or full, most, progress)
+    while search.round():
+        pass
+    lean = search.model()
+    found = search.measured(search.edits)
+    progress("measuring run times")
+    times = step_times((full, lean), search.course, ROUNDS)
+    counts = (unknowns(full), unknowns(lean))
+    return Proposal(lean, search.edits, found, search.course, counts, (float(times[0]), float(times[1])), search.next)
+
+
+class _Search:
+    """The present model, as edits of the one that the search started from, and all errors measured so far."""
+
+    def __init__(self, full: Scene, start: Scene, most: float, progress: Progress) -> None:
+        _check_same_boom(full, start)
+        self.start, self.most, self.progress = start, most, progress
+        self.course = course_of(full)
+        self.edits: tuple[Edit, ...] = ()
+        self.full: Answer = answer(full, self.course)
+        if self.full.status != "ok":
+            raise SolverError(f"the full model itself fails: {self.full.status}")
+        self.known: dict[tuple[Edit, ...], Deviation] = {}
+        self.sizes: dict[tuple[Edit, ...], float] = {}
+        self.next: tuple[str, float] | None = None
+        first = self.measured(()).worst
+        if first > most:
+            off = f"the scene to start from is {first:.3g} m off already"
+            raise UsageError(f"need = {most:g} m: {off}. Start from a fuller one.")
+
+    def model(self) -> Scene:
+        """The present model."""
+        return edited(self.start, self.edits)
+
+    def size(self, edits: tuple[Edit, ...]) -> float:
+        """Of the start after `edits`, see `study.cost`."""
+        if edits not in self.sizes:
+            self.sizes[edits] = size(edited(self.start, edits))
+        return self.sizes[edits]
+
+    def measured(self, edits: tuple[Edit, ...]) -> Deviation:
+        """Of the start after `edits`, from the full model."""
+        if edits not in self.known:
+            self.progress(f"{len(self.known)} models measured, {len(self.edits)} edits kept")
+            found = answer(edited(self.start, edits), self.course)
+            self.known[edits] = deviation(found, self.full, self.course)
+        return self.known[edits]
+
+    def round(self) -> bool:
+        """Try everything that is still there, the cheapest error first; whether anything could go."""
+        before, self.next = self.edits, None
+        queue = [entry for number, part in enumerate(self._parts()) if (entry := self._priced(number, *part))]
+        heapq.heapify(queue)
+        while queue:
+            _, number, kind, where = heapq.heappop(queue)
+            trial = self._trial(kind, where)
+            if trial is None:
+                continue
+            variant, edits = trial
+            error = self.measured(edits).worst
+            if error <= self.most:
+                self.edits = edits
+                if again := self._priced(number, kind, where):
+                    heapq.heappush(queue, again)
+            elif self.next is None or error < self.next[1]:
+                self.next = (variant.name, error)
+        return self.edits != before
+
+    def _parts(self) -> Iterator[tuple[Kind, Sequence[int]]]:
+        """Every kind of part, everywhere and in every group of sections."""
+        everywhere = range(len(self.start.sections))
+        groups = [group.tolist() for group in np.array_split(everywhere, min(GROUPS, len(everywhere)))]
+        for kind in (FEWER_MODES, *KINDS):
+            for where in [everywhere, *groups] if len(groups) > 1 else [everywhere]:
+                yield kind, where
+
+    def _trial(self, kind: Kind, where: Sequence[int]) -> tuple[Variant, tuple[Edit, ...]] | None:
+        """The present model without a part, and all its edits; None if the part is gone or costs nothing."""
+        variant = without(self.model(), kind, where)
+        if variant is None:
+            return None
+        edits = merged((*self.edits, *variant.edits))
+        return (variant, edits) if self.size(edits) < self.size(self.edits) else None
+
+    def _priced(self, number: int, kind: Kind, where: Sequence[int]) -> tuple[float, int, Kind, Sequence[int]] | None:
+        """Entry of the queue, error added per size saved first; None if there is nothing to leave out."""
+        trial = self._trial(kind, where)
+        if trial is None:
+            return None
+        added = self.measured(trial[1]).worst - self.measured(self.edits).worst
+        return added / (self.size(self.edits) - self.size(trial[1])), number, kind, where
+
+
+def _check_same_boom(full: Scene, start: Scene) -> None:
+    """Raise unless both have the sections of the same lengths."""
+    one, other = ([section.length for section in scene.sections] for scene in (full, start))
+    if one != other:
+        raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")

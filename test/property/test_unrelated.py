@@ -1,0 +1,158 @@
+"""What has nothing to do with a motion changes no bit of it, and what is not there costs no time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracle import booms
+
+from boom_twin.analysis import march as stepping
+from boom_twin.analysis.statics import statics
+from boom_twin.plan.compile import compile_scene
+from boom_twin.study.deviation import answer, course_of
+from boom_twin.study.motion import motion_of
+
+RUNS, STEPS, STEP, ATTEMPTS = 30, 400, 1e-3, 3
+MOST = 1.05
+ZERO = {"mass": 0.0, "inertia": 0.0, "com": 0.3}
+
+
+def edited(edit):
+    """The default scene after `edit` of its document."""
+    spec = booms.document()
+    edit(spec)
+    return booms.scene_of(spec)
+
+
+def each(block, **values):
+    """An edit that sets keys of every section or joint."""
+
+    def edit(spec):
+        for item in spec[block]:
+            item |= values
+
+    return edit
+
+
+def without(block, *keys):
+    """An edit that removes keys of every section, joint or ("cylinder") cylinder."""
+
+    def edit(spec):
+        for item in [joint["cylinder"] for joint in spec["joints"]] if block == "cylinder" else spec[block]:
+            for key in keys:
+                item.pop(key, None)
+
+    return edit
+
+
+def both(*edits):
+    """All edits one after the other."""
+
+    def edit(spec):
+        for one in edits:
+            one(spec)
+
+    return edit
+
+
+def cylinders(**values):
+    """An edit that sets keys of every cylinder."""
+
+    def edit(spec):
+        for joint in spec["joints"]:
+            joint["cylinder"] |= values
+
+    return edit
+
+
+def _off(spec):
+    spec |= {"axial": False, "geometric": False}
+
+
+RIGID = each("sections", modes=0)
+# what is compared: (an edit, and the same with something that is zero, unused or mere words)
+PAIRS = {
+    "description": (both(), lambda spec: spec.update(description="another text")),
+    "posture": (both(), lambda spec: spec["postures"].update(mine=[50, 10, -20, -60])),
+    "material's name, nu, rho": (both(), lambda spec: spec["material"].update(name="other", nu=0.2, rho=7000.0)),
+    "payload of 0": (both(), lambda spec: spec.update(tip={"payload": 0.0})),
+    "tip without payload": (both(), lambda spec: spec.update(tip={})),
+    "line fill of 0": (both(), lambda spec: spec.update(line_fill=0.0)),
+    "inclination of 0": (both(), lambda spec: spec["base"].update(inclination=0.0)),
+    "modes named": (both(), lambda spec: spec.update(modes=3)),
+    "axial, geometric named": (both(), lambda spec: spec.update(axial=True, geometric=True)),
+    "axial, geometric of sections, for none": (both(), both(each("sections", axial=True, geometric=True), _off)),
+    "axial, geometric of rigid sections": (RIGID, both(RIGID, each("sections", axial=False, geometric=False))),
+    "modes of all sections, for none": (RIGID, both(RIGID, lambda spec: spec.update(modes=5))),
+    "A, I, beta of rigid sections": (RIGID, both(RIGID, each("sections", A=1.0, I=1.0, beta=0.5))),
+    "links of mass 0": (without("joints", "mL", "mR"), each("joints", mL=0.0, mR=0.0)),
+    "barrels of mass 0": (without("cylinder", "barrel"), cylinders(barrel=ZERO)),
+    "rods of mass 0": (without("cylinder", "rod"), cylinders(rod=ZERO)),
+    "d of 0": (without("cylinder", "d"), cylinders(d=0.0)),
+    "beta of 0": (without("sections", "beta"), each("sections", beta=0.0)),
+    "rho_I of 0": (without("sections", "rho_I"), each("sections", rho_I=0.0)),
+}
+TIMED = [name for name in PAIRS if name.endswith("of 0") and name != "inclination of 0"] + ["A, I, beta of rigid sections"]
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_no_bit_changes(name):
+    one, other = (edited(edit) for edit in PAIRS[name])
+    course = course_of(edited(both()))
+    course = replace(course, motion=replace(course.motion, rise=0.3, duration=0.4))
+    first, second = answer(one, course), answer(other, course)
+    assert first.status == second.status == "ok"
+    assert np.array_equal(first.rest, second.rest) and np.array_equal(first.tip, second.tip)
+    assert np.array_equal(
+        statics(one, posture="arch", modes=3).frequencies, statics(other, posture="arch", modes=3).frequencies
+    )
+
+
+def least_times(motion, *boxes):
+    """Least time (s) of stepping every boom of `boxes`, 30 interleaved runs; a boom is a scene and the plan to use, or None."""
+    times = []
+    for _ in range(RUNS):
+        times.append([])
+        for scene, plan in boxes:
+            with pytest.MonkeyPatch.context() as patch:
+                if plan is not None:
+                    patch.setattr(stepping, "compile_scene", lambda *_, plan=plan: plan)
+                run = stepping.march(scene, motion, STEPS * STEP, STEP, every=STEPS, angles=motion.angles)
+            assert run.status == "ok"
+            times[-1].append(run.seconds)
+    return np.min(times, axis=0), run
+
+
+def ratio(motion, one, other):
+    """Time of `other` over that of `one`; of the first of three attempts that is within bounds, else of the last."""
+    for _ in range(ATTEMPTS):
+        (first, second), _ = least_times(motion, one, other)
+        if second <= MOST * first:
+            break
+    return second / first
+
+
+@pytest.mark.parametrize("name", TIMED)
+def test_what_is_zero_or_unused_costs_no_time(name):
+    one, other = (edited(edit) for edit in PAIRS[name])
+    assert ratio(motion_of(one), (one, None), (other, None)) <= MOST
+
+
+def with_unused_rows(plan, other):
+    """`plan` with the tables of beams, links and cylinder parts of another boom, to which no operation points."""
+    tables, full = plan.tables, other.tables
+    assert len(tables.beams) == len(tables.links) == len(tables.parts) == 0
+    names = ("beams", "psi", "weights", "stiffness", "point_mass", "point_rotary", "links", "parts")
+    return replace(plan, tables=tables._replace(**{name: getattr(full, name) for name in names}))
+
+
+def test_an_empty_table_costs_nothing():
+    """A rigid boom with massless links and cylinders: stepped with empty tables and with tables full of rows not in use."""
+    scene = edited(both(RIGID, without("joints", "mL", "mR"), without("cylinder", "barrel", "rod", "d")))
+    full = edited(both())
+    one, other = (scene, None), (scene, with_unused_rows(compile_scene(scene), compile_scene(full)))
+    assert ratio(motion_of(full), one, other) <= MOST and ratio(motion_of(full), other, one) <= MOST
+    (_, same), (_, again) = (least_times(motion_of(full), box) for box in (one, other))
+    assert np.array_equal(same.tip, again.tip) and np.array_equal(same.cylinder_forces, again.cylinder_forces)

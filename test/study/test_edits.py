@@ -1,0 +1,114 @@
+"""Edits of scenes and of their text say the same, and leave everything else as it was."""
+
+from __future__ import annotations
+
+import difflib
+import io
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from boom_twin.scene import Scene, load_scene
+from boom_twin.scene.load import default_text, examine
+from boom_twin.scene.read import parse
+from boom_twin.scene.structure import structure
+from boom_twin.study.edits import Edit, edited, merged
+from boom_twin.study.rewrite import rewritten
+from boom_twin.study.variants import variants
+
+EDITS = (
+    Edit(("modes",), 4),
+    Edit(("sections", 0, "modes"), 2),
+    Edit(("sections", 0, "rho_I"), None),
+    Edit(("joints", 1, "mL"), None),
+    Edit(("joints", 1, "mR"), None),
+    Edit(("joints", 0, "cylinder", "k"), None),
+    Edit(("joints", 0, "cylinder", "d"), None),
+    Edit(("joints", 2, "cylinder", "barrel"), None),
+    Edit(("joints", 3, "cylinder", "rod"), None),
+)
+
+
+def scene_of(text: str) -> Scene:
+    scene, _, faults = structure(parse(text, "test"))
+    assert scene is not None and not faults
+    return scene
+
+
+def in_blocks(text: str) -> str:
+    """The same scene without braces and brackets."""
+    yaml, stream = YAML(), io.StringIO()
+    yaml.default_flow_style = False
+    yaml.dump(YAML(typ="safe").load(text), stream)
+    return stream.getvalue()
+
+
+def changes(before: str, after: str) -> list[str]:
+    """Lines that went or came."""
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm="")
+    return [line for line in lines if line[0] in "+-" and not line.startswith(("---", "+++"))]
+
+
+def test_edits_speak_the_words_of_the_file() -> None:
+    assert str(Edit(("sections", 1, "modes"), 0)) == "sections[1].modes: 0"
+    assert str(Edit(("sections", 1, "axial"), False)) == "sections[1].axial: false"
+    assert str(Edit(("joints", 0, "cylinder", "k"), None)) == "remove joints[0].cylinder.k"
+
+
+def test_of_several_edits_of_a_key_the_last_one_counts() -> None:
+    edits = [Edit(("sections", 1, "modes"), 2), Edit(("modes",), 2), Edit(("sections", 1, "modes"), 1)]
+    assert merged(edits) == (Edit(("modes",), 2), Edit(("sections", 1, "modes"), 1))
+
+
+def test_an_edited_scene_differs_in_the_edited_keys_only() -> None:
+    scene = load_scene()
+    after = edited(scene, EDITS)
+    assert after.modes == 4 and after.sections[0].modes == 2 and after.sections[0].rho_I is None
+    assert after.joints[1].mL is None and after.joints[0].cylinder.k is None
+    assert after.sections[1:] == scene.sections[1:] and after.postures == scene.postures
+    assert scene == load_scene()
+
+
+@pytest.mark.parametrize("form", [str, in_blocks], ids=["braces", "blocks"])
+def test_the_edited_text_describes_the_edited_scene(form, tmp_path: Path) -> None:
+    text = form(default_text())
+    scene = scene_of(text)
+    after = rewritten(text, scene, EDITS)
+    (tmp_path / "lean.yaml").write_text(after, encoding="utf-8")
+    found, oddities = examine(tmp_path / "lean.yaml")
+    assert found.model_dump() == edited(scene, EDITS).model_dump() and oddities == []
+
+
+def test_comments_and_layout_stay() -> None:
+    text = default_text()
+    one = rewritten(text, load_scene(), [Edit(("sections", 3, "modes"), 1)])
+    assert len(changes(text, one)) == 2
+    assert "inertia: 0.02}, modes: 1}   # head holds the end hose" in one
+    blocks = in_blocks(text).replace("    mass: 36.0", "    mass: 36.0  # heavy")
+    after = rewritten(blocks, scene_of(blocks), EDITS[3:5])
+    assert changes(blocks, after) == ["-  mL: 4.0", "-  mR: 3.0"] and "# heavy" in after
+
+
+def test_a_key_that_is_there_gets_its_new_value_in_place() -> None:
+    text = default_text().replace("beta: 1.0e-3,", "beta: 1.0e-3, modes: 3,", 1)
+    after = rewritten(text, scene_of(text), [Edit(("sections", 0, "modes"), 1)])
+    assert after == text.replace("modes: 3", "modes: 1")
+
+
+def test_blocks_that_share_their_text_are_written_anew() -> None:
+    text = default_text().replace("barrel: {mass: 22.0", "barrel: &b {mass: 22.0", 1)
+    text = text.replace("barrel: {mass: 16.0, inertia: 0.7, com: 0.25}", "barrel: *b")
+    scene = scene_of(text)
+    for place in (("joints", 0, "cylinder", "barrel"), ("joints", 1, "cylinder", "barrel")):
+        after = scene_of(rewritten(text, scene, [Edit(place, None)]))
+        assert after.model_dump() == edited(scene, [Edit(place, None)]).model_dump()
+
+
+def test_every_variant_of_the_default_scene_is_a_scene(tmp_path: Path) -> None:
+    scene, text, path = load_scene(), default_text(), tmp_path / "variant.yaml"
+    found = variants(scene)
+    assert len({variant.name for variant in found}) == len(found) > 40
+    for variant in found:
+        path.write_text(rewritten(text, scene, variant.edits), encoding="utf-8")
+        assert examine(path)[0].model_dump() == variant.of(scene).model_dump() != scene.model_dump(), variant.name

@@ -1,0 +1,187 @@
+"""What `check --need` proposes keeps its word, is final, and refuses nonsense."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle import booms
+from ruamel.yaml import YAML
+
+from boom_twin.analysis.simulate import simulate
+from boom_twin.analysis.statics import statics
+from boom_twin.cli.main import main
+from boom_twin.cli.need import tip_error
+from boom_twin.errors import UsageError
+from boom_twin.scene import Scene, load_scene
+from boom_twin.study.edits import edited
+from boom_twin.study.motion import motion_of
+from boom_twin.study.need import Proposal, propose
+
+
+def measured_anew(full: Scene, lean: Scene) -> float:
+    """Largest distance of two models' tips (m) at rest in all postures and in the move, by the commands' own functions."""
+    off = [
+        np.linalg.norm(statics(full, posture=name, modes=0).tip - statics(lean, posture=name, modes=0).tip)
+        for name in full.postures
+    ]
+    motion = motion_of(full)
+    times = np.arange(0.0, motion.duration + 1e-9, 2e-3)
+    strokes, _ = motion(times)
+    tips = [simulate(scene, times, strokes, angles=motion.angles).tip[:, :2] for scene in (full, lean)]
+    return float(max(*off, np.linalg.norm(tips[0] - tips[1], axis=1).max()))
+
+
+@pytest.fixture(scope="module")
+def proposal() -> Proposal:
+    """For 1 mm, of the default scene."""
+    return propose(load_scene(), 1e-3)
+
+
+def test_the_stated_error_is_kept(proposal: Proposal) -> None:
+    found = measured_anew(load_scene(), proposal.scene)
+    assert found <= 1e-3
+    assert found == pytest.approx(proposal.deviation.worst, rel=0.01)
+
+
+def test_the_proposal_leaves_something_out_and_is_faster(proposal: Proposal) -> None:
+    assert len(proposal.edits) >= 5 and proposal.scene == edited(load_scene(), proposal.edits)
+    assert proposal.unknowns[1] < proposal.unknowns[0]
+    assert proposal.next is not None and proposal.next[1] > 1e-3
+
+
+def test_a_second_search_finds_nothing_more(proposal: Proposal) -> None:
+    again = propose(load_scene(), 1e-3, start=proposal.scene)
+    assert again.edits == () and again.next == proposal.next
+    assert again.deviation == proposal.deviation
+
+
+@pytest.mark.parametrize("most", [1e-5, 2e-3, 0.05])
+def test_it_is_kept_at_other_errors_too(two_sections: Scene, most: float) -> None:
+    found = propose(two_sections, most)
+    assert measured_anew(two_sections, found.scene) <= most
+
+
+def test_nothing_can_be_left_out_at_a_tiny_error(two_sections: Scene) -> None:
+    found = propose(two_sections, 1e-13)
+    assert found.scene == two_sections and found.edits == () and found.deviation.worst == 0.0
+
+
+def test_all_that_costs_goes_at_a_huge_error(two_sections: Scene) -> None:
+    found = propose(two_sections, 10.0)
+    assert found.next is None
+    assert [found.scene.is_flexible(i) for i in range(2)] == [False, False]
+    assert all(joint.mL is joint.cylinder.rod is joint.cylinder.barrel is None for joint in found.scene.joints)
+    assert all(joint.cylinder.k is not None for joint in found.scene.joints)  # costs nothing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_it_is_kept_on_booms_of_all_kinds(seed: int) -> None:
+    scene = booms.random_boom(seed)
+    for most in (1e-4, 3e-3):
+        found = propose(scene, most)
+        assert measured_anew(scene, found.scene) <= 1.001 * most
+        assert propose(scene, most, start=found.scene).edits == ()
+
+
+@pytest.mark.parametrize("most", [0.0, -1e-3, float("nan"), float("inf")])
+def test_an_error_that_is_none_is_refused(two_sections: Scene, most: float) -> None:
+    with pytest.raises(UsageError, match=r"need = .* m: must be positive"):
+        propose(two_sections, most)
+
+
+def test_another_boom_is_refused(two_sections: Scene) -> None:
+    with pytest.raises(UsageError, match=r"lengths of sections = .* two scenes of the same boom"):
+        propose(load_scene(), 1e-3, start=two_sections)
+
+
+def test_a_start_that_is_further_off_is_refused(two_sections: Scene) -> None:
+    rigid = two_sections.model_copy(update={"modes": 0})
+    with pytest.raises(UsageError, match=r"is 0\.\d+ m off already"):
+        propose(two_sections, 1e-3, start=rigid)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("tip=1mm", 1e-3), ("tip = 0.5 cm", 5e-3), ("tip=2e-3", 2e-3), ("tip=.1m", 0.1), ("tip=1E-1mm", 1e-4), ("tip=3 m", 3.0)],
+)
+def test_units_of_need(text: str, value: float) -> None:
+    assert tip_error(text) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1mm", "like tip=1mm"),
+        ("tip", "like tip=1mm"),
+        ("tip=", "like tip=1mm"),
+        ("tip=mm", "like tip=1mm"),
+        ("tip=1,5mm", "like tip=1mm"),
+        ("tip=nan", "like tip=1mm"),
+        ("tip=1e400", "must be positive and finite"),
+        ("tip=0mm", "must be positive and finite"),
+        ("tip=-1mm", "must be positive and finite"),
+        ("tip=1in", "the unit 'in' is none of mm, cm, m"),
+        ("tip=1MM", "the unit 'MM' is none of mm, cm, m"),
+        ("joint_1=1mm", "only the error of the tip can be stated"),
+    ],
+)
+def test_nonsense_is_one_clear_error(text: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["check", "--need", text])
+    out, err = capsys.readouterr()
+    assert stop.value.code == 2 and out == ""
+    assert words in err and err.count("error:") == 1
+
+
+@pytest.mark.parametrize("option", ["--out", "--against"])
+def test_options_of_need_alone_are_refused(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", option, "x.yaml"]) == 1
+    assert f"{option} x.yaml: goes with --need only" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
+    """A scene file and where its lean one goes."""
+    folder = tmp_path_factory.mktemp("need")
+    with (folder / "full.yaml").open("w", encoding="utf-8") as stream:
+        YAML(typ="safe").dump(json.loads(two_sections.model_dump_json(exclude_none=True)), stream)
+    return folder / "full.yaml", folder / "lean.yaml"
+
+
+def test_the_command_writes_a_scene_that_loads(
+    written: tuple[Path, Path], two_sections: Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    full, lean = map(str, written)
+    assert main(["check", full, "--need", "tip=2mm", "--out", lean, "--json"]) == 0
+    out, err = capsys.readouterr()
+    values = json.loads(out)
+    assert err == "" and out.count("\n") == 1 and not any(isinstance(value, dict) for value in values.values())
+    assert values["need_tip_m"] == 2e-3 and values["lean_edits"] and values["mass_kg"] > 0.0
+    assert values["lean_tip_error_m"] == max(values["lean_rest_error_m"], values["lean_move_error_max_m"]) <= 2e-3
+    assert "posture" in values["measured_in_move"] and "Another motion may differ" in values["note"]
+    assert measured_anew(two_sections, load_scene(lean)) == pytest.approx(values["lean_tip_error_m"], rel=0.01)
+
+
+def test_the_lean_scene_against_the_full_one_has_nothing_more_to_lose(
+    written: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    full, lean = map(str, written)
+    if not written[1].exists():
+        main(["check", full, "--need", "tip=2mm", "--out", lean])
+        capsys.readouterr()
+    assert main(["check", lean, "--need", "tip=2mm", "--against", full]) == 0
+    out = capsys.readouterr().out
+    assert "this one: nothing can be left out" in out
+    assert "Another motion may differ" in out and "us" in out
+
+
+def test_without_need_no_study_is_imported() -> None:
+    code = "import sys; from boom_twin.cli.main import main; main(['check']); print([n for n in sys.modules if '.study' in n])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr

@@ -1,0 +1,80 @@
+"""The study of a scene's parts: complete, sorted, and the same as editing the file by hand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.analysis.statics import statics
+from boom_twin.scene import Scene
+from boom_twin.study import deviation, parts
+from boom_twin.study.edits import Edit
+from boom_twin.study.variants import KINDS, Variant, variants, without
+
+
+@pytest.fixture(scope="module")
+def found(two_sections: Scene) -> parts.Parts:
+    return parts.measure(two_sections, rounds=1)
+
+
+def test_every_variant_is_there_ascending_in_error(found: parts.Parts, two_sections: Scene) -> None:
+    assert {part.variant for part in found.parts} == set(variants(two_sections))
+    errors = [part.deviation.worst for part in found.parts]
+    assert errors == sorted(errors) and all(np.isfinite(errors))
+    assert all(part.status == "ok" and part.step_time > 0.0 for part in found.parts)
+
+
+def test_its_numbers_are_those_of_the_edited_scene(found: parts.Parts, two_sections: Scene) -> None:
+    part = next(part for part in found.parts if part.variant.name == "cylinder 2 incompressible")
+    second = two_sections.joints[1]
+    cylinder = second.cylinder.model_copy(update={"k": None, "d": None})
+    hard = two_sections.model_copy(
+        update={"joints": (two_sections.joints[0], second.model_copy(update={"cylinder": cylinder}))}
+    )
+    full, lean = (statics(scene, posture="arch", modes=3) for scene in (two_sections, hard))
+    assert part.shifts == pytest.approx(lean.frequencies / full.frequencies - 1.0, abs=1e-6)
+    off = [np.linalg.norm(statics(two_sections, posture=n).tip - statics(hard, posture=n).tip) for n in ("arch", "low")]
+    assert part.deviation.rest == pytest.approx(max(off), rel=1e-6)
+    assert part.unknowns == found.unknowns
+
+
+def test_what_leaves_more_out_has_less_unknowns(found: parts.Parts) -> None:
+    unknowns = {part.variant.name: part.unknowns for part in found.parts}
+    assert unknowns["all sections rigid"] < unknowns["all sections with modes: 1"] < unknowns["all sections with modes: 2"]
+    assert unknowns["all sections with modes: 2"] < found.unknowns < unknowns["all sections with modes: 4"]
+
+
+def test_a_part_that_is_not_there_cannot_be_left_out(two_sections: Scene) -> None:
+    for kind in KINDS:
+        variant = without(two_sections, kind, [0, 1])
+        assert variant is not None
+        assert without(variant.of(two_sections), kind, [0, 1]) is None
+
+
+def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    course = deviation.course_of(two_sections)
+    good = deviation.answer(two_sections, course, deviation.FREQUENCIES)
+    answers = iter([good, replace(good, status="a sentence", frequencies=np.zeros(0))])
+    monkeypatch.setattr(parts, "variants", lambda _: (Variant("without all", "test", (Edit(("modes",), 1),)),))
+    monkeypatch.setattr(parts, "answer", lambda *_: next(answers))
+    result = parts.measure(two_sections, rounds=1)
+    assert result.parts[0].status == "a sentence" and np.isinf(result.parts[0].deviation.worst)
+    row = next(line for line in parts.as_markdown(result).splitlines() if "without all" in line)
+    assert "a sentence" in row and "nan" not in row and "inf" not in row
+
+
+def test_the_files(found: parts.Parts, two_sections: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "measure", lambda *_: found)
+    parts.write(two_sections, tmp_path / "deep" / "out", quick=True)
+    out = tmp_path / "deep" / "out"
+    values = json.loads((out / "parts.json").read_text())
+    assert len(values["variants"]) == len(found.parts) and values["machine"]["cpu"]
+    first = values["variants"][0]
+    assert first["edits"].startswith(("sections[", "remove ")) and first["step_time_s"] > 0.0
+    text = (out / "parts.md").read_text()
+    assert text.count("| ok |") == len(found.parts) and "Another motion may differ" in text and "surrogate" in text
+    assert (out / "parts.png").read_bytes()[:4] == b"\x89PNG"
