@@ -13,7 +13,8 @@ from ..scene.parts import Scene
 from ..view.stability_matrix import Line, matrix_picture
 from ..view.stability_roundoff import roundoff_picture
 from .report import machine, write_json
-from .stability_cases import Case, cases, days
+from .stability_case import Case
+from .stability_cases import cases, days
 from .stability_limit import Limit, limit_of
 from .stability_report import mark, text
 from .stability_roundoff import Loss, losses

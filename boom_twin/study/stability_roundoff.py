@@ -11,6 +11,7 @@ from ..scene.parts import Scene
 from . import stability_scenes as made
 from .long_booms import long_boom, seven_sections
 from .motion import motion_of
+from .stability_case import short
 from .stability_step import Step, one_step
 
 COUNTS, QUICK_COUNTS = (2, 3, 5, 10, 20, 50, 100, 200), (2, 5, 20)
@@ -42,7 +43,7 @@ def _by_count(counts: tuple[int, ...]) -> Iterator[Loss]:
 
 def _by_step(scene: Scene, steps: tuple[float, ...]) -> Iterator[Loss]:
     for step in steps:
-        yield Loss("time step", f"dt {step:.0e} s", step, one_step(scene, _angles(scene), step, RHO))
+        yield Loss("time step", f"dt {short(step)} s", step, one_step(scene, _angles(scene), step, RHO))
 
 
 def _by_stiffness(scene: Scene) -> Iterator[Loss]:

@@ -13,7 +13,7 @@ from ..errors import SolverError
 from ..plan.compile import compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
-from .stability_cases import Case
+from .stability_case import Case
 from .stability_facts import against_motion, against_rest
 from .stability_motions import Setup
 from .stability_verdict import Facts, Verdict, verdict

@@ -95,4 +95,4 @@ def _grade(name: str, value: float) -> Word:
 
 
 def _shown(value: float) -> str:
-    return f"{value:.2g}" if abs(value) < 1e4 else f"{value:.0e}"
+    return f"{float(f'{value:.2g}'):g}"

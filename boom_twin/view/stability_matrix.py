@@ -20,8 +20,8 @@ MARKS: dict[str, tuple[str, str, str, str]] = {
     "fails": ("F", "#D55E00", "#FFFFFF", "fails, the status says so"),
     "silent": ("S", "#4A0E0E", "#FFFFFF", "fails silently: wrong numbers, status ok"),
 }
-ROW, TOP, BELOW = 0.25, 1.9, 0.9  # inches
-NAMES, METHODS = 5.2, 0.85  # widths, inches
+ROW, TOP, BELOW = 0.25, 1.6, 0.9  # inches
+NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Line:
 
 def matrix_picture(path: Path, title: str, methods: Sequence[str], lines: Sequence[Line], note: str = "") -> None:
     """Write the matrix as PNG."""
-    width, height = NAMES + METHODS * len(methods) + 0.3, TOP + ROW * len(lines) + BELOW
+    width, height = NAMES + METHODS * len(methods) + ASIDE, TOP + ROW * len(lines) + BELOW
     with picture(path, title, note, (width, height)) as figure:
         figure.set_layout_engine("none")
         box = (NAMES / width, BELOW / height, METHODS * len(methods) / width, ROW * len(lines) / height)
