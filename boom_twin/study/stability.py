@@ -48,7 +48,7 @@ def write(scene: Scene, out: Path, quick: bool = False, soak: bool = False, tell
     lost = losses(scene, quick)
     tell("error over the step")
     turned = turn_up(scene, QUICK_STEPS if quick else STEPS)
-    _write_files(out, rows, long_rows, limits, lost, turned, f"{len(scene.sections)} sections")
+    write_files(out, rows, long_rows, limits, lost, turned, f"{len(scene.sections)} sections")
 
 
 def _stuck(rows: Sequence[Row], case: Case) -> bool:
@@ -56,13 +56,14 @@ def _stuck(rows: Sequence[Row], case: Case) -> bool:
     return any(row.case is case and NO_EQUILIBRIUM in row.cells["default"].facts.status for row in rows)
 
 
-def _write_files(
+def write_files(
     out: Path, rows: list[Row], long_rows: list[Row], limits: dict[str, Limit], lost: list[Loss], turned: TurnUp, scene: str
 ) -> None:
+    """Write all files from what was found; arguments as in `write`, `long_rows` are holds of a day."""
     (out / "stability.md").write_text(text(rows, long_rows, limits, lost, turned, {"scene": scene}), encoding="utf-8")
     write_json(out / "stability.json", _as_json(rows + long_rows, limits, lost, turned))
     lines = [Line(row.case.group, row.case.name, [mark(cell) for cell in row.cells.values()]) for row in rows]
-    matrix_picture(out / "stability.png", "Where each method holds", list(METHODS), lines)
+    matrix_picture(out / "stability.png", "Where each method holds", list(rows[0].cells), lines)
     chain = [loss for loss in lost if loss.group == "sections"]
     shown = {"Riccati": "riccati", "plain product": "plain", "LU of the whole system": "dense"}
     roundoff_picture(

@@ -58,7 +58,7 @@ def growth(motion: March, still: float) -> float:
 
 def alternating(values: Array) -> Array:
     """The part of rows (m, c) that changes sign from row to row, (m - 2, c); a smooth curve leaves next to nothing."""
-    return np.asarray(0.25 * (values[2:] - 2.0 * values[1:-1] + values[:-2]))
+    return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
 def _rings(found: March, right: March | None, late: np.ndarray) -> tuple[float, float]:
