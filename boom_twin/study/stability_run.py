@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -136,9 +136,8 @@ def _right(setup: Setup) -> tuple[March, int]:
 
 def _thinned(motion: March, stride: int) -> March:
     """Every `stride`-th row."""
-    names: Sequence[str] = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
-    arrays = {name: getattr(motion, name)[::stride] for name in names}
-    return March(**arrays, seconds=motion.seconds, steps=motion.steps, passes=motion.passes, status=motion.status)
+    names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
+    return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
 
 def _equilibrium(setup: Setup) -> Array:
