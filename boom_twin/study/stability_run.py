@@ -103,7 +103,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
         return lambda found: _against(found, right, stride, setup.still), f"default method at {_fine(setup):.3g} s"
     rest = _equilibrium(setup) if case.truth == "equilibrium" else None
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
-    return lambda found: _ended(found) or against_rest(found, rest, setup.still), told
+    return lambda found: _ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
 
 def _none(found: March) -> Facts:
