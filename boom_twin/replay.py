@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,9 @@ from .records import Array, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .truth import TipTruth, load_truth
-from .twin import Twin
+
+if TYPE_CHECKING:
+    from .twin import Twin
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 
@@ -95,8 +97,11 @@ def replay(
     session, out = scan(Path(bag)), Path(out)
     wanted = _wanted(session)
     _clear(out)
-    twin, recording = Twin(scene, settings), Recording()
-    with _unhurried_collector(), _ends(session, wanted, twin, out / "bag") as (ahead, behind):
+    recording = Recording()
+    with _unhurried_collector(), _ends(session, wanted, len(scene.joints), out / "bag") as (ahead, behind):
+        twin = _ready_twin(scene, settings)
+        ahead.wait_ready()
+        behind.wait_ready()
         samples: Iterator[Sample | None] = iter(ahead)
         if progress is not None:
             samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
@@ -146,18 +151,24 @@ def _clear(out: Path) -> None:
 
 
 @contextmanager
-def _ends(session: Session, wanted: dict[str, Stream], twin: Twin, bag: Path) -> Iterator[tuple[Ahead, Behind]]:
-    """The processes that read and write, and the compiled model between them, all ready."""
-    ahead = Ahead(session.path, wanted, twin.plan.joints)
+def _ends(session: Session, wanted: dict[str, Stream], joints: int, bag: Path) -> Iterator[tuple[Ahead, Behind]]:
+    """The processes that read and write, as they start."""
+    ahead = Ahead(session.path, wanted, joints)
     behind = Behind(bag, session.notes)
     try:
-        twin.warm_up()
-        ahead.wait_ready()
-        behind.wait_ready()
         yield ahead, behind
     finally:
         ahead.stop()
         behind.stop()
+
+
+def _ready_twin(scene: Scene, settings: Settings | None) -> Twin:
+    """A twin with its compiled model; its modules are imported here, while the other processes start."""
+    from .twin import Twin
+
+    twin = Twin(scene, settings)
+    twin.warm_up()
+    return twin
 
 
 @contextmanager

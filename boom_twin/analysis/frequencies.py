@@ -15,8 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..chain.place import place
+<<<<<<< HEAD
 from ..chain.program import JOINT_A, Motion, State, Work
 from ..chain.status import OK
+=======
+from ..chain.program import Motion, State, Work
+>>>>>>> wt-published
 from ..chain.step import observe
 from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..plan.compile import Plan
@@ -61,8 +65,9 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     status, negative = _condense(plan, state, work, motion, drive)
     if status != OK:
         return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
-    sizes = [2 if kind == JOINT_A else 6 for kind in plan.tables.operations.kind if kind <= 1]
-    return int(negative) + sum(_negative_eigenvalues(work.blocks[i, :size, :size]) for i, size in enumerate(sizes))
+    blocks = work.blocks.copy()
+    blocks[0, 2:, 2:] = np.eye(4)  # joint A, always the first, condenses two unknowns only
+    return int(negative) + _negative_eigenvalues(blocks)
 
 
 def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int]:
@@ -79,14 +84,13 @@ def _drive(plan: Plan, state: State, work: Work) -> Array:
     return np.array([work.position[c.history] - c.compliance * state.z[c.z] for c in t.cylinders])
 
 
-def _negative_eigenvalues(block: Array) -> int:
-    """Of a small symmetric matrix whose rows differ by many orders of magnitude: balanced first, signs stay."""
-    scaled = block.copy()
+def _negative_eigenvalues(blocks: Array) -> int:
+    """Of small symmetric matrices (k, 6, 6) whose rows differ by many orders of magnitude: balanced first, signs stay."""
     for _ in range(6):
-        size = np.sqrt(np.abs(scaled).max(axis=1))
+        size = np.sqrt(np.abs(blocks).max(axis=2))
         size[size == 0.0] = 1.0
-        scaled /= np.outer(size, size)
-    return int(np.sum(np.linalg.eigvalsh(scaled) < 0.0))
+        blocks = blocks / (size[:, :, None] * size[:, None, :])
+    return int(np.sum(np.linalg.eigvalsh(blocks) < 0.0))
 
 
 def natural_modes(

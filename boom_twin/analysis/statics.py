@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from .posture import rigid_tip, set_undeformed
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
 LONGEST_INCREMENT = 0.1  # rad in one pass
-LOAD_STEPS = (0.05, 0.2, 0.4, 0.6, 0.8, 1.0)  # of gravity, where the full load at once does not converge
+FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full load at once fails, and the smallest that is tried
 
 
 @dataclass(frozen=True)
@@ -109,37 +109,46 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then in steps. Histories are left without motion.
+    The full load at once is tried first, then gradually. Histories are left without motion.
     """
     drive = plan.closed_lengths + strokes
-    for loads in ((1.0,), LOAD_STEPS):
-        set_undeformed(plan, state, angles)
-        status = OK
-        for load in loads:
-            status = _solve(plan, state, work, drive, load)
-            if status != OK:
-                break
-        if status == OK and is_stable(plan, state, work):
-            return
-    where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
-    reason = "what was found is not stable" if status == OK else "weight moves it on and on, or a linkage folds over"
-    raise SolverError(
-        f"no equilibrium at strokes {where} m: {reason}. Check masses, payload, stiffnesses, and how near the posture is to "
-        "the end of a joint's range."
-    )
+    set_undeformed(plan, state, angles)
+    if _rests(plan, state, work, drive, 1.0):
+        return
+    set_undeformed(plan, state, angles)
+    share = _load_gradually(plan, state, work, drive)
+    if share < 1.0:
+        where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
+        raise SolverError(
+            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
+            "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's range."
+        )
+
+
+def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
+    """Follow the equilibrium from no gravity towards all of it; returns the share that was reached."""
+    share, step = 0.0, FIRST_LOAD
+    while share < 1.0 and step >= LEAST_LOAD:
+        z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
+        if _rests(plan, state, work, drive, aim):
+            share, step = aim, 2.0 * step
+        else:
+            state.z[:], state.history[:] = z, history
+            step *= 0.5
+    return share
+
+
+def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> bool:
+    """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
+    loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
+    scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+    return bool(status == OK and is_stable(loaded, state, work))
 
 
 def is_stable(plan: Plan, state: State, work: Work) -> bool:
     """Whether energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
     return negative_pivots(plan, state, work, 0.0) == constraints(plan)
-
-
-def _solve(plan: Plan, state: State, work: Work, drive: Array, load: float) -> int:
-    tables = plan.tables._replace(gravity=load * plan.tables.gravity)
-    still = np.zeros(plan.joints)
-    scheme = prepare(REST, 0.0, 0.0, work.weights)
-    status, _, _ = advance(tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
-    return int(status)
 
 
 def outline(plan: Plan, state: State, position: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..physics.beam import transfer_beam
+from ..physics.beam import USUAL, Sizes, transfer_beam
 from ..physics.jit import inner, kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
@@ -33,8 +33,15 @@ def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
     tables = (t.psi[row], t.weights[row], t.stiffness[row], t.point_mass[row], t.point_rotary[row])
     scratch = (work.rho[row], work.drho[row], work.turn[row], work.local, work.block)
+    beam = t.beams[row]
+    if beam.bending == USUAL.bending and beam.axial == USUAL.axial:
+        return transfer_beam(
+            beam, USUAL, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
+            work.gains[operation], work.free[operation],
+        )  # fmt: skip
+    sizes = Sizes(beam.bending, beam.axial, beam.points)
     return transfer_beam(
-        t.beams[row], tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
+        beam, sizes, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
         work.gains[operation], work.free[operation],
     )  # fmt: skip
 

@@ -8,11 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
-from ..pictures import draw
-from ..replay import replay
-from ..settings import load_settings
 from .common import add_json, add_scene, open_scene, print_json
 
 
@@ -28,11 +23,18 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
+    from ..replay import replay
+    from ..settings import load_settings
+
     scene = open_scene(args.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     result = replay(args.bag, scene, args.out, settings, _progress)
-    pictures = [] if args.no_pictures else draw(result, scene, Path(args.out))
+    pictures = []
+    if not args.no_pictures:
+        from ..pictures import draw  # with the plotting library
+
+        pictures = draw(result, scene, Path(args.out))
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms")})
         return 0
@@ -43,6 +45,8 @@ def run(args: Namespace) -> int:
 
 
 def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
+    from tqdm import tqdm
+
     return iter(tqdm(messages, total=total, unit="msg", desc="replay", disable=None, mininterval=0.2))
 
 

@@ -6,9 +6,6 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ..io.session import write_session
-from ..rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
-from ..truth import FILE_NAME
 from .common import add_scene, open_scene
 
 ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
@@ -19,20 +16,23 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth")
     parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
-    parser.add_argument("--duration", type=float, default=BUNDLED_DURATION, metavar="S", help="s (default 60)")
+    parser.add_argument("--duration", type=float, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
 
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
+    from ..io.session import write_session
+    from ..rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
+    from ..truth import FILE_NAME
+
     scene, out = open_scene(args.scene), Path(args.out)
-    programme = (
-        random_programme(scene, args.random, args.duration, args.seed) if args.random else bundled(scene)
-    )
+    duration = BUNDLED_DURATION if args.duration is None else args.duration
+    programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     sensors = noise_free() if args.clean else Sensors()
-    print(f"simulating {args.duration:g} s, about as long as that ..", file=sys.stderr)
-    session = record(scene, programme, args.duration, sensors, args.seed)
+    print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
+    session = record(scene, programme, duration, sensors, args.seed)
     notes = {"origin": ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
     write_session(out, session.stamps, session.strokes, session.joints, session.imu, notes)
     session.save_truth(out / FILE_NAME)

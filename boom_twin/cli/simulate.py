@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.simulate import simulate
 from ..errors import UsageError
 from ..records import Array
 from ..scene import Scene
-from ..scene.kinematics import posture_angles, strokes_of_posture
 from .common import add_scene, open_scene
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
@@ -29,6 +27,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
+    from ..analysis.simulate import simulate
+
     scene = open_scene(args.scene)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
@@ -76,6 +76,8 @@ def _number(path: Path, line: int, row: list[str], header: list[str], place: int
 
 def _angles_near(scene: Scene, posture: str, first: Array) -> Array:
     """Joint angles of the posture, if the first row has its strokes."""
+    from ..scene.kinematics import posture_angles, strokes_of_posture
+
     expected = strokes_of_posture(scene, posture)
     off = np.abs(expected - first)
     if not np.max(off) <= FAR:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..analysis.statics import Equilibrium, statics
 from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..analysis.statics import Equilibrium
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -29,9 +31,10 @@ def numbers(text: str) -> list[float]:
 
 def run(args: Namespace) -> int:
     """Solve and print."""
+    from ..analysis.statics import statics
+
     scene = open_scene(args.scene)
-    strokes = None if args.strokes is None else np.array(args.strokes)
-    found = statics(scene, strokes=strokes, posture=args.posture)
+    found = statics(scene, strokes=args.strokes, posture=args.posture)
     if args.json:
         print_json(as_json(found))
     else:
@@ -61,7 +64,7 @@ def as_text(found: Equilibrium) -> list[str]:
         "joint   stroke m   angle deg   cylinder force kN",
     ]
     for i in range(len(found.strokes)):
-        angle, force = np.degrees(found.joints[i]), 1e-3 * found.cylinder_forces[i]
+        angle, force = math.degrees(found.joints[i]), 1e-3 * found.cylinder_forces[i]
         lines.append(f"{i + 1:5d} {found.strokes[i]:10.4f} {angle:11.3f} {force:+19.3f}")
     frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies) or "none: nothing in this model can vibrate"
     return [*lines, "", f"natural frequencies Hz   {frequencies}"]

@@ -14,6 +14,8 @@ Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.notation`; the in
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .algebra import condense
@@ -36,16 +38,27 @@ BEAM = np.dtype(
 )
 
 
+class Sizes(NamedTuple):
+    """Loop counts of a part, as the row has them: bending, axial, points."""
+
+    bending: int
+    axial: int
+    points: int
+
+
+USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))
+
+
 @inner
-def turn_points(row, psi, z, angles, turn):
+def turn_points(row, sizes, psi, z, angles, turn):
     """Fill turn (P, 4): cosine, sine and their derivatives by the angle, at every point; returns the end's turn."""
     end = 0.0
-    for j in range(row.points + 1):
+    for j in range(sizes.points + 1):
         end = 0.0
-        for k in range(row.bending):
+        for k in range(sizes.bending):
             end += psi[j, k] * z[row.z + k]
         angles[j] = end
-    for j in range(row.points):
+    for j in range(sizes.points):
         turn[j, 0], turn[j, 1], turn[j, 2], turn[j, 3] = 1.0, angles[j], 0.0, 1.0
     cosines(angles, row.finite, turn)
     for j in range(row.finite):
@@ -54,20 +67,20 @@ def turn_points(row, psi, z, angles, turn):
 
 
 @inner
-def beam_shape(row, psi, weights, z, rho, drho, angles, turn):
+def beam_shape(row, sizes, psi, weights, z, rho, drho, angles, turn):
     """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), angles (P+1,), `turn`; returns the end's turn.
 
     `psi` is (P+1, n), `weights` (P+1, P); their last row belongs to the output end.
     """
-    n, stretch = row.bending, 1.0
-    if row.axial:
+    n, stretch = sizes.bending, 1.0
+    if sizes.axial:
         stretch += z[row.z + n]
-    end = turn_points(row, psi, z, angles, turn)
-    for i in range(row.points + 1):
+    end = turn_points(row, sizes, psi, z, angles, turn)
+    for i in range(sizes.points + 1):
         x, y = 0.0, 0.0
         for k in range(n):
             drho[i, k, 0], drho[i, k, 1] = 0.0, 0.0
-        for j in range(row.points):
+        for j in range(sizes.points):
             weight = weights[i, j]
             x += weight * turn[j, 0]
             y += weight * turn[j, 1]
@@ -76,24 +89,24 @@ def beam_shape(row, psi, weights, z, rho, drho, angles, turn):
                 drho[i, k, 0] += dx * psi[j, k]
                 drho[i, k, 1] += dy * psi[j, k]
         rho[i, 0], rho[i, 1] = stretch * x, stretch * y
-        if row.axial:
+        if sizes.axial:
             drho[i, n, 0], drho[i, n, 1] = x, y
     return end
 
 
 @inner
-def place_beam(row, rho, angles, x, y, theta, c, s, position):
+def place_beam(row, sizes, rho, angles, x, y, theta, c, s, position):
     """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
-    for i in range(row.points):
+    for i in range(sizes.points):
         at = row.history + 2 * i
         position[at] = x + c * rho[i, 0] - s * rho[i, 1]
         position[at + 1] = y + s * rho[i, 0] + c * rho[i, 1]
     for i in range(row.rotary):
-        position[row.history + 2 * row.points + i] = theta + angles[i]
+        position[row.history + 2 * sizes.points + i] = theta + angles[i]
 
 
 @inner
-def transfer_beam(row, tables, scratch, z, c, sn, motion, gravity, position, s, p, m, gains, force):
+def transfer_beam(row, sizes, tables, scratch, z, c, sn, motion, gravity, position, s, p, m, gains, force):
     """Carry a cut (s, p) with m slots from the output to the input end, condensing q.
 
     tables : psi, weights, stiffness (n, n), mass (P,), rotary (P,) of this part.
@@ -105,13 +118,13 @@ def transfer_beam(row, tables, scratch, z, c, sn, motion, gravity, position, s, 
     """
     psi, weights, stiffness, mass, rotary = tables
     rho, drho, turn, local, block = scratch
-    n = row.bending
-    size = n + row.axial
+    n = sizes.bending
+    size = n + sizes.axial
     fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
-    _pull_back_end(psi[row.points], rho[row.points], drho[row.points], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
-    _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, gains, block, force)
-    _add_bending_of_forces(row, psi, weights, turn, local, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n], block)
-    _add_stiffness(row, stiffness, z, motion, block, force)
+    _pull_back_end(psi[sizes.points], rho[sizes.points], drho[sizes.points], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
+    _add_points(row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, gains, block, force)
+    _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n], block)
+    _add_stiffness(row, sizes, stiffness, z, motion, block, force)
     return condense(s, p, gains, block, force, m, size)
 
 
@@ -142,15 +155,15 @@ def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, bl
 
 
 @inner
-def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force):
+def _add_points(row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force):
     """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`.
 
     Into s only below its diagonal.
     """
-    n = row.bending
-    size = n + row.axial
+    n = sizes.bending
+    size = n + sizes.axial
     total, fx_all, fy_all, moment, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(row.points):
+    for i in range(sizes.points):
         at = row.history + 2 * i
         inertial = mass[i] * motion.gain
         fx = inertial * (position[at] - motion.hat[at]) - mass[i] * gravity[0]
@@ -175,7 +188,7 @@ def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, posit
             for b in range(a + 1):
                 block[a, b] += mx * drho[i, b, 0] + my * drho[i, b, 1]
     for i in range(row.rotary):
-        at = row.history + 2 * row.points + i
+        at = row.history + 2 * sizes.points + i
         inertial = rotary[i] * motion.gain
         torque = inertial * (position[at] - motion.hat[at])
         moment += torque
@@ -197,9 +210,9 @@ def _add_points(row, psi, rho, drho, mass, rotary, c, sn, motion, gravity, posit
 
 
 @inner
-def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stretch, block):
+def _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx_end, fy_end, stretch, block):
     """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
-    n, points = row.bending, row.points
+    n, points = sizes.bending, sizes.points
     for j in range(points):
         fx, fy = weights[points, j] * fx_end, weights[points, j] * fy_end
         for i in range(points):
@@ -212,21 +225,21 @@ def _add_bending_of_forces(row, psi, weights, turn, local, fx_end, fy_end, stret
                 for b in range(a + 1):
                     block[a, b] -= share * psi[j, b]
         across = fx * turn[j, 2] + fy * turn[j, 3]
-        for a in range(n * row.axial):
+        for a in range(n * sizes.axial):
             block[n, a] += across * psi[j, a]
 
 
 @inner
-def _add_stiffness(row, stiffness, z, motion, block, force):
+def _add_stiffness(row, sizes, stiffness, z, motion, block, force):
     """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
-    n = row.bending
+    n = sizes.bending
     lead = 1.0 + row.beta * motion.rate
     for a in range(n):
         for b in range(n):
             force[a] += stiffness[a, b] * z[row.z + b]
         for b in range(a + 1):
             block[a, b] += lead * stiffness[a, b]
-    if row.axial:
+    if sizes.axial:
         force[n] += row.axial_stiffness * z[row.z + n]
         block[n, n] += lead * row.axial_stiffness
     for b in range(row.damped):

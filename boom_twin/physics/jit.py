@@ -18,7 +18,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FOLDERS = ("physics", "chain", "estimate")
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 
 
 def _source_hash() -> str:
@@ -49,8 +49,27 @@ def _numba() -> Any:
     return numba
 
 
+def _cache(function: Callable[..., Any]) -> Any:
+    """A cache on disk that loads compiled code without first filling numba's tables of types and of BLAS.
+
+    Filling them takes 0.25 s, most of it an import of scipy.linalg, and only compiling needs them: it fills them itself.
+    """
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime import rtsys
+
+    class Quick(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)  # the symbols that loaded code refers to
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+
+    return Quick(function)
+
+
 class Kernel:
     """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""
+
+    _cached = True
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)
@@ -59,7 +78,10 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """numba's object, made on first use."""
-        return _numba().njit(**OPTIONS, **self._options)(self.py_func)
+        dispatcher = _numba().njit(**OPTIONS, **self._options)(self.py_func)
+        if self._cached and hasattr(dispatcher, "enable_caching"):  # not where numba is told not to compile
+            dispatcher._cache = _cache(self.py_func)
+        return dispatcher
 
     @property
     def _numba_type_(self) -> Any:
@@ -72,6 +94,8 @@ class Kernel:
 
 class Inner(Kernel):
     """A kernel that exists compiled only inside others; called from Python it runs as Python."""
+
+    _cached = False
 
     def __call__(self, *arguments: Any) -> Any:
         return self.py_func(*arguments)

@@ -9,6 +9,8 @@ B:  E = Rot(phi) (ex, ey); Q = intersection, left of D->E, of the circles (D, lL
     B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
     B3's R from Q towards E.
 
+Plain Python calls these with arrays of angles too, under np.errstate(invalid="ignore") where links may not close.
+
 length = |R - C|.  Derivatives follow from (Q-D).dQ = 0 and (Q-E).(dQ-dE) = 0.
 """
 
@@ -41,10 +43,7 @@ def joint_pin(dx, dy, ex, ey, length_l, length_r):
     vx, vy = ex - dx, ey - dy
     distance2 = vx * vx + vy * vy
     foot = (length_l * length_l - length_r * length_r + distance2) / (2.0 * distance2)
-    height2 = length_l * length_l / distance2 - foot * foot
-    if not height2 >= 0.0:
-        return math.nan, math.nan
-    height = math.sqrt(height2)
+    height = np.sqrt(length_l * length_l / distance2 - foot * foot)
     return dx + foot * vx - height * vy, dy + foot * vy + height * vx
 
 
@@ -53,7 +52,7 @@ def link_angles(row, phi):
     """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
     ex, ey = turned(phi, row.ex, row.ey)
     qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
-    return math.atan2(qy - row.dy, qx - row.dx), math.atan2(qy - ey, qx - ex)
+    return np.arctan2(qy - row.dy, qx - row.dx), np.arctan2(qy - ey, qx - ex)
 
 
 @inner
@@ -81,7 +80,7 @@ def cylinder_length(row, phi):
             rate_r = (ux * (dqy - ex) - uy * (dqx + ey)) / row.length_r
             drx, dry = -ey - rate_r * (ry - ey), ex + rate_r * (rx - ex)
     px, py = rx - row.cx, ry - row.cy
-    length = math.hypot(px, py)
+    length = np.hypot(px, py)
     return length, (px * drx + py * dry) / length
 
 

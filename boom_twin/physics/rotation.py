@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .jit import inner
 
 SMALL = 0.5  # rad; up to here the series below are exact to rounding
@@ -12,7 +14,7 @@ SMALL = 0.5  # rad; up to here the series below are exact to rounding
 @inner
 def turned(angle, x, y):
     """Vector (x, y) turned by `angle` (rad)."""
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = np.cos(angle), np.sin(angle)
     return c * x - s * y, s * x + c * y
 
 

@@ -8,15 +8,20 @@ from .motion import Move, Programme
 from .programmes import BUNDLED_DURATION, bundled, random_programme
 from .sensors import Sensors, noise_free
 from .session import Session, observe, record
-from .solve import simulate, statics
+from .solve import at_rest, move, simulate, statics
+from .stepping import Effort, Scheme
 
 __all__ = [
     "BUNDLED_DURATION",
+    "Effort",
     "Move",
     "Programme",
+    "Scheme",
     "Sensors",
     "Session",
+    "at_rest",
     "bundled",
+    "move",
     "noise_free",
     "observe",
     "random_programme",

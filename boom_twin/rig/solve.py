@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,16 +13,12 @@ from ..scene.parts import Scene
 from .assembly import section_frames
 from .equilibrium import find_equilibrium
 from .exudyn_boom import build
-from .peer import exudyn
-from .probes import attach, read
+from .probes import Probes, attach, read
+from .stepping import Effort, Scheme, step_through
 from .system import Boom
 
 Drive = Callable[[Array], tuple[Array, Array]]
 """Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s."""
-
-SPECTRAL_RADIUS = 0.8
-TOLERANCE = 1e-6  # relative, of a step; Exudyn's rounding allows no less
-STEP_FORCE = 1e-6  # N, absolute, of a step
 
 
 def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
@@ -72,63 +66,45 @@ def simulate(
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
         ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``; each of shape (rows,).
     """
+    first = drive(np.zeros(1))[0][0]
+    return move(at_rest(scene, first, elements), drive, t_end, step, output_step)[0]
+
+
+@dataclass(frozen=True)
+class Resting:
+    """A boom in equilibrium, which may be moved from there any number of times; cylinder forces (n,) in N."""
+
+    boom: Boom
+    probes: Probes
+    forces: Array
+
+
+def at_rest(scene: Scene, strokes: Array, elements: int) -> Resting:
+    """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest."""
+    boom = build(scene, strokes, elements)
+    probes = attach(boom)
+    settle(boom, strokes)
+    return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])
+
+
+def move(
+    resting: Resting, drive: Drive, t_end: float, step: float, output_step: float, scheme: Scheme | None = None
+) -> tuple[dict[str, Array], Effort]:
+    """`simulate` from a boom at rest by a chosen scheme, and what its stepping took."""
     every = _ratio("output_step", output_step, step)
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
     strokes, rates = drive(times)
-    boom = build(scene, strokes[0], elements)
-    probes = attach(boom)
-    settle(boom, strokes[0])
-    rest = read(boom, probes, at_rest=True)["forces"][-1]
-    _feed(boom, strokes, rates, step)
-    _run(boom, count, step, output_step)
-    found = read(boom, probes, at_rest=False)
-    found["forces"][0] = rest  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
-    return _columns(found, strokes[::every], times[::every])
+    effort = step_through(resting.boom, strokes, rates, step, output_step, scheme or Scheme())
+    found = read(resting.boom, resting.probes, at_rest=False)
+    found["forces"][0] = resting.forces  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
+    return _columns(found, strokes[::every], times[::every]), effort
 
 
 def settle(boom: Boom, strokes: Array) -> None:
     """Assemble the boom and bring it to its equilibrium; it is the start of what follows."""
     boom.system.Assemble()
     find_equilibrium(boom.system, f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m")
-
-
-def _run(boom: Boom, count: int, step: float, output_step: float) -> None:
-    settings = exudyn.SimulationSettings()
-    settings.solution.file.write = False
-    settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
-    settings.solution.sensors.writePeriod = output_step
-    scheme = settings.timeIntegration
-    scheme.numberOfSteps, scheme.endTime = count, count * step
-    scheme.adaptiveStep = scheme.automaticStepSize = False
-    scheme.verboseMode = 0
-    scheme.newton.relativeTolerance, scheme.newton.absoluteTolerance = TOLERANCE, STEP_FORCE
-    scheme.newton.useModifiedNewton = True
-    scheme.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
-    scheme.generalizedAlpha.computeInitialAccelerations = False  # at rest they are zero
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            boom.system.SolveDynamic(settings)
-    except exudyn.SolverError as failure:
-        raise SolverError(
-            f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
-        ) from failure
-
-
-def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> None:
-    """Before every step, hand the drives their lengths and rates at its end."""
-    closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
-    lengths, speeds = (strokes + closed).tolist(), rates.tolist()
-
-    def before_step(system: Any, time: float) -> bool:
-        row = round(time / step)
-        for i, (drive, name) in enumerate(boom.drives):
-            system.SetObjectParameter(drive, name, lengths[row][i])
-            if name == "referenceLength":
-                system.SetObjectParameter(drive, "velocityOffset", speeds[row][i])
-        return True
-
-    boom.system.SetPreStepUserFunction(before_step)
 
 
 def _ratio(name: str, whole: float, step: float) -> int:

@@ -47,7 +47,8 @@ def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.rec
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
     """Strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
     row, closed = linkage(scene, index), scene.joints[index].cylinder.closed_length
-    return np.array([cylinder_length(row, float(phi))[0] - closed for phi in np.atleast_1d(angles)])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(cylinder_length(row, np.atleast_1d(angles))[0] - closed)
 
 
 def posture_angles(scene: Scene, name: str) -> Array:

@@ -38,7 +38,8 @@ def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Iterator[Findi
     """The cylinder's length over range_deg."""
     low, high = joint.range_deg
     degrees = np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
-    lengths = np.array([cylinder_length(row, phi)[0] for phi in np.radians(degrees)])
+    with np.errstate(invalid="ignore"):
+        lengths = cylinder_length(row, np.radians(degrees))[0]
     closed = np.isfinite(lengths)
     yield from _closing(draft, i, joint, degrees, closed)
     if closed.any():
@@ -132,7 +133,8 @@ def _posture(
         yield wrong(draft, place, value, bound, remedy)
     elif row is not None:
         most = joint.cylinder.max_stroke
-        stroke = cylinder_length(row, math.radians(degrees))[0] - joint.cylinder.closed_length
+        with np.errstate(invalid="ignore"):
+            stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
         if math.isnan(stroke):
             yield wrong(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
         elif not -TOLERANCE <= stroke <= most + TOLERANCE:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ HALVINGS = 4
 RISE = 1.5  # s
 DURATION = 4.0  # s
 SAMPLES = 181  # of a joint's range
+T = TypeVar("T", float, Array)
 
 
 @dataclass(frozen=True)
@@ -53,14 +55,14 @@ class Motion:
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
-        x = np.clip(np.asarray(times, float) / self.rise, 0.0, 1.0)
-        place, rate = x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * (x * (1.0 - x)) ** 2 / self.rise
-        return self.first + np.outer(place, self.travel), np.outer(rate, self.travel)
+        x = np.clip(np.asarray(times, float) / self.rise, 0.0, 1.0)[:, None]
+        place, rate, _ = _quintic(x)
+        return self.first + place * self.travel, rate / self.rise * self.travel
 
-    def accelerations(self, times: Array) -> Array:
-        """Second derivatives of the strokes (m/s^2), shape (m, n)."""
-        x = np.clip(np.asarray(times, float) / self.rise, 0.0, 1.0)
-        return np.outer(60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / self.rise**2, self.travel)
+    def at(self, time: float) -> tuple[Array, Array, Array]:
+        """Strokes (m), rates (m/s) and accelerations (m/s^2), each (n,), at one `time` (s)."""
+        place, rate, bend = _quintic(min(max(time / self.rise, 0.0), 1.0))
+        return self.first + place * self.travel, rate / self.rise * self.travel, bend / self.rise**2 * self.travel
 
 
 def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Motion:
@@ -92,6 +94,12 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     more = ", .." if np.count_nonzero(travel) > 6 else ""
     label = f"from rest in {start}: {far}{more} in {RISE:g} s, {duration:g} s in all"
     return Motion(label, angles, first, travel, RISE, duration)
+
+
+def _quintic(x: T) -> tuple[T, T, T]:
+    """From 0 to 1 over x in [0, 1] with two derivatives, which vanish at both ends."""
+    y = 1.0 - x
+    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x)
 
 
 @lru_cache(maxsize=1)

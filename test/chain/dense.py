@@ -10,8 +10,18 @@ import numpy as np
 
 from boom_twin.chain.place import place
 from boom_twin.chain.program import JOINT_B
+from boom_twin.chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 NUDGE = 1e-5  # rad
+
+
+def riccati_pass(plan, state, work, motion, drive, drive_rate):
+    """One pass of the sweeps over the whole boom: increments into `work.dz`."""
+    end = np.int64(len(plan.tables.operations))
+    clear_cut(work, FREE)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, drive_rate, ROOT, end, FREE)
+    sweep_out(plan.tables, state, work, ROOT, end, FREE)
+    return status
 
 
 class Dense:
@@ -53,7 +63,8 @@ class Dense:
             places = slice(beam.z, beam.z + beam.bending)
             lead = z + beam.beta * rates[: len(z)] * (beam.damped > 0)
             total[places] += t.stiffness[row, : beam.bending, : beam.bending] @ lead[places]
-            total[beam.z + beam.bending] += beam.axial_stiffness * lead[beam.z + beam.bending]
+            if beam.axial:
+                total[beam.z + beam.bending] += beam.axial_stiffness * lead[beam.z + beam.bending]
         for k, joint in enumerate(t.joints[1:]):
             total[joint.z + 3 : joint.z + 5] = at[histories + 2 * k : histories + 2 * k + 2]
         for i, cylinder in enumerate(t.cylinders):

@@ -6,17 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from chain.dense import Dense
+from chain.dense import Dense, riccati_pass
 from oracle import booms
 
 from boom_twin.analysis.posture import set_undeformed
 from boom_twin.analysis.statics import settle
-from boom_twin.chain.newton import NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, newton
 from boom_twin.chain.place import place
+from boom_twin.chain.plain import new_product
 from boom_twin.chain.program import Motion
-from boom_twin.chain.step import advance, motion_at_rest, rest
-from boom_twin.chain.sweep import sweep_in, sweep_out
-from boom_twin.physics.integrators import generalised_alpha
+from boom_twin.chain.status import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR
+from boom_twin.chain.step import advance
+from boom_twin.physics.integrators import GENERALISED_ALPHA, REST, A, X, prepare
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
@@ -35,6 +35,28 @@ def boom_beside_equilibrium(scene, posture, seed=0, size=2e-3):
     return plan, state, work, still
 
 
+
+
+@pytest.mark.parametrize("name, seed", [("default", None), ("boom 4", 4), ("boom 8", 8)])
+def test_plain_product_solves_the_same_step(name, seed):
+    """A long step, where the product still has digits: the same increments as the Riccati form; a short one says it has not."""
+    scene, posture = (load_scene(), "arch") if seed is None else (booms.random_boom(seed), "test")
+    plan = compile_scene(scene)
+    drive, still = plan.closed_lengths + strokes_of_posture(scene, posture), np.zeros(plan.joints)
+    ends = []
+    for product in (None, new_product(plan.tables)):
+        state, work = plan.state(), plan.work()
+        settle(plan, state, work, drive - plan.closed_lengths, posture_angles(scene, posture))
+        scheme = prepare(GENERALISED_ALPHA, 0.8, 0.02, work.weights)
+        for k in range(5):
+            moved = drive + 1e-4 * (k + 1)
+            status, _, _ = advance(plan.tables, state, work, scheme, moved, still, 1e-7, np.int64(20), 0.5, product)
+            assert status == OK
+        ends.append(state.history[X, plan.tables.tip : plan.tables.tip + 2].copy())
+    assert ends[1] == pytest.approx(ends[0], abs=1e-7)
+    scheme = prepare(GENERALISED_ALPHA, 0.8, 1e-6, work.weights)
+    status, _, _ = advance(plan.tables, state, work, scheme, moved, still, 1e-7, np.int64(20), 0.5, product)
+    assert status in (DIGITS_LOST, NOT_CONVERGED, SINGULAR, NOT_FINITE)
 
 
 def rod_pin_outboard_of_c():
@@ -63,8 +85,7 @@ def test_increments_solve_the_equations_of_all_unknowns_at_once(scene, posture, 
         plan, state, work, rested = boom_beside_equilibrium(scene, posture, size=size)
         motion, still = Motion(gain, rate, rested, -rate * rested), np.zeros(plan.joints)
         z = state.z.copy()
-        sweep_in(plan.tables, state, work, motion, plan.closed_lengths + drive, still)
-        sweep_out(plan.tables, state, work)
+        riccati_pass(plan, state, work, motion, plan.closed_lengths + drive, still)
         left.append(Dense(plan, motion, plan.closed_lengths + drive, still).left_by(z, work.dz))
     (far, before), (near, _) = left
     moving = plan.tables.moving > 0
@@ -78,9 +99,10 @@ def test_newton_converges_quadratically(scene, posture):
     """A tangent with any term missing or wrong in sign converges linearly at best."""
     plan, state, work, _ = boom_beside_equilibrium(scene, posture, seed=3)
     drive, still = plan.closed_lengths + strokes_of_posture(scene, posture), np.zeros(plan.joints)
-    motion, sizes = motion_at_rest(len(plan.masses)), []
+    scheme, sizes = prepare(REST, 0.0, 0.0, work.weights), []
+    state.history[X, : len(state.z)] = state.z
     for _ in range(6):
-        _, _, size = newton(plan.tables, state, work, motion, drive, still, 0.0, 1, 10.0)
+        _, _, size = advance(plan.tables, state, work, scheme, drive, still, 0.0, np.int64(1), 10.0, None)
         sizes.append(size)
     factors = [b / a**2 for a, b in pairwise(sizes) if b > 1e-11]
     assert sizes[-1] < 1e-12 and len(factors) >= 1
@@ -91,7 +113,7 @@ def test_newton_converges_quadratically(scene, posture):
 def test_condensed_tangent_is_symmetric(scene, posture):
     plan, state, work, rested = boom_beside_equilibrium(scene, posture)
     motion = Motion(1e5, 500.0, rested, -500.0 * rested)
-    sweep_in(plan.tables, state, work, motion, plan.closed_lengths, np.zeros(plan.joints))
+    riccati_pass(plan, state, work, motion, plan.closed_lengths, np.zeros(plan.joints))
     for index in range(plan.joints):
         block = work.blocks[index]
         assert block == pytest.approx(block.T, rel=1e-9, abs=1e-9 * np.abs(block).max())
@@ -102,18 +124,17 @@ def rested():
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes_of_posture(scene, "arch"), posture_angles(scene, "arch"))
-    rest(state, work)
     return plan, state, work, plan.closed_lengths + strokes_of_posture(scene, "arch")
 
 
 def test_equilibrium_stays_where_it_is():
     plan, state, work, drive = rested()
-    before, scheme = state.history[:, 0].copy(), generalised_alpha(1e-3, 0.8)
+    before, scheme = state.history[X].copy(), prepare(GENERALISED_ALPHA, 0.8, 1e-3, work.weights)
     for _ in range(200):
-        advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(20))
+        advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(20), 0.5, None)
     moving = np.append(plan.tables.moving > 0, np.ones(len(before) - len(plan.names), bool))
-    assert state.history[moving, 0] == pytest.approx(before[moving], abs=1e-11)
-    assert np.abs(state.history[len(plan.names) :, 2]).max() < 1e-4
+    assert state.history[X, moving] == pytest.approx(before[moving], abs=1e-11)
+    assert np.abs(state.history[A, len(plan.names) :]).max() < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -122,8 +143,8 @@ def test_equilibrium_stays_where_it_is():
 )
 def test_failed_step_says_so_and_leaves_the_histories(drive, passes, expected):
     plan, state, work, _ = rested()
-    before, scheme = state.history.copy(), generalised_alpha(1e-3, 0.8)
-    status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(passes))
+    before, scheme = state.history.copy(), prepare(GENERALISED_ALPHA, 0.8, 1e-3, work.weights)
+    status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-9, np.int64(passes), 0.5, None)
     assert status == expected
     assert np.array_equal(state.history, before)
 
@@ -137,7 +158,7 @@ def test_massless_boom_without_stiffness_is_singular():
     plan = compile_scene(booms.scene_of(spec))
     state, work = plan.state(), plan.work()
     set_undeformed(plan, state, np.zeros(1))
-    drive, motion = np.array([1.2]), motion_at_rest(len(plan.masses))
-    status, _, _ = newton(plan.tables, state, work, motion, drive, np.zeros(1), 1e-9, np.int64(20), 0.1)
+    drive, scheme = np.array([1.2]), prepare(REST, 0.0, 0.0, work.weights)
+    status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(1), 1e-9, np.int64(20), 0.1, None)
     assert status in (SINGULAR, NOT_FINITE)
     assert status != OK

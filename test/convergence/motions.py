@@ -6,7 +6,8 @@ import numpy as np
 
 from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
 from boom_twin.analysis.statics import settle
-from boom_twin.chain.step import observe, rest, run
+from boom_twin.chain.step import observe, run
+from boom_twin.physics.integrators import GENERALISED_ALPHA
 from boom_twin.plan.compile import compile_scene
 
 
@@ -32,12 +33,13 @@ def follow(scene, drive, angles, step, count, every=1, rho=RHO):
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    rest(state, work)
     rows = np.empty((count // every + 1, 2 * plan.joints + 9))
     observe(plan.tables, state, rows[0])
     times = step * np.arange(1, count + 1)[:, None]
     lengths, rates, _ = drive(times)
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, _, _ = run(plan.tables, state, work, steps, counts, lengths, rates, rho, TOLERANCE, PASSES, rows[1:])
+    status, _, _ = run(
+        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
+    )
     assert status == 0
     return rows

@@ -9,8 +9,8 @@ from oracle import booms, energy, segments
 
 from boom_twin.analysis.simulate import PASSES, TOLERANCE
 from boom_twin.analysis.statics import settle
-from boom_twin.chain.step import advance, rest
-from boom_twin.physics.integrators import generalised_alpha
+from boom_twin.chain.step import LONGEST_INCREMENT, advance
+from boom_twin.physics.integrators import GENERALISED_ALPHA, prepare
 from boom_twin.plan.compile import compile_scene
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
@@ -23,12 +23,13 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
     angles = np.diff(np.radians(scene.postures[posture]), prepend=0.0)
     drive = motions.smooth_drive(segments.Segments(scene, 0).lengths(angles), travel, 0.5)
     settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    rest(state, work)
-    scheme, start = generalised_alpha(step, rho), energy.total(plan, state, drive(0.0)[0])
+    scheme, start = prepare(GENERALISED_ALPHA, rho, step, work.weights), energy.total(plan, state, drive(0.0)[0])
     powers, gaps, done, lost = [(0.0, 0.0)], [], 0.0, 0.0
     for k in range(1, round(duration / step) + 1):
         length, rate, _ = drive(k * step)
-        status, _, _ = advance(plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES)
+        status, _, _ = advance(
+            plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None
+        )
         assert status == 0
         powers.append((energy.power_of_drives(plan, state, rate), energy.dissipation(plan, state, rate)))
         done += 0.5 * step * (powers[-1][0] + powers[-2][0])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from . import segments
 from .segments import Segments, cylinder_forces, equilibrium
 
 
@@ -33,7 +34,7 @@ class Lagrange:
         """Accelerations, multipliers of the incompressible cylinders, and the boom."""
         length, rate, bend = self.drive(time)
         boom = self.model.place(q)
-        energy, constraints = self.model.energy(boom, length)
+        energy, constraints = segments.energy(self.model, boom, length)
         n, closures = len(q), len(boom.closures)
         rows, turning = [], []
         for m in boom.masses:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle.jets import coordinates, cos, sin
 
 from boom_twin.chain.program import Motion
+from boom_twin.peers.jets import coordinates, cos, sin
 from boom_twin.physics import algebra, beam, cylinder, modes, rigid
+from boom_twin.physics.rotation import turned
 
 GRAVITY = np.array([0.7, -9.5])
 GAIN, RATE = 3.0e3, 90.0
@@ -99,11 +100,14 @@ def test_cylinder_law_with_damping():
 COUNT, POINTS = 3, 5
 
 
-def beam_row(beta):
+def beam_row(beta, finite=POINTS):
     rows = np.zeros(1, beam.BEAM).view(np.recarray)
     size = COUNT + 1
-    rows[0] = (0, COUNT, 1, POINTS, POINTS, size if beta else 0, size, beta, 6.0e4)
+    rows[0] = (0, COUNT, 1, POINTS, finite, POINTS, size if beta else 0, size, beta, 6.0e4)
     return rows[0]
+
+
+SIZES = beam.Sizes(COUNT, 1, POINTS)
 
 
 BASIS = modes.end_shapes_and_bubbles(COUNT, POINTS)
@@ -124,33 +128,33 @@ BEAM_Z = np.array([0.2, -0.1, 0.6, 0.10, -0.15, 0.05, 0.02])  # x, y, theta of t
 def placed(z, row):
     """End position (3,) and all histories for input end z[:3] and coordinates z[3:]."""
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
-    turn, position = np.zeros((POINTS, 2)), np.zeros(COUNT + 1 + 3 * POINTS)
-    angle = beam.beam_shape(row, BASIS.psi, TABLES[1], z[3:], rho, drho, turn)
+    turn, angles, position = np.zeros((POINTS, 4)), np.zeros(POINTS + 1), np.zeros(COUNT + 1 + 3 * POINTS)
+    angle = beam.beam_shape(row, SIZES, BASIS.psi, TABLES[1], z[3:], rho, drho, angles, turn)
     c, s = np.cos(z[2]), np.sin(z[2])
-    beam.place_beam(row, BASIS.psi, rho, z[3:], *z[:3], c, s, position)
+    beam.place_beam(row, SIZES, rho, angles, *z[:3], c, s, position)
     end = z[:2] + np.array([[c, -s], [s, c]]) @ rho[-1]
     scratch = rho, drho, turn, np.zeros((POINTS, 2)), np.zeros((COUNT + 1, COUNT + 1))
     return np.append(end, z[2] + angle), position, scratch
 
 
 def swept(z, row):
-    """Cut at the input end and gains, with two carried slots and the outboard side linearised at END_AT."""
+    """Cut at the input end and gains, with two carried slots and the outboard side linearised where the end is."""
     _, position, scratch = placed(z, row)
     s, p, gains, free = END_STIFFNESS.copy(), END_FORCE.copy(), np.zeros((COUNT + 1, 5)), np.zeros(COUNT + 1)
     motion, turn = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS), (np.cos(z[2]), np.sin(z[2]))
-    beam.transfer_beam(row, TABLES, scratch, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5), gains, free)
+    beam.transfer_beam(row, SIZES, TABLES, scratch, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5), gains, free)
     return s, p, free, gains
-
-
-END_AT, _, _ = placed(BEAM_Z, beam_row(0.0))
 
 
 def beam_potential(row):
     """Jet over (input end, two carried slots, q): positions by the integral in the head of `physics.beam`."""
     z = coordinates(np.concatenate([BEAM_Z[:3], np.zeros(2), BEAM_Z[3:]]))
     x, y, theta, carried, q, eps = z[0], z[1], z[2], z[3:5], z[5:-1], z[-1]
-    angles = [sum((shape * a for shape, a in zip(psi, q, strict=True)), theta) for psi in BASIS.psi]
+    bends = [sum((shape * a for shape, a in zip(psi, q, strict=True)), 0.0) for psi in BASIS.psi]
+    angles, co, si = [theta + bend for bend in bends], cos(theta), sin(theta)
     c, s = [cos(a) for a in angles[:-1]], [sin(a) for a in angles[:-1]]
+    if row.finite == 0:  # the turn's cosine and sine are 1 and the angle itself
+        c, s = [co - si * bend for bend in bends[:-1]], [si + co * bend for bend in bends[:-1]]
     places = []
     for weights in TABLES[1]:
         along, across = (sum((w * v for w, v in zip(weights, values, strict=True)), 0.0) for values in (c, s))
@@ -166,7 +170,7 @@ def beam_potential(row):
             total = total + 0.5 * GAIN * mass * ((at - float(hat)) * (at - float(hat)))
         total = total - TABLES[3][i] * (GRAVITY[0] * places[i][0] + GRAVITY[1] * places[i][1])
     cut = [*places[-1], angles[-1], *carried]
-    away = [at - float(now) for at, now in zip(cut, np.append(END_AT, np.zeros(2)), strict=True)]
+    away = [at - float(now) for at, now in zip(cut, np.append(placed(BEAM_Z, row)[0], np.zeros(2)), strict=True)]
     for i, a in enumerate(away):
         total = total + END_FORCE[i] * a
         for j, b in enumerate(away):
@@ -174,9 +178,9 @@ def beam_potential(row):
     return total
 
 
-def dense(beta):
+def dense(row):
     """Gradient and tangent of the beam with its outboard side, over (input end, carried slots, q)."""
-    row = beam_row(beta)
+    beta = row.beta
     energy = beam_potential(row)
     g, h = energy.g, energy.h
     rate = RATE * BEAM_Z[3:] + BEAM_OFFSETS[: COUNT + 1]
@@ -186,10 +190,11 @@ def dense(beta):
     return g, h
 
 
-@pytest.mark.parametrize("beta", [0.0, 2e-3])
-def test_beam_condenses_the_hessian_of_its_energy(beta):
-    g, h = dense(beta)
-    s, p, gain, gains = swept(BEAM_Z, beam_row(beta))
+@pytest.mark.parametrize("beta, finite", [(0.0, POINTS), (2e-3, POINTS), (0.0, 0)])
+def test_beam_condenses_the_hessian_of_its_energy(beta, finite):
+    row = beam_row(beta, finite)
+    g, h = dense(row)
+    s, p, gain, gains = swept(BEAM_Z, row)
     inner = np.linalg.solve(h[5:, 5:], np.column_stack([h[5:, :5], g[5:]]))
     assert s == pytest.approx(h[:5, :5] - h[:5, 5:] @ inner[:, :5], rel=1e-9, abs=1e-11 * np.abs(h).max())
     assert p == pytest.approx(g[:5] - h[:5, 5:] @ inner[:, 5], rel=1e-9, abs=1e-11 * np.abs(g).max())
@@ -197,8 +202,9 @@ def test_beam_condenses_the_hessian_of_its_energy(beta):
     assert gain == pytest.approx(inner[:, 5], rel=1e-9, abs=1e-11 * np.abs(inner[:, 5]).max())
 
 
-def test_beam_shape_derivatives():
-    row = beam_row(0.0)
+@pytest.mark.parametrize("finite", [POINTS, 0])
+def test_beam_shape_derivatives(finite):
+    row = beam_row(0.0, finite)
     drho = placed(BEAM_Z, row)[2][1]
     expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2][0], BEAM_Z[3:])
     assert drho == pytest.approx(np.moveaxis(expected, -1, 1), abs=1e-8)
@@ -211,7 +217,7 @@ def test_body_forces_and_tangent():
     hat, arm, mass, inertia = np.array([0.3, -0.2, 0.1]), np.array([0.4, 0.25]), 12.0, 0.8
 
     def place(e):
-        return e + np.append(rigid.turned_by(e[2], *arm), 0.0)
+        return e + np.append(turned(e[2], *arm), 0.0)
 
     def potential(e):
         at = place(e)
@@ -238,15 +244,15 @@ def test_outlet_and_offset(slots):
     force, outlet, offset, theta = rng.normal(size=slots), (0.6, -0.3), (1.2, 0.1), 0.4
 
     def potential(w):
-        end = w[:2] + rigid.turned_by(theta + w[2], *offset) - np.array(rigid.turned_by(theta, *offset))
-        pin = w[:2] + rigid.turned_by(theta + w[2], *outlet) - np.array(rigid.turned_by(theta, *outlet))
+        end = w[:2] + turned(theta + w[2], *offset) - np.array(turned(theta, *offset))
+        pin = w[:2] + turned(theta + w[2], *outlet) - np.array(turned(theta, *outlet))
         increments = np.concatenate([end, w[2:3], pin, w[3:]])
         return force @ increments + 0.5 * increments @ stiffness @ increments
 
     s, p = np.zeros((6, 6)), np.zeros(6)
     s[:slots, :slots], p[:slots] = stiffness, force
-    rigid.pull_back(s, p, slots, 0, 1, *rigid.turned_by(theta, *offset))
-    m = rigid.merge_outlet(s, p, slots, *rigid.turned_by(theta, *outlet))
+    rigid.pull_back(s, p, slots, 0, 1, *turned(theta, *offset))
+    m = rigid.merge_outlet(s, p, slots, *turned(theta, *outlet))
     zero = np.zeros(slots - 2)
     assert m == slots - 2
     assert p[:m] == pytest.approx(gradient(potential, zero), abs=1e-8)

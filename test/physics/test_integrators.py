@@ -1,73 +1,152 @@
-"""Generalised-alpha: its coefficients against the published ones, its order, and its damping of high frequencies."""
+"""Time integrators: published coefficients, defining equations, order, damping of high frequencies."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from boom_twin.physics.integrators import finish_step, generalised_alpha, start_step
+from boom_twin.physics.integrators import (
+    GENERALISED_ALPHA,
+    HAT,
+    HOUBOLT,
+    NEWMARK,
+    OFFSET,
+    OLD,
+    PARK,
+    REST,
+    WILSON,
+    A,
+    P,
+    V,
+    X,
+    depth_of,
+    finish_step,
+    new_weights,
+    prepare,
+    start_step,
+)
 
 RHOS = [0.0, 0.3, 0.8, 1.0]
+SCHEMES = [(GENERALISED_ALPHA, rho) for rho in RHOS] + [(NEWMARK, 0.5), (WILSON, 1.4), (HOUBOLT, 0.0), (PARK, 0.0)]
+
+
+def scheme_of(family, parameter, step):
+    return prepare(family, parameter, step, new_weights(depth_of(family)))
+
+
+def published(rho):
+    """am, af, gamma, beta of Chung and Hulbert 1993, equations 25, 17, 20."""
+    am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+    return am, af, 0.5 - am + af, 0.25 * (1 - am + af) ** 2
 
 
 @pytest.mark.parametrize("rho", RHOS)
-def test_coefficients(rho):
-    """Chung and Hulbert 1993, equations 25 (am, af) and 17, 20 (gamma, beta)."""
-    s = generalised_alpha(0.01, rho)
-    assert s.am == pytest.approx((2 * rho - 1) / (rho + 1))
-    assert s.af == pytest.approx(rho / (rho + 1))
-    assert s.gamma == pytest.approx(0.5 - s.am + s.af)
-    assert s.beta == pytest.approx(0.25 * (1 - s.am + s.af) ** 2)
-    assert s.gain == pytest.approx((1 - s.am) / ((1 - s.af) * s.beta * 1e-4))
-    assert s.rate == pytest.approx(s.gamma / (s.beta * 0.01))
+def test_gain_and_rate(rho):
+    am, af, gamma, beta = published(rho)
+    s = scheme_of(GENERALISED_ALPHA, rho, 0.01)
+    assert s.gain == pytest.approx((1 - am) / ((1 - af) * beta * 1e-4))
+    assert s.rate == pytest.approx(gamma / (beta * 0.01))
 
 
 @pytest.mark.parametrize("rho", RHOS)
 def test_a_step_satisfies_the_defining_equations(rho):
     h, rng = 0.02, np.random.default_rng(1)
-    s, history = generalised_alpha(h, rho), rng.normal(size=(5, 4))
-    x, v, a, p = history.T.copy()
-    hat, offset, new = np.zeros(5), np.zeros(5), rng.normal(size=5)
-    start_step(s, history, hat, offset)
-    finish_step(s, new, hat, offset, history)
-    x1, v1, a1, p1 = history.T
+    am, af, gamma, beta = published(rho)
+    s, history = scheme_of(GENERALISED_ALPHA, rho, h), rng.normal(size=(4, 5))
+    x, v, p, a = history.copy()
+    new = stepped(s, history, rng.normal(size=5))
+    x1, v1, p1, a1 = history
     assert x1 == pytest.approx(new)
-    assert x1 == pytest.approx(x + h * v + h * h * ((0.5 - s.beta) * p + s.beta * p1))
-    assert v1 == pytest.approx(v + h * ((1 - s.gamma) * p + s.gamma * p1))
-    assert (1 - s.am) * p1 + s.am * p == pytest.approx((1 - s.af) * a1 + s.af * a, abs=1e-9 * np.abs(a1).max())
+    assert x1 == pytest.approx(x + h * v + h * h * ((0.5 - beta) * p + beta * p1))
+    assert v1 == pytest.approx(v + h * ((1 - gamma) * p + gamma * p1))
+    assert (1 - am) * p1 + am * p == pytest.approx((1 - af) * a1 + af * a, abs=1e-9 * np.abs(a1).max())
 
 
-def oscillator(step, rho, omega=6.0, zeta=0.05, duration=1.0):
-    """x'' + 2 zeta omega x' + omega^2 x = 0 from x = 1 at rest: final x, v, a."""
-    s = generalised_alpha(step, rho)
-    history = np.array([[1.0, 0.0, -(omega**2), -(omega**2)]])
+def stepped(scheme, history, new):
+    """Take positions `new`; returns them."""
+    hat, offset = np.zeros(len(new)), np.zeros(len(new))
+    start_step(scheme, history, hat, offset)
+    finish_step(scheme, new, hat, offset, history)
+    return new
+
+
+@pytest.mark.parametrize("family", [NEWMARK, WILSON, HOUBOLT, PARK])
+def test_motion_that_a_scheme_reproduces(family):
+    """A parabola is followed without error: x, v, a at the new time, from exact values at the old ones."""
+    h, parameter = 0.1, {NEWMARK: 0.5, WILSON: 1.4}.get(family, 0.0)
+    s, depth = scheme_of(family, parameter, h), depth_of(family)
+
+    def x(t):
+        return 0.3 + 0.7 * t - 1.1 * t * t
+
+    def v(t):
+        return 0.7 - 2.2 * t
+
+    rows = [x(-2 * h), v(-2 * h), x(-h), v(-h), x(0), v(0), -2.2, -2.2]
+    history = np.array(rows[-depth:])[:, None]
+    stepped(s, history, np.array([x(s.reach)]))
+    assert history[[X, V, A], 0] == pytest.approx([x(h), v(h), -2.2], abs=1e-12)
+    if depth == 8:
+        assert history[:4, 0] == pytest.approx([x(-h), v(-h), x(0), v(0)], abs=1e-12)
+
+
+def test_newmark_is_generalised_alpha_without_averaging():
+    newmark, alpha = scheme_of(NEWMARK, 0.5, 0.03), scheme_of(GENERALISED_ALPHA, 1.0, 0.03)
+    assert newmark.rate == pytest.approx(alpha.rate)
+    assert newmark.weights[HAT, OLD:].sum() == pytest.approx(alpha.weights[HAT, OLD:].sum())
+
+
+def test_rest_leaves_positions_without_motion():
+    for depth in (4, 8):
+        s = prepare(REST, 0.0, 0.0, new_weights(depth))
+        history = np.random.default_rng(0).normal(size=(depth, 3))
+        assert not s.weights[[HAT, OFFSET]].any() and s.gain == s.rate == s.reach == 0.0
+        new = stepped(s, history, np.array([1.0, 2.0, 3.0]))
+        assert np.array_equal(history[X], new)
+        assert not history[[V, P, A]].any()
+        assert depth == 4 or (np.array_equal(history[0], new) and np.array_equal(history[2], new))
+
+
+def oscillator(family, parameter, step, omega=6.0, zeta=0.05, duration=1.0):
+    """x'' + 2 zeta omega x' + omega^2 x = 0 from x = 1 at rest: final x, v, a. Earlier values are the exact ones."""
+    s = scheme_of(family, parameter, step)
+    exact = np.array([solution(-2 * step), solution(-step), solution(0.0)])
+    history = np.append(exact[:, :2].ravel(), [exact[-1, 2], exact[-1, 2]])[-depth_of(family) :, None]
     hat, offset = np.zeros(1), np.zeros(1)
     for _ in range(round(duration / step)):
         start_step(s, history, hat, offset)
         right = s.gain * hat - 2 * zeta * omega * offset
         finish_step(s, right / (s.gain + 2 * zeta * omega * s.rate + omega**2), hat, offset, history)
-    return history[0, :3]
+    return history[[X, V, A], 0]
 
 
-@pytest.mark.parametrize("rho", RHOS)
-def test_second_order_on_a_damped_oscillator(rho):
-    omega, zeta = 6.0, 0.05
+def solution(time, omega=6.0, zeta=0.05):
+    """Exact x, v, a of the same."""
     root = -zeta * omega + 1j * omega * np.sqrt(1 - zeta**2)
     factor = np.conj(root) / (np.conj(root) - root)
-    exact = [2 * np.real(factor * root**k * np.exp(root)) for k in range(3)]
-    steps = np.array([2e-3, 1e-3, 5e-4])
-    errors = np.array([np.abs(oscillator(h, rho) - exact) for h in steps])
+    return [2 * np.real(factor * root**k * np.exp(root * time)) for k in range(3)]
+
+
+@pytest.mark.parametrize("family, parameter", SCHEMES)
+def test_second_order_on_a_damped_oscillator(family, parameter):
+    steps = np.array([1e-3, 5e-4, 2.5e-4])
+    errors = np.array([np.abs(oscillator(family, parameter, h) - solution(1.0)) for h in steps])
     assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(2.0, abs=0.12)
+
+
+def test_newmark_with_numerical_damping_is_of_first_order():
+    errors = [np.abs(oscillator(NEWMARK, 0.6, h) - solution(1.0)) for h in (1e-3, 5e-4)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("rho", [0.3, 0.8])
 def test_spectral_radius_at_high_frequency(rho):
-    s = generalised_alpha(1.0, rho)
+    s = scheme_of(GENERALISED_ALPHA, rho, 1.0)
     hat, offset, omega, norms = np.zeros(1), np.zeros(1), 1e6, []
-    history = np.array([[1.0, 0.0, -(omega**2), -(omega**2)]])
+    history = np.array([[1.0], [0.0], [-(omega**2)], [-(omega**2)]])
     for _ in range(60):
         start_step(s, history, hat, offset)
         finish_step(s, s.gain * hat / (s.gain + omega**2), hat, offset, history)
-        norms.append(abs(history[0, 3]))
+        norms.append(abs(history[P, 0]))
     assert (norms[-1] / norms[-21]) ** (1 / 20) == pytest.approx(rho, rel=0.2)
     assert norms[-1] < norms[-21]

@@ -190,5 +190,5 @@ def test_work_of_the_drives_is_the_rise_of_the_potential(number):
             length = drive.copy()
             length[i] += sign * 1e-4
             _, boom, _, _ = segments.equilibrium(model, length, angles)
-            energies.append(model.energy(boom, length)[0].v)
+            energies.append(segments.energy(model, boom, length)[0].v)
         assert -(energies[0] - energies[1]) / 2e-4 == pytest.approx(forces[i], rel=5e-3, abs=1.0)

@@ -1,0 +1,89 @@
+"""What the rows of `study error` say: who is on the front, and who is the fastest at an error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from .error_cases import Own, Peer
+from .error_run import Row
+
+EQUAL = (0.3, 1.0, 3.0, 10.0)  # mm
+NOISE = 0.9  # a run must take less than this share of another's time to be called faster
+Measure = Callable[[Row], float]
+
+
+def tip(row: Row) -> float:
+    """Error of the tip, mm."""
+    return row.tip_mm
+
+
+def acceleration(row: Row) -> float:
+    """Relative error of the tip's acceleration."""
+    return row.acceleration
+
+
+def front(rows: Sequence[Row], error: Measure = tip) -> list[Row]:
+    """The Pareto front, fastest first: no row is both faster and less wrong than one of these."""
+    found: list[Row] = []
+    for row in sorted((row for row in rows if row.good), key=lambda row: (row.seconds, error(row))):
+        if not found or error(row) < error(found[-1]):
+            found.append(row)
+    return found
+
+
+def fastest(rows: Sequence[Row], most: float, error: Measure = tip) -> Row | None:
+    """The fastest row whose error is at most `most`."""
+    return min((row for row in rows if row.good and error(row) <= most), key=lambda row: row.seconds, default=None)
+
+
+def of(rows: Sequence[Row], kind: type) -> list[Row]:
+    """Rows of one program: `Own`, `Peer` or `Stiff`."""
+    return [row for row in rows if isinstance(row.case, kind)]
+
+
+@dataclass(frozen=True)
+class Match:
+    """The fastest of both programs at an error of the tip (mm); a row is None where none reaches it."""
+
+    most: float
+    own: Row | None
+    other: Row | None
+
+    @property
+    def ratio(self) -> float | None:
+        """Time of the other over the own one."""
+        return None if self.own is None or self.other is None else self.other.seconds / self.own.seconds
+
+
+def matches(rows: Sequence[Row], kind: type = Peer) -> list[Match]:
+    """At equal error of the tip."""
+    own, other = of(rows, Own), of(rows, kind)
+    return [Match(most, fastest(own, most), fastest(other, most)) for most in EQUAL]
+
+
+def better(rows: Sequence[Row], row: Row) -> Row | None:
+    """The fastest own row that is clearly faster than `row` and no worse in both errors; None if `row` is on the front."""
+    faster = [
+        other
+        for other in of(rows, Own)
+        if other.good
+        and other.seconds < NOISE * row.seconds
+        and other.tip_mm <= row.tip_mm
+        and other.acceleration <= row.acceleration
+    ]
+    return min(faster, key=lambda other: other.seconds, default=None)
+
+
+def order(rows: Sequence[Row]) -> list[tuple[Row, float | None]]:
+    """Rows of one method by falling step, each with the order of its own tip error from the step before."""
+    from math import log
+
+    found: list[tuple[Row, float | None]] = []
+    for row in sorted(rows, key=lambda row: -row.case.step if isinstance(row.case, Own | Peer) else 0.0):
+        last = found[-1][0] if found else None
+        slope = None
+        if last is not None and last.good and row.good and isinstance(row.case, Own) and isinstance(last.case, Own):
+            slope = log(last.own_mm / row.own_mm) / log(last.case.step / row.case.step)
+        found.append((row, slope))
+    return found

@@ -1,0 +1,125 @@
+"""The motion that all programs step, and the two references that their errors are taken against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..analysis.march import march
+from ..errors import BoomTwinError
+from ..records import Array
+from ..scene.parts import Scene
+from .error_cases import STEPS, with_modes
+from .exudyn import load_rig
+from .motion import Motion
+
+ROW = STEPS[-1]  # s between the instants that are compared
+OWN_MODES, OWN_STEP = (6, 8), (2.5e-4, 1.25e-4)
+ELEMENTS, EXUDYN_STEP = (16, 32), (5e-4, 2.5e-4)
+
+
+@dataclass(frozen=True)
+class Path:
+    """Tip (m) and its acceleration (m/s^2) at the compared instants, each of shape (m, 2)."""
+
+    tip: Array
+    acceleration: Array
+
+    def away(self, other: Path) -> tuple[float, float]:
+        """Root mean square over the motion: of the tip (mm), of its acceleration over that of `other`."""
+        return 1e3 * rms(self.tip - other.tip), rms(self.acceleration - other.acceleration) / rms(other.acceleration)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A path, and what is left in it: errors of the tip (mm) and of the acceleration (relative), as estimated."""
+
+    path: Path
+    tip_mm: float
+    acceleration: float
+    what: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene in motion; `exudyn` is None where Exudyn is missing, and `missing` says so."""
+
+    scene: Scene
+    motion: Motion
+    own: Reference
+    exudyn: Reference | None
+    missing: str
+
+    def errors(self, path: Path) -> tuple[tuple[float, float], tuple[float, float] | None]:
+        """Against the own and the independent reference."""
+        return path.away(self.own.path), None if self.exudyn is None else path.away(self.exudyn.path)
+
+
+def rms(vectors: Array) -> float:
+    """Root mean square length of `vectors`, shape (m, 2)."""
+    return float(np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1))))
+
+
+def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
+    """Compute the references. Quick ones take fewer elements and longer steps."""
+    rig, missing = load_rig()
+    independent = None
+    if rig is not None:
+        try:
+            independent = _independent(rig, scene, motion, quick)
+        except BoomTwinError as failure:
+            missing = str(failure)
+    return Problem(scene, motion, _own(scene, motion, quick), independent, missing)
+
+
+def every(step: float) -> int:
+    """Steps between the compared instants."""
+    return round(ROW / step)
+
+
+def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
+    """Many bending shapes and a fine step; its error is estimated by fewer shapes and a step twice as long."""
+    coarse, fine = OWN_STEP if not quick else (1e-3, 5e-4)
+    paths = []
+    for modes, step in ((OWN_MODES[1], fine), (OWN_MODES[0], fine), (OWN_MODES[1], coarse)):
+        found = march(with_modes(scene, modes), motion, motion.duration, step, every(step), angles=motion.angles)
+        paths.append(Path(found.tip, found.tip_acceleration))
+    shape, time = paths[1].away(paths[0]), paths[2].away(paths[0])
+    what = f"boom_twin, {OWN_MODES[1]} modes, step {1e3 * fine:g} ms"
+    return Reference(paths[0], shape[0] + time[0] / 3.0, shape[1] + time[1] / 3.0, what)
+
+
+def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Reference:
+    """Exudyn, extrapolated in elements and in steps; both extrapolations are of second order.
+
+    What they add is the error of the finer runs; a tenth of it is taken as what is left.
+    """
+    (few, many), (coarse, fine) = (ELEMENTS, EXUDYN_STEP) if not quick else ((8, 16), (2e-3, 1e-3))
+    paths = {}
+    for elements, steps in ((few, (coarse, fine)), (many, (coarse,))):
+        resting = rig.at_rest(scene, motion.first, elements)
+        for step in steps:
+            rows, _ = rig.move(resting, motion, motion.duration, step, ROW)
+            paths[elements, step] = path_of(rows)
+    a, finer, longer = paths[few, coarse], paths[few, fine], paths[many, coarse]
+    best = Path(
+        _extrapolated(a.tip, finer.tip, longer.tip),
+        _extrapolated(a.acceleration, finer.acceleration, longer.acceleration),
+    )
+    added = longer.away(best)
+    what = f"Exudyn, extrapolated from {few} and {many} elements a section and steps of {1e3 * coarse:g} and {1e3 * fine:g} ms"
+    return Reference(best, 0.1 * added[0], 0.1 * added[1], what)
+
+
+def _extrapolated(coarse: Array, finer: Array, longer: Array) -> Array:
+    """Richardson, twice: `finer` halves the step of `coarse`, `longer` doubles its elements."""
+    return longer + (longer - coarse) / 3.0 + 4.0 * (finer - coarse) / 3.0
+
+
+def path_of(rows: dict[str, Array]) -> Path:
+    """The path in the columns of a simulation of Exudyn."""
+    return Path(
+        np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]), np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]])
+    )

@@ -1,0 +1,133 @@
+"""Valid booms of any number of sections, made up to one recipe so that they differ in nothing but their divisions.
+
+Joint 1 is of kind A, the others are six-bars, all geometrically similar to those of the default scene. Second moments and oil
+stiffnesses follow the static moments of the boom stretched out horizontally, so that every boom bends and gives by the same
+angles in all. Six-bars of short sections are low, so their cylinders push along the beams with forces that grow with the number
+of sections: the made-up material gets stiffer to match. The numbers describe no real machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..physics.linkage import cylinder_length
+from ..records import Array
+from ..scene.kinematics import linkage_of
+from ..scene.parts import Base, Joint, Scene, Section
+
+STEEL, DENSITY, GRAVITY = 2.06e11, 7850.0, 9.81  # Pa, kg/m^3, m/s^2
+FEW = 7.0  # sections up to which the material is steel
+BENT, GIVEN_WAY = 0.1, 0.05  # rad in all: of the beams, of the cylinders, stretched out under gravity
+LIGHT, HEAVY = 40.0, 200.0  # kg/m at the tip, at the base
+LEVER = 0.15  # m/rad of a six-bar's cylinder, for a section of UNIT length
+UNIT = 3.3  # m, length of the section whose six-bars are copied
+REACH = 8.0  # deg that each joint can turn to either side of the posture
+SIX_BARS: dict[str, dict[str, Any]] = {
+    "B1": {"C": (-0.816, 0.18), "D": (-0.14, -0.04), "E": (0.12, 0.062), "lL": 0.42, "lR": 0.377},
+    "B2": {"C": (-1.298, 0.18), "D": (-0.14, -0.04), "E": (0.12, 0.081), "lL": 0.42, "lR": 0.367, "R": (0.42, 0.12)},
+    "B3": {"C": (-1.300, 0.18), "D": (-0.14, -0.04), "E": (0.12, 0.100), "lL": 0.42, "lR": 0.347, "R": (0.02, -0.12)},
+}  # m, of the default scene
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """Of every section, all of shape (n,): length (m), mass per metre (kg/m), mass (kg), moment at its inboard pivot (N m).
+
+    `modulus` is that of the material (Pa).
+    """
+
+    length: Array
+    per_metre: Array
+    mass: Array
+    moment: Array
+    modulus: float
+
+
+def long_boom(count: int, length: float = 20.0, kinds: Sequence[str] = ("B1",)) -> Scene:
+    """A boom of `count` equal sections (2 or more), `length` m in all, with the posture ``test``: a gentle arch.
+
+    `kinds` of joints 2, 3, .. are taken in turn.
+    """
+    return boom_of(np.full(count, length / count), kinds, np.linspace(50.0, 0.0, count))
+
+
+def seven_sections() -> Scene:
+    """A boom of 101 m in seven sections with all kinds of joints, in the posture ``test``: an arch."""
+    lengths = np.array([20.0, 17.0, 15.0, 14.0, 13.0, 12.0, 10.0])
+    return boom_of(lengths, ("B1", "B2", "B3"), np.array([75.0, 55.0, 35.0, 10.0, -15.0, -40.0, -60.0]))
+
+
+def boom_of(lengths: Array, kinds: Sequence[str], headings: Array) -> Scene:
+    """A boom of sections of these `lengths` (m), shape (n,), at `headings` (deg, falling, less than 165 each), shape (n,)."""
+    sizes, relative = _sizes(lengths), np.diff(headings, prepend=0.0)
+    scale = np.append(lengths[0], np.minimum(lengths[1:], lengths[:-1])) / UNIT
+    base = Base(pivot=(0.0, 0.0), cylinder_pin=(0.45 * scale[0], -1.25 * scale[0]))
+    sections = [_section(sizes, i, scale[0]) for i in range(len(lengths))]
+    names = ["A", *(kinds[i % len(kinds)] for i in range(len(lengths) - 1))]
+    joints = [_joint(name, sizes, i, scale[i], relative[i], (base, sections[0])) for i, name in enumerate(names)]
+    return Scene.model_validate(
+        {
+            "description": f"{len(lengths)} sections, {lengths.sum():.6g} m, made up for studies of the numerics",
+            "gravity": (0.0, -GRAVITY),
+            "material": {"name": "steel", "E": sizes.modulus, "rho": DENSITY},
+            "base": base,
+            "sections": sections,
+            "joints": joints,
+            "postures": {"test": tuple(float(heading) for heading in headings)},
+        }
+    )
+
+
+def _sizes(lengths: Array) -> _Sizes:
+    ends = np.cumsum(lengths)
+    middles, total = ends - 0.5 * lengths, ends[-1]
+    per_metre = LIGHT + (HEAVY - LIGHT) * (1.0 - middles / total) ** 2
+    mass = 1.5 * per_metre * lengths  # beam, rigid ends, links and cylinder
+    moment = np.array([GRAVITY * mass[i:] @ (middles[i:] - (ends[i] - lengths[i])) for i in range(len(lengths))])
+    return _Sizes(lengths, per_metre, mass, moment, STEEL * max(1.0, len(lengths) / FEW) ** 2)
+
+
+def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
+    """Section `i`, flexible between a rigid root and a rigid head."""
+    length, beam_mass = float(sizes.length[i]), float(sizes.per_metre[i] * sizes.length[i])
+    root, head = (0.6 * base_scale if i == 0 else 0.08 * length), 0.08 * length
+    second_moment = sizes.moment[i] * sizes.length.sum() / (BENT * sizes.modulus)
+    end = {"mass": 0.09 * beam_mass, "inertia": 0.09 * beam_mass * (0.03 * length) ** 2}
+    return Section.model_validate(
+        {
+            "length": length, "beam": (root, length - head), "A": sizes.per_metre[i] / DENSITY, "I": second_moment,
+            "rho_A": sizes.per_metre[i], "rho_I": DENSITY * second_moment, "beta": 1e-3,
+            "root": end | {"com": (0.5 * root, 0.0)}, "head": end | {"com": (length - 0.5 * head, 0.0)},
+            "rod_pin": (root, -0.12 * base_scale) if i == 0 else None,
+        }
+    )  # fmt: skip
+
+
+def _links(kind: str, scale: float, mass: float) -> dict[str, Any]:
+    """Links of a six-bar, those of the default scene times `scale`, for a section of `mass` (kg)."""
+
+    def scaled(value: Any) -> Any:
+        return tuple(scale * x for x in value) if isinstance(value, tuple) else scale * value
+
+    return {key: scaled(value) for key, value in SIX_BARS[kind].items()} | {"mL": 0.02 * mass, "mR": 0.015 * mass}
+
+
+def _joint(kind: str, sizes: _Sizes, i: int, scale: float, angle: float, ground: tuple[Base, Section]) -> Joint:
+    """Joint `i` that turns `REACH` degrees to either side of `angle` (deg); `ground` carries cylinder 1."""
+    lever = 0.55 * scale if kind == "A" else LEVER * scale
+    stiffness = sizes.moment[i] * len(sizes.length) / (GIVEN_WAY * lever**2)
+    low, high = angle - REACH, angle + REACH
+    part = {"mass": 0.06 * sizes.mass[i], "inertia": 0.06 * sizes.mass[i] * (0.2 * scale) ** 2, "com": 0.25 * scale}
+    cylinder = {"k": stiffness, "d": 3e-3 * stiffness, "closed_length": 1.0, "max_stroke": 1.0, "barrel": part, "rod": part}
+    links = {} if kind == "A" else _links(kind, scale, sizes.mass[i])
+    joint = Joint.model_validate({"kind": kind, "range_deg": (low, high), "cylinder": cylinder} | links)
+    row = linkage_of(joint, *ground)
+    lengths = [cylinder_length(row, math.radians(phi))[0] for phi in np.linspace(low, high, 101)]
+    margin = 0.1 * (max(lengths) - min(lengths))
+    travel = {"closed_length": min(lengths) - margin, "max_stroke": max(lengths) - min(lengths) + 2.0 * margin}
+    return joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update=travel)})

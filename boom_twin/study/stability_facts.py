@@ -1,0 +1,95 @@
+"""What a motion shows against the right one: error, ringing, growth, drift."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..analysis.march import March
+from ..records import Array
+from .stability_verdict import Facts
+
+QUIET = 1e-3  # share of the peak acceleration below which vibration is not followed
+SHORTEST_PATH = 1e-9  # m
+
+
+def against_motion(found: March, right: March, still: float) -> Facts:
+    """Compare with a motion at the same rows; the drives hold from `still` (s) on."""
+    path, late = _path(right), right.times > still
+    shares = _rings(found, right, late)
+    return Facts(
+        found.status,
+        error=_largest(found.tip - right.tip) / path,
+        acceleration=_rms(found.tip_acceleration - right.tip_acceleration) / max(_rms(right.tip_acceleration), 1e-12),
+        force=_rms(found.cylinder_forces - right.cylinder_forces) / max(_largest(right.cylinder_forces), 1e-12),
+        ringing=shares[0],
+        force_ringing=shares[1],
+        growth=growth(found, still) / max(growth(right, still), 1e-3),
+        passes=found.passes,
+    )
+
+
+def against_rest(found: March, equilibrium: Array | None, still: float) -> Facts:
+    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself."""
+    late = np.flatnonzero(found.times > still)
+    first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
+    away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
+    shares = _rings(found, None, found.times > still)
+    return Facts(
+        found.status,
+        drift=float(np.linalg.norm(away)) / _path(found),
+        ringing=shares[0],
+        force_ringing=shares[1],
+        growth=growth(found, still),
+        passes=found.passes,
+    )
+
+
+def growth(motion: March, still: float) -> float:
+    """Vibration of the tip's acceleration in the last quarter of the hold over that in the first; 1 where it is still."""
+    late = np.flatnonzero(motion.times > still)
+    quarter = max(len(late) // 4, 1)
+    first, last = (_spread(motion.tip_acceleration[rows]) for rows in (late[:quarter], late[-quarter:]))
+    if last <= QUIET * _largest(motion.tip_acceleration):
+        return 1.0
+    return last / first if first > 0.0 else math.inf
+
+
+def alternating(values: Array) -> Array:
+    """The part of rows (m, c) that changes sign from row to row, (m - 2, c); a smooth curve leaves next to nothing."""
+    return np.asarray(0.25 * (values[2:] - 2.0 * values[1:-1] + values[:-2]))
+
+
+def _rings(found: March, right: March | None, late: np.ndarray) -> tuple[float, float]:
+    """Ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of what is right."""
+    shares = []
+    for name in ("tip_acceleration", "cylinder_forces"):
+        own = getattr(found, name)
+        other = np.zeros_like(own) if right is None else getattr(right, name)
+        peak = _largest(other if right is not None else own)
+        ring = alternating((own - other)[late])
+        shares.append(_rms(ring) / max(peak, 1e-12))
+    return shares[0], shares[1]
+
+
+def _spread(values: Array) -> float:
+    return _rms(values - values.mean(0))
+
+
+def _rms(values: Array) -> float:
+    """Of the length of the rows (m, c); infinite if any is not finite, 0 without rows."""
+    if not values.size:
+        return 0.0
+    return float(np.sqrt(np.mean(np.sum(values**2, axis=-1)))) if np.isfinite(values).all() else math.inf
+
+
+def _path(motion: March) -> float:
+    """How far the tip gets from where it starts, m."""
+    return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
+
+
+def _largest(values: Array) -> float:
+    """Largest length of the rows; infinite if any is not finite."""
+    sizes = np.linalg.norm(values, axis=-1)
+    return float(sizes.max()) if np.isfinite(sizes).all() else math.inf

@@ -1,0 +1,119 @@
+"""Motions of the stability study: smooth moves that end in a hold, strokes to the ends of their range, a dead stop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..analysis.march import Drive
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes, stroke_curve
+from ..scene.parts import Scene
+from .motion import Motion, motion_of
+
+FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
+SHARE = 0.05  # of a cylinder's travel, from where it goes to the end
+SAMPLES = 1001  # of a joint's range
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a case steps through.
+
+    Attributes
+    ----------
+    scene : Scene
+    drive : Drive
+    angles : ndarray, shape (n,)
+        Joint angles (rad) next to which the boom starts.
+    duration, step : float
+        s.
+    still : float
+        s, from here on the drives hold.
+    every : int
+        Steps to a row.
+    """
+
+    scene: Scene
+    drive: Drive
+    angles: Array
+    duration: float
+    step: float
+    still: float
+    every: int = 1
+
+
+@dataclass(frozen=True)
+class DeadStop:
+    """Strokes `first` (m) that reach `speed` (m/s), both shape (n,), within `ramp` (s) and stop dead at `stop` (s)."""
+
+    first: Array
+    speed: Array
+    ramp: float
+    stop: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
+        moving = times < self.stop - 1e-9
+        x = np.clip(times / self.ramp, 0.0, 1.0)
+        gone = self.ramp * (2.5 * x**4 - 3.0 * x**5 + x**6) + np.clip(times, self.ramp, self.stop) - self.ramp
+        rate = np.where(moving, x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 0.0)
+        return self.first + np.outer(gone, self.speed), np.outer(rate, self.speed)
+
+
+def smooth(
+    scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3,
+    every: int = 1,
+) -> Setup:  # fmt: skip
+    """`share` of the study's move in `rise` (s), then a hold until `duration` (s)."""
+    own = motion_of(scene, posture)
+    move = replace(own, travel=share * own.travel, rise=rise, duration=duration)
+    return Setup(scene, move, own.angles, duration, step, rise, every)
+
+
+def first_cylinder(scene: Scene, posture: str, turn: float, step: float, rise: float = 1.0, duration: float = 2.0) -> Setup:
+    """Cylinder 1 turns joint 1 by `turn` (rad) in `rise` (s), then holds."""
+    return one_cylinder(scene, posture, 0, _stroke_for(scene, posture, turn), step, rise, duration)
+
+
+def one_cylinder(
+    scene: Scene, posture: str, index: int, travel: float, step: float = 1e-3, rise: float = 1.0, duration: float = 2.0
+) -> Setup:
+    """Cylinder `index` travels by `travel` (m) in `rise` (s), then holds."""
+    own = motion_of(scene, posture)
+    far = np.zeros(len(own.first))
+    far[index] = travel
+    return Setup(scene, replace(own, travel=far, rise=rise, duration=duration), own.angles, duration, step, rise)
+
+
+def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
+    """The study's move at full speed of the drives, from 0.3 s on, stopped dead at 0.8 s; 2 s in all."""
+    own = motion_of(scene)
+    full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
+    drive = DeadStop(own.first, np.sign(own.travel) * full, 0.3, 0.8)
+    return Setup(scene, drive, own.angles, 2.0, step, 0.8)
+
+
+def to_the_ends(scene: Scene, longest: bool) -> Setup:
+    """All cylinders, from near by, to their longest or shortest stroke that range and cylinder allow."""
+    ends, aside = np.array([_reach(scene, i) for i in range(len(scene.joints))]), SHARE
+    last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
+    first = last + aside * (other - last)
+    move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
+    return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
+
+
+def _reach(scene: Scene, index: int) -> tuple[float, float]:
+    """Shortest and longest stroke (m) of cylinder `index` over its joint's range."""
+    joint = scene.joints[index]
+    low, high = np.radians(joint.range_deg)
+    strokes = stroke_curve(scene, index, np.linspace(low, high, SAMPLES))
+    return max(0.0, float(np.nanmin(strokes))), min(joint.cylinder.max_stroke, float(np.nanmax(strokes)))
+
+
+def _stroke_for(scene: Scene, posture: str, turn: float) -> float:
+    """Travel (m) of cylinder 1 that turns joint 1 by `turn` (rad) from a posture."""
+    angle = motion_of(scene, posture).angles[0]
+    first, last = stroke_curve(scene, 0, np.array([angle, angle + turn]))
+    return float(last - first)

@@ -1,0 +1,146 @@
+"""The matrix: every case marched by every method, judged against what is right there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..analysis.march import March, Method, march
+from ..analysis.statics import settle
+from ..errors import BoomTwinError, SolverError
+from ..plan.compile import compile_scene
+from ..records import Array
+from ..scene.kinematics import joint_angles_of_strokes
+from .stability_cases import Case
+from .stability_facts import against_motion, against_rest
+from .stability_motions import Setup
+from .stability_verdict import Facts, Verdict, verdict
+
+METHODS: dict[str, Method] = {
+    "default": Method(),
+    "rho 1": Method(parameter=1.0),
+    "rho 0.5": Method(parameter=0.5),
+    "rho 0": Method(parameter=0.0),
+    "Newmark 0.5": Method("newmark", 0.5),
+    "Newmark 0.6": Method("newmark", 0.6),
+    "Wilson 1.4": Method("wilson", 1.4),
+    "Houbolt": Method("houbolt"),
+    "Park": Method("park"),
+    "single pass": Method(passes=1),
+    "plain product": Method(product="plain"),
+}
+RIGHT = Method(tolerance=1e-10)
+FINER, FINEST = 8, 5e-6  # steps of what is right: an eighth, but not below this (s), where round-off takes over
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What came of one method in one case."""
+
+    facts: Facts
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Row:
+    """A case with a cell for each method, and what the reference was."""
+
+    case: Case
+    reference: str
+    cells: dict[str, Cell]
+
+
+def run(
+    found: Iterable[Case], methods: dict[str, Method] | None = None, tell: Callable[[str], None] = lambda line: None
+) -> list[Row]:
+    """March all cases by all methods; `tell` hears of each case as it is done."""
+    rows = []
+    for case in found:
+        rows.append(one(case, METHODS if methods is None else methods))
+        tell(f"{case.group}: {case.name}: " + ", ".join(cell.verdict.word for cell in rows[-1].cells.values()))
+    return rows
+
+
+def one(case: Case, methods: dict[str, Method]) -> Row:
+    """March one case by `methods`."""
+    try:
+        setup = case.make()
+        judge, told = _judge(case, setup)
+    except BoomTwinError as error:
+        reason = str(error)
+        return Row(case, "no solution", {name: _cell(Facts(reason, solvable=False)) for name in methods})
+    return Row(case, told, {name: _cell(_facts(case, setup, method, judge)) for name, method in methods.items()})
+
+
+def _cell(facts: Facts) -> Cell:
+    return Cell(facts, verdict(facts))
+
+
+def _facts(case: Case, setup: Setup, method: Method, judge: Callable[[March], Facts]) -> Facts:
+    try:
+        return judge(_marched(setup, method))
+    except SolverError as error:
+        return Facts(str(error), solvable=case.truth != "none")
+
+
+def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
+    """How a motion of the case is judged, and that in words.
+
+    Raises
+    ------
+    SolverError
+        No equilibrium to start from.
+    """
+    if case.truth == "fine steps":
+        right, stride = _right(setup)
+        if right.status != "ok":
+            raise SolverError(f"the reference ended: {right.status}")
+        step = setup.step / round(setup.step / _fine(setup)) if setup.step > FINEST else FINEST
+        return lambda found: _against(found, right, stride, setup.still), f"default method at {step:.3g} s"
+    if case.truth == "none":
+        return lambda found: Facts(found.status, solvable=False, passes=found.passes), "there is no solution"
+    rest = _equilibrium(setup) if case.truth == "equilibrium" else None
+    told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
+    return lambda found: _ended(found) or against_rest(found, rest, setup.still), told
+
+
+def _against(found: March, right: March, stride: int, still: float) -> Facts:
+    return _ended(found) or against_motion(_thinned(found, stride), right, still)
+
+
+def _ended(found: March) -> Facts | None:
+    """Facts of a motion that did not reach its end; None if it did."""
+    return None if found.status == "ok" else Facts(found.status, passes=found.passes)
+
+
+def _marched(setup: Setup, method: Method) -> March:
+    return march(setup.scene, setup.drive, setup.duration, setup.step, setup.every, method, angles=setup.angles)
+
+
+def _fine(setup: Setup) -> float:
+    return max(setup.step / FINER, FINEST)
+
+
+def _right(setup: Setup) -> tuple[March, int]:
+    """What is right, and how many rows of the case's motion there are to one of its."""
+    step = _fine(setup)
+    every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
+    return march(setup.scene, setup.drive, setup.duration, step, every, RIGHT, angles=setup.angles), stride
+
+
+def _thinned(motion: March, stride: int) -> March:
+    """Every `stride`-th row."""
+    names: Sequence[str] = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
+    arrays = {name: getattr(motion, name)[::stride] for name in names}
+    return March(**arrays, seconds=motion.seconds, steps=motion.steps, passes=motion.passes, status=motion.status)
+
+
+def _equilibrium(setup: Setup) -> Array:
+    """Tip (m), shape (2,), at rest at the last strokes."""
+    plan = compile_scene(setup.scene)
+    state, work = plan.state(), plan.work()
+    strokes = setup.drive(np.array([setup.duration]))[0][0]
+    settle(plan, state, work, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
+    return state.frames[-1, :2].copy()

@@ -1,0 +1,55 @@
+"""Which modules a command imports: start-up time is made of that, and modules can be counted without a clock."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SLOW = ("numba", "llvmlite", "scipy", "scipy.linalg", "matplotlib", "rosbags", "exudyn", "rclpy")
+PROGRAM = """
+import contextlib, io, json, sys
+from boom_twin.cli.main import main
+with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+    try:
+        code = main(json.loads(sys.argv[1]))
+    except SystemExit as end:
+        code = end.code
+print(json.dumps([code, sorted(sys.modules)]))
+"""
+
+
+def imported_by(*arguments: str) -> tuple[int, set[str]]:
+    """Exit code of a command in a fresh process, and those of the slow modules that it has imported."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(arguments)], capture_output=True, text=True, check=True, timeout=300
+    )
+    code, modules = json.loads(done.stdout)
+    return code, set(SLOW) & set(modules)
+
+
+@pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["--help"], ["statics", "--help"]])
+def test_what_does_not_step_needs_no_compiler(arguments: list[str]) -> None:
+    assert imported_by(*arguments) == (0, set())
+
+
+@pytest.mark.parametrize("command", ["check", "statics", "simulate", "replay", "rig", "play", "record"])
+def test_usage_errors_are_told_at_once(command: str) -> None:
+    code, slow = imported_by(command, "--no-such-option")
+    assert code == 2 and slow <= {"rosbags"}
+
+
+def test_a_faulty_scene_is_refused_without_a_compiler(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text("sections: []\n", encoding="utf-8")
+    assert imported_by("check", str(path)) == (1, set())
+
+
+def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
+    """To compile, numba imports SciPy's BLAS; what is cached is loaded without. The first call fills the cache."""
+    imported_by("statics", "--posture", "arch")
+    code, slow = imported_by("statics", "--posture", "arch")
+    assert code == 0 and slow == {"numba", "llvmlite", "scipy"}
