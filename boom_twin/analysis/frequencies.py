@@ -15,12 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..chain.place import place
-<<<<<<< HEAD
-from ..chain.program import JOINT_A, Motion, State, Work
-from ..chain.status import OK
-=======
 from ..chain.program import Motion, State, Work
->>>>>>> wt-published
+from ..chain.status import OK
 from ..chain.step import observe
 from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..plan.compile import Plan

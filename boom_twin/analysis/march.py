@@ -137,7 +137,7 @@ def march(
     plan = compile_scene(scene, basis)
     family = FAMILIES[method.integrator]
     depth = integrators.depth_of(family)
-    strokes, rates = drive(step * (np.arange(rows * every) + method.reach))
+    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
     first = drive(np.zeros(1))[0][0]
     start, work = plan.state(depth), plan.work(depth)
     product = new_product(plan.tables) if method.product == "plain" else None
@@ -157,7 +157,7 @@ def march(
     n, done = plan.joints, max(int(row), 1) * every
     tip = out[:, 2 * n :].reshape(-1, 3, 3)
     return March(
-        times=step * every * np.arange(rows + 1),
+        times=np.asarray(step * every * np.arange(rows + 1), float),
         tip=tip[:, 0, :2],
         tip_acceleration=tip[:, 2, :2],
         joints=out[:, :n],

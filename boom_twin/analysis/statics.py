@@ -121,7 +121,8 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
         where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
         raise SolverError(
             f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
-            "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's range."
+            "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's "
+            "range."
         )
 
 

@@ -145,7 +145,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(units - 1, -1, -1):
         open_end(work, force[k])
-        status, _, m = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
+        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
         if status != OK:
             return SINGULAR
         if k > 0:

@@ -133,7 +133,9 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     for row in range(steps.shape[0]):
         scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
-            status, count, _ = advance(t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product)
+            status, count, _ = advance(
+                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product
+            )
             total += count
             at += 1
             if status != OK:

@@ -41,9 +41,9 @@ BEAM = np.dtype(
 class Sizes(NamedTuple):
     """Loop counts of a part, as the row has them: bending, axial, points."""
 
-    bending: int
-    axial: int
-    points: int
+    bending: np.int64
+    axial: np.int64
+    points: np.int64
 
 
 USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))
@@ -121,7 +121,8 @@ def transfer_beam(row, sizes, tables, scratch, z, c, sn, motion, gravity, positi
     n = sizes.bending
     size = n + sizes.axial
     fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
-    _pull_back_end(psi[sizes.points], rho[sizes.points], drho[sizes.points], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
+    end = sizes.points
+    _pull_back_end(psi[end], rho[end], drho[end], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
     _add_points(row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, gains, block, force)
     _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n], block)
     _add_stiffness(row, sizes, stiffness, z, motion, block, force)
@@ -155,7 +156,9 @@ def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, bl
 
 
 @inner
-def _add_points(row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force):
+def _add_points(
+    row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force
+):
     """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`.
 
     Into s only below its diagonal.
