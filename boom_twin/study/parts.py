@@ -15,10 +15,12 @@ from ..scene.parts import Scene
 from ..view.parts import Bars, parts_picture
 from .cost import step_times, unknowns
 from .deviation import FREQUENCIES, Answer, Course, Deviation, answer, course_of, deviation
+from .motion import DURATION
 from .report import machine, provenance, table, write_json
 from .variants import Variant, variants
 
 ROUNDS, QUICK_ROUNDS = 9, 3
+QUICK_DURATION = 2.0  # s
 NOTE = "surrogate parameters; one motion, another may differ"
 HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest mm", "f1, %", "f2, %", "f3, %", "step, us",
         "time saved, %", "unknowns", "status")  # fmt: skip
@@ -64,15 +66,15 @@ class Parts:
         return 1.0 - part.step_time / self.full_times[0]
 
 
-def measure(scene: Scene, rounds: int = ROUNDS) -> Parts:
-    """Every variant of a scene against the scene itself.
+def measure(scene: Scene, course: Course, rounds: int = ROUNDS) -> Parts:
+    """Every variant of a scene against the scene itself, times the least of `rounds`.
 
     Raises
     ------
     SolverError
         The scene itself has no equilibrium or fails in the move. A variant that does has a status.
     """
-    course, found = course_of(scene), variants(scene)
+    found = variants(scene)
     full = answer(scene, course, FREQUENCIES)
     if full.status != "ok":
         raise SolverError(f"the scene itself fails: {full.status}")
@@ -93,13 +95,19 @@ def _part(scene: Scene, variant: Variant, found: Answer, time: float, full: Answ
     return Part(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
 
 
-def write(scene: Scene, out: Path, quick: bool = False) -> None:
-    """Measure, and write ``parts.json``, ``parts.md`` and ``parts.png`` into the folder `out`."""
-    found = measure(scene, QUICK_ROUNDS if quick else ROUNDS)
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+    """Measure, and write ``parts.json``, ``parts.md`` and ``parts.png`` into the folder `out`; returns their paths.
+
+    The move starts at `posture`; `quick`: it is short, and times are the least of few rounds.
+    """
+    course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
+    found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "parts.json", {"machine": machine(), **as_json(found)})
-    (out / "parts.md").write_text(as_markdown(found), encoding="utf-8")
-    parts_picture(out / "parts.png", bars(found), NOTE)
+    paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
+    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    paths[1].write_text(as_markdown(found), encoding="utf-8")
+    parts_picture(paths[2], bars(found), NOTE)
+    return paths
 
 
 def as_json(found: Parts) -> dict[str, Any]:
