@@ -155,7 +155,7 @@ def measured(counts: Counter[str]) -> None:
     print("| what | figure |\n|---|---|")
     print(f"| operations in a step | {work} ({', '.join(f'{count} {kind}' for kind, count in counts.items())}) |")
     print(f"| a step, {found.passes:g} pass | {1e6 * step:.1f} us, {work / step / 1e9:.2f} G operations/s |")
-    print(f"| one core, scalar | {scalar / 1e9:.1f} G operations/s: the step at this rate would take {1e6 * work / scalar:.1f} us |")
+    print(f"| one core, scalar | {scalar / 1e9:.1f} G operations/s: at this rate {1e6 * work / scalar:.1f} us |")
     print(f"| one core, vectors | {wide / 1e9:.1f} G operations/s: {1e6 * work / wide:.1f} us |")
 
 
