@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
-    need.refuse_alone(args)
+    need.refuse_misuse(args)
     scene, oddities = examine(args.scene)
     account = explain(scene)
     name = args.scene or DEFAULT_NAME
