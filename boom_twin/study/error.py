@@ -59,7 +59,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
 
 
 def _rows(problem: Problem, quick: bool) -> list[Row]:
-    cases: list[Case] = [*own_cases(quick), *(peer_cases(quick) if problem.exudyn else ()), *stiff_cases(quick)]
+    cases: list[Case] = [*own_cases(problem.scene, quick), *(peer_cases(quick) if problem.exudyn else ()), *stiff_cases(quick)]
     rounds = 1 if quick else ROUNDS
     with tqdm(total=rounds * len(cases), desc="study error", file=sys.stderr, unit="case") as bar:
         return Runner(problem).rows(cases, rounds, bar.update)
@@ -163,7 +163,7 @@ def _equal(problem: Problem, rows: list[Row], duel: dict[str, Any] | None) -> st
         parts.append(
             f"Exudyn: build {build()}, sparse solver, one thread, generalised-alpha 0.8, all ways of Newton's method that the "
             "tables below name; its drives get their lengths from a Python function before every step, "
-            + (f"which takes up to {100 * share:.2g} % of its time." if share else "whose time was not measured.")
+            + (f"which takes {100 * share:.2g} % of its time." if share else "whose time was not measured.")
         )
     parts.append(
         "SciPy: `solve_ivp` on finite segments with all kinematics closed, vectorised in numpy, with the Jacobian of the stiff "

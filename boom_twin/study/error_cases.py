@@ -101,11 +101,12 @@ def with_modes(scene: Scene, modes: int) -> Scene:
     return scene.model_copy(update={"sections": sections, **own})
 
 
-def own_cases(quick: bool) -> list[Own]:
-    """Every variant of the default at every step; the default itself first."""
+def own_cases(scene: Scene, quick: bool) -> list[Own]:
+    """Every variant of the default at every step; the default itself first, and only once."""
     steps = STEPS[2:6] if quick else STEPS
-    variants = [*_few_variants()] if quick else [*_variants()]
-    return [replace(variant, step=step) for variant in [Own(), *variants] for step in steps]
+    variants = _few_variants() if quick else _variants()
+    kept = [variant for variant in variants if replace(variant, modes=None) != Own() or variant.scene(scene) != scene]
+    return [replace(variant, step=step) for variant in [Own(), *kept] for step in steps]
 
 
 def _few_variants() -> Iterator[Own]:
