@@ -149,7 +149,7 @@ def march(
         out = np.full((rows + 1, 2 * plan.joints + 9), np.nan)
         observe(plan.tables, state, out[0])
         begun = time.perf_counter()
-        status, row, total = run(
+        status, row, total, _ = run(
             plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
             method.tolerance, np.int64(method.passes), product, out[1:],
         )  # fmt: skip

@@ -38,6 +38,9 @@ class Simulation:
         x, y, orientation of the last head, in m and rad, and their rates.
     passes : float
         Newton passes per step, mean.
+    step_error : float
+        Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
+        |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     """
 
     times: Array
@@ -48,6 +51,7 @@ class Simulation:
     tip_velocity: Array
     tip_acceleration: Array
     passes: float
+    step_error: float
 
     def columns(self) -> dict[str, Array]:
         """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
@@ -93,15 +97,16 @@ def simulate(
     rows = np.empty((len(times), 2 * n + 9))
     observe(plan.tables, state, rows[0])
     steps, counts, drives, rates = _drive(plan, times, strokes, dt)
-    status, row, passes = run(
+    status, row, passes, jolt = run(
         plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     if status != OK:
         raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
     tip = rows[:, 2 * n :].reshape(-1, 3, 3)
     return Simulation(
-        times, strokes, rows[:, :n], rows[:, n : 2 * n], tip[:, 0], tip[:, 1], tip[:, 2], passes / max(int(counts.sum()), 1)
-    )
+        times, strokes, rows[:, :n], rows[:, n : 2 * n], tip[:, 0], tip[:, 1], tip[:, 2], passes / max(int(counts.sum()), 1),
+        abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt,
+    )  # fmt: skip
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:

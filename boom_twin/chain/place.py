@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..physics.beam import USUAL, Sizes, beam_shape, place_beam
+from ..physics.beam import USUAL, Sizes, beam_shape, is_usual, place_beam
 from ..physics.cylinder import place_cylinder
 from ..physics.jit import inner, kernel
 from ..physics.linkage import LINK_L
@@ -54,7 +54,7 @@ def place(t, state, work):
         frames[k, 0], frames[k, 1], frames[k, 2], frames[k, 3], frames[k, 4] = x, y, theta, c, s
         if kind == BEAM:
             beam, rho = t.beams[row], work.rho[row]
-            if beam.bending == USUAL.bending and beam.axial == USUAL.axial:
+            if is_usual(beam):
                 end = beam_shape(beam, USUAL, t.psi[row], t.weights[row], z, rho, work.drho[row], work.angles, work.turn[row])
                 place_beam(beam, USUAL, rho, work.angles, x, y, theta, c, s, position)
             else:

@@ -53,7 +53,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         else:
             status = plain_pass(t, state, work, motion, drive, drive_rate, product)
         if status != OK:
-            return status, k + 1, size
+            return reason(work, status), k + 1, size
         size = add_increments(t, state, work, longest)
         if not math.isfinite(size):
             return NOT_FINITE, k + 1, size
@@ -71,6 +71,15 @@ def predict(t, state, reach):
     for i in range(state.z.shape[0]):
         if t.moving[i] > 0.0:
             state.z[i] = x[i] + reach * (v[i] + 0.5 * reach * a[i])
+
+
+@inner
+def reason(work, status):
+    """NOT_FINITE in place of `status` if the force at the cut where a sweep stopped is not finite."""
+    for i in range(3):
+        if not math.isfinite(work.p[i]):
+            return NOT_FINITE
+    return status
 
 
 @inner
@@ -128,17 +137,22 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     -------
     status, row, passes : int
         Status of the last step and the row it belongs to; total of Newton passes.
+    jolt : float
+        Sum over all steps of h^2 |a' - a| of the tip, m: what the error of a step is measured by, see `Simulation`.
     """
-    at, total = 0, 0
+    at, total, jolt, a = 0, 0, 0.0, state.history[A]
     for row in range(steps.shape[0]):
-        scheme = prepare(family, parameter, steps[row], work.weights)
+        if row == 0 or steps[row] != steps[row - 1]:
+            scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
+            ax, ay = a[t.tip], a[t.tip + 1]
             status, count, _ = advance(
                 t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product
             )
             total += count
             at += 1
             if status != OK:
-                return status, row, total
+                return status, row, total, jolt
+            jolt += steps[row] * steps[row] * math.hypot(a[t.tip] - ax, a[t.tip + 1] - ay)
         observe(t, state, out[row])
-    return OK, steps.shape[0], total
+    return OK, steps.shape[0], total, jolt

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..physics.beam import USUAL, Sizes, transfer_beam
+from ..physics.beam import USUAL, Sizes, is_usual, transfer_beam
 from ..physics.jit import inner, kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
@@ -34,7 +34,7 @@ def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     tables = (t.psi[row], t.weights[row], t.stiffness[row], t.point_mass[row], t.point_rotary[row])
     scratch = (work.rho[row], work.drho[row], work.turn[row], work.local, work.block)
     beam = t.beams[row]
-    if beam.bending == USUAL.bending and beam.axial == USUAL.axial:
+    if is_usual(beam):
         return transfer_beam(
             beam, USUAL, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
             work.gains[operation], work.free[operation],

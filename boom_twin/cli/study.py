@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # kind: (module in boom_twin.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
     "error": ("error", "error against run time of all methods, beside two other programs"),
+    "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
 }
 
 

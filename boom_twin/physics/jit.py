@@ -10,15 +10,17 @@ costs no reference counting, which was nearly half of a step.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FOLDERS = ("physics", "chain", "estimate")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+COMPILING = "compiling the model, about half a minute; done once for this version and kept in %s"
 
 
 def _source_hash() -> str:
@@ -39,13 +41,16 @@ def cache_folder() -> Path:
     return home / "boom_twin" / _source_hash()
 
 
+@cache
 def _numba() -> Any:
-    """numba, its cache pointed at our folder."""
-    folder = str(cache_folder())
-    os.environ["NUMBA_CACHE_DIR"] = folder
+    """numba, its cache pointed at our folder; says so if that is empty."""
+    folder = cache_folder()
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
     import numba
 
-    numba.config.CACHE_DIR = folder
+    numba.config.CACHE_DIR = str(folder)
+    if not numba.config.DISABLE_JIT and not any(folder.glob("**/*.nbi")):
+        logging.getLogger("boom_twin").warning(COMPILING, folder)
     return numba
 
 

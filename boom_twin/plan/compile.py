@@ -23,6 +23,9 @@ from .layout import Layout
 
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
+# Gauss points beyond the number of shapes: polynomials, or functions that grow exponentially. The error of the quadrature
+# then stays below that of leaving out further shapes.
+MORE_POINTS = {"end-shapes": 1, "cantilever": 3}
 LOOP = 14  # most rows of the system of a six-bar
 
 
@@ -104,7 +107,7 @@ class _Builder:
     """Walks a scene from the base to the tip."""
 
     def __init__(self, scene: Scene, basis: BasisName) -> None:
-        self.scene, self.basis, self.layout = scene, BASES[basis], Layout()
+        self.scene, self.basis, self.more_points, self.layout = scene, BASES[basis], MORE_POINTS[basis], Layout()
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
         self.outline: list[tuple[int, int]] = []
         self.scale: list[float] = []
@@ -233,7 +236,7 @@ class _Builder:
         """A flexible part of section `index`."""
         section, n = self.scene.sections[index], self.scene.modes_of(index)
         assert section.A is not None and section.I is not None and section.rho_A is not None
-        points = max(3, n + 1)  # the quadrature's error stays below that of leaving out further shapes
+        points = max(3, n + self.more_points)
         basis = self.basis(n, points)
         _, share = modes.gauss_points(points)
         mass = (section.rho_A + (self.scene.line_fill or 0.0)) * length * share

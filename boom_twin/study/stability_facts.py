@@ -30,12 +30,15 @@ def against_motion(found: March, right: March, still: float) -> Facts:
     )
 
 
-def against_rest(found: March, equilibrium: Array | None, still: float) -> Facts:
-    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself."""
+def against_rest(found: March, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
+    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself.
+
+    `every` steps lie between rows; ringing is seen only where there is a row for each.
+    """
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
     away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
-    shares = _rings(found, None, found.times > still)
+    shares = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
     return Facts(
         found.status,
         drift=float(np.linalg.norm(away)) / _path(found),
@@ -58,7 +61,7 @@ def growth(motion: March, still: float) -> float:
 
 def alternating(values: Array) -> Array:
     """The part of rows (m, c) that changes sign from row to row, (m - 2, c); a smooth curve leaves next to nothing."""
-    return np.asarray(0.25 * (values[2:] - 2.0 * values[1:-1] + values[:-2]))
+    return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
 def _rings(found: March, right: March | None, late: np.ndarray) -> tuple[float, float]:

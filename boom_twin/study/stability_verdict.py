@@ -58,7 +58,7 @@ class Verdict:
 # quantity: (degrades above, fails above, symptom)
 BOUNDS: dict[str, tuple[float, float, str]] = {
     "error": (1e-2, 1e-1, "tip wrong by {} of its path"),
-    "acceleration": (5e-2, 0.5, "tip acceleration wrong by {} of its rms"),
+    "acceleration": (5e-2, 1.0, "tip acceleration wrong by {} of its rms"),
     "force": (1e-2, 1e-1, "cylinder forces wrong by {} of the largest"),
     "drift": (1e-4, 1e-2, "tip drifts by {} of its path"),
     "growth": (1.2, 3.0, "vibration grows {}-fold while the drives hold"),
@@ -95,4 +95,4 @@ def _grade(name: str, value: float) -> Word:
 
 
 def _shown(value: float) -> str:
-    return f"{value:.2g}" if abs(value) < 1e4 else f"{value:.0e}"
+    return f"{float(f'{value:.2g}'):g}"

@@ -68,6 +68,10 @@ def rod_pin_outboard_of_c():
 
 
 SCENES = [pytest.param(load_scene(), "arch", id="default")]
+SCENES += [
+    pytest.param(load_scene().model_copy(update={key: value}), "arch", id=f"{key} {value}")
+    for key, value in (("modes", 2), ("modes", 5), ("axial", False), ("geometric", False))
+]
 SCENES += [pytest.param(rod_pin_outboard_of_c(), "arch", id="rod pin outboard of C")]
 SCENES += [pytest.param(booms.random_boom(seed), "test", id=f"boom {seed}") for seed in SEEDS]
 

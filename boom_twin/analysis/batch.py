@@ -1,0 +1,141 @@
+"""Many booms of one structure stepped together over all cores: parameters, hypotheses, sensitivities."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..chain.batch import run_each
+from ..chain.status import OK, SENTENCES
+from ..chain.step import observe
+from ..errors import UsageError
+from ..physics.integrators import GENERALISED_ALPHA
+from ..plan.compile import Plan
+from ..records import Array
+from .simulate import PASSES, RHO, TOLERANCE
+from .statics import settle
+
+SHARES = 4  # pieces of work a core, so that one that is slowed down does not hold up the others
+
+
+class Batch:
+    """Booms that differ in numbers but not in structure, each with a state of its own.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        Compiled booms with the same operations, unknowns and bases: one scene with changed masses, stiffnesses, lengths.
+    cores : int, optional
+        Threads; all cores if not given.
+
+    Raises
+    ------
+    UsageError
+        No plan, or structures that differ; names the first boom that does.
+    """
+
+    def __init__(self, plans: Sequence[Plan], cores: int | None = None) -> None:
+        _check_structure(plans)
+        self.plans = tuple(plans)
+        self.cores = cores or len(os.sched_getaffinity(0))
+        self._tables = _stacked([plan.tables for plan in plans])
+        self._states = _stacked([plan.state() for plan in plans])
+        self._works = _stacked([plan.work() for plan in plans])
+
+    def settle(self, strokes: Array, angles: Array) -> Array:
+        """Bring every boom to rest at `strokes` (m) next to joint `angles` (rad), both (n,) or (booms, n).
+
+        Returns their first rows, shape (booms, 2 n + 9): joint angles, cylinder forces, x, v, a of the tip.
+
+        Raises
+        ------
+        SolverError
+            A boom has no equilibrium there.
+        """
+        n = self.plans[0].joints
+        rows = np.empty((len(self.plans), 2 * n + 9))
+        every = (len(self.plans), n)
+        for i, (at, near) in enumerate(zip(np.broadcast_to(strokes, every), np.broadcast_to(angles, every), strict=True)):
+            plan, state = self.plans[i], _part(self._states, i)
+            settle(plan, state, _part(self._works, i), at, near)
+            observe(plan.tables, state, rows[i])
+        return rows
+
+    def run(self, step: float, strokes: Array, rates: Array, every: int = 1, rho: float = RHO) -> Array:
+        """Step all booms along their strokes.
+
+        Parameters
+        ----------
+        step : float
+            s.
+        strokes, rates : ndarray, shape (steps, n) for all booms or (booms, steps, n)
+            m and m/s at the end of every step; `steps` is a multiple of `every`.
+        every : int
+            Steps to a row of results.
+
+        Returns
+        -------
+        ndarray, shape (booms, steps/every, 2 n + 9)
+            Joint angles, cylinder forces, x, v, a of tip x, y, angle. NaN from where a boom's step failed; see `failures`.
+        """
+        count, n = len(self.plans), self.plans[0].joints
+        total = np.shape(strokes)[-2]
+        if total % every:
+            raise UsageError(f"strokes = {total} steps: not a multiple of every = {every}. Give whole rows.")
+        closed = np.array([plan.closed_lengths for plan in self.plans])[:, None]
+        drives = np.ascontiguousarray(closed + np.broadcast_to(strokes, (count, total, n)))
+        speeds = np.ascontiguousarray(np.broadcast_to(rates, (count, total, n)))
+        rows = total // every
+        steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
+        out, self._ends = np.full((count, rows, 2 * n + 9), np.nan), np.zeros((count, 3), np.int64)
+
+        def share(bounds: tuple[int, int]) -> None:
+            run_each(
+                self._tables, self._states, self._works, *bounds, steps, counts, drives, speeds, GENERALISED_ALPHA, rho,
+                TOLERANCE, PASSES, out, self._ends,
+            )  # fmt: skip
+
+        limits = np.linspace(0, count, min(count, SHARES * self.cores) + 1).astype(int).tolist()
+        with ThreadPoolExecutor(self.cores) as pool:
+            list(pool.map(share, pairwise(limits)))
+        return out
+
+    def failures(self) -> dict[int, str]:
+        """Booms whose last run ended early, and why."""
+        return {i: SENTENCES[int(status)] for i, (status, _, _) in enumerate(self._ends) if status != OK}
+
+
+def _check_structure(plans: Sequence[Plan]) -> None:
+    if not plans:
+        raise UsageError("plans = none: give at least one compiled boom.")
+    first = plans[0]
+    for i, plan in enumerate(plans):
+        same = plan.names == first.names and all(_alike(a, b) for a, b in zip(plan.tables, first.tables, strict=True))
+        if not same:
+            raise UsageError(
+                f"plans[{i}]: another structure than plans[0] (parts that one of them leaves out, or other modes). Give booms "
+                "that differ in numbers only."
+            )
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """Same shape, and the same places of rows and histories."""
+    if np.shape(a) != np.shape(b):
+        return False
+    names = getattr(a, "dtype", np.dtype(float)).names or ()
+    return all(np.array_equal(a[name], b[name]) for name in names if a.dtype[name].kind == "i")
+
+
+def _stacked(parts: Sequence[Any]) -> Any:
+    """Named tuples of arrays as one, a leading axis over them; what is not an array is common."""
+    columns = zip(*parts, strict=True)
+    return type(parts[0])(*(np.stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
+
+
+def _part(stack: Any, i: int) -> Any:
+    return type(stack)(*(column[i] for column in stack))
