@@ -54,7 +54,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     write_json(paths[0], _content(problem, rows, duel))
     paths[1].write_text(_report(problem, rows, duel), encoding="utf-8")
     work_precision_picture(paths[2], "Error against run time", NOTE, main_panels(problem, rows))
-    methods_picture(paths[3], "Methods of boom_twin: error against run time", NOTE, method_panels(rows))
+    methods_picture(paths[3], "Methods of boom_twin: error against run time", NOTE, method_panels(scene, rows))
     return paths
 
 
