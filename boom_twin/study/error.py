@@ -13,7 +13,7 @@ from ..scene.parts import Scene
 from ..view.work_precision import methods_picture, work_precision_picture
 from .error_cases import Case, Own, Peer, Stiff, own_cases, peer_cases, stiff_cases
 from .error_choice import paragraph
-from .error_front import acceleration, front, matches, of, tip
+from .error_front import acceleration, best_way, front, matches, of, tip
 from .error_panels import main_panels, method_panels
 from .error_problem import Problem, pose
 from .error_run import ROUNDS, Row, Runner, in_turn
@@ -49,7 +49,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     out.mkdir(parents=True, exist_ok=True)
     problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
     rows = _rows(problem, quick)
-    duel = _duel(problem, QUICK_TURNS if quick else TURNS)
+    duel = _duel(problem, rows, QUICK_TURNS if quick else TURNS)
     paths = [out / name for name in ("error.json", "error.md", "error.png", "error_methods.png")]
     write_json(paths[0], _content(problem, rows, duel))
     paths[1].write_text(_report(problem, rows, duel), encoding="utf-8")
@@ -65,14 +65,15 @@ def _rows(problem: Problem, quick: bool) -> list[Row]:
         return Runner(problem).rows(cases, rounds, bar.update)
 
 
-def _duel(problem: Problem, turns: int) -> dict[str, Any] | None:
-    """The default against Exudyn with few elements at the same step, in turn."""
-    if problem.exudyn is None:
+def _duel(problem: Problem, rows: list[Row], turns: int) -> dict[str, Any] | None:
+    """The default against Exudyn's best way with few elements at the same step, in turn."""
+    best = best_way(rows, SAME_ELEMENTS, SAME_STEP)
+    if best is None or not isinstance(best.case, Peer):
         return None
-    own, peer = in_turn(problem, Own(SAME_STEP), Peer(SAME_STEP, SAME_ELEMENTS, True, 1e-6), turns)
+    own, peer = in_turn(problem, Own(SAME_STEP), best.case, turns)
     middle = [sorted(values)[len(values) // 2] for values in (own, peer)]
     return {
-        "step_s": SAME_STEP, "elements": SAME_ELEMENTS, "boom_twin_s": own, "exudyn_s": peer,
+        "step_s": SAME_STEP, "elements": SAME_ELEMENTS, "exudyn_method": best.case.label, "boom_twin_s": own, "exudyn_s": peer,
         "ratio_of_medians": middle[1] / middle[0], "ratio_of_minima": min(peer) / min(own),
     }  # fmt: skip
 
@@ -156,9 +157,8 @@ def _equal(problem: Problem, rows: list[Row], duel: dict[str, Any] | None) -> st
         own, peer = (sorted(duel[key])[len(duel[key]) // 2] for key in ("boom_twin_s", "exudyn_s"))
         share = feeding_share(rows)
         parts.append(
-            f"At the same step of {1e3 * SAME_STEP:g} ms, in turn: boom_twin {1e6 * own * SAME_STEP:.3g} us a step, Exudyn "
-            f"with {SAME_ELEMENTS} elements a section {1e6 * peer * SAME_STEP:.3g} us, {duel['ratio_of_medians']:.3g} times "
-            f"as long (of the fastest runs: {duel['ratio_of_minima']:.3g})."
+            f"At the same step of {1e3 * SAME_STEP:g} ms, in turn: boom_twin {1e6 * own * SAME_STEP:.3g} us a step, "
+            f"{duel['exudyn_method']}, {1e6 * peer * SAME_STEP:.3g} us, {duel['ratio_of_medians']:.3g} times as long (of the fastest runs: {duel['ratio_of_minima']:.3g})."
         )
         parts.append(
             f"Exudyn: build {build()}, sparse solver, one thread, generalised-alpha 0.8, all ways of Newton's method that the "

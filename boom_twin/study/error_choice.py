@@ -7,11 +7,10 @@ from dataclasses import replace
 
 from ..scene.parts import Scene
 from .error_cases import DEFAULT_STEP, Own, with_modes
-from .error_front import NOISE, acceleration, better, fastest, front, of, tip
+from .error_front import NOISE, SAME, acceleration, better, fastest, front, of, tip
 from .error_run import Row
 from .error_text import name, run_time
 
-SAME = 1.1  # errors that differ by less than a tenth count as equal
 GOALS = ((1.0, 0.03), (0.1, 0.01))  # mm, relative: what a user may want, for the advice on steps
 
 

@@ -10,6 +10,7 @@ from .error_run import Row
 
 EQUAL = (0.3, 1.0, 3.0, 10.0)  # mm
 NOISE = 0.9  # a run must take less than this share of another's time to be called faster
+SAME = 1.1  # errors that differ by less than a tenth count as equal
 Measure = Callable[[Row], float]
 
 
@@ -40,6 +41,12 @@ def fastest(rows: Sequence[Row], most: float, error: Measure = tip) -> Row | Non
 def of(rows: Sequence[Row], kind: type) -> list[Row]:
     """Rows of one program: `Own`, `Peer` or `Stiff`."""
     return [row for row in rows if isinstance(row.case, kind)]
+
+
+def best_way(rows: Sequence[Row], elements: int, step: float) -> Row | None:
+    """Exudyn's fastest way to solve a step that errs at the tip at most a tenth more than its best, None if none ran."""
+    here = [row for row in rows if isinstance(row.case, Peer) and (row.case.elements, row.case.step) == (elements, step)]
+    return fastest(here, SAME * min((row.tip_mm for row in here if row.good), default=0.0))
 
 
 @dataclass(frozen=True)

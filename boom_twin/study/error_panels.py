@@ -9,7 +9,7 @@ from ..scene.parts import Scene
 from ..view.work_precision import TONES, Curve, Panel
 from .error_cases import PAPERS, Case, Own, Peer, Stiff
 from .error_choice import find
-from .error_front import Measure, acceleration, fastest, front, of, tip
+from .error_front import Measure, acceleration, best_way, front, of, tip
 from .error_problem import Problem
 from .error_run import Row
 
@@ -52,14 +52,13 @@ def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _exudyn(rows: Sequence[Row]) -> list[list[Row]]:
-    """One curve per number of elements: at every step the fastest way that errs no more than a tenth above the best."""
+    """One curve per number of elements: at every step its best way."""
     curves = []
     cases = [row.case for row in rows if isinstance(row.case, Peer)]
     for elements in sorted({case.elements for case in cases}):
         curve = []
         for step in sorted({case.step for case in cases}):
-            here = [r for r in rows if isinstance(r.case, Peer) and (r.case.elements, r.case.step) == (elements, step)]
-            best = fastest(here, 1.1 * min((r.tip_mm for r in here if r.good), default=0.0))
+            best = best_way(rows, elements, step)
             curve += [best] if best is not None else []
         curves += [curve] if curve else []
     return curves
