@@ -18,7 +18,7 @@ PAPERS_NAME = "as in the papers"
 
 def main_panels(problem: Problem, rows: Sequence[Row]) -> tuple[Panel, Panel]:
     """Tip and acceleration, all programs; of Exudyn's ways to solve a step, the fastest at each number of elements."""
-    apart = (None, None) if problem.exudyn is None else problem.own.path.away(problem.exudyn.path)
+    apart = problem.apart or (None, None)
     percent: Measure = lambda row: 100.0 * acceleration(row)  # noqa: E731
     return (
         _panel("Tip", "error of the tip, mm rms", rows, tip, apart[0]),
