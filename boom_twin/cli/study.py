@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # kind: (module in boom_twin.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
     "error": ("error", "error against run time of all methods, beside two other programs"),
+    "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
 }
 
@@ -30,6 +31,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         own.add_argument("--out", required=True, metavar="DIR", help="folder for tables, numbers and pictures")
         own.add_argument("--posture", metavar="NAME", help="where the motion starts (default: arch, or the first)")
         own.add_argument("--quick", action="store_true", help="few cases on a short motion")
+        if name == "stability":
+            own.add_argument("--soak", action="store_true", help="also the holds of 24 simulated hours, some minutes more")
 
 
 def run(args: Namespace) -> int:
@@ -37,6 +40,7 @@ def run(args: Namespace) -> int:
     from .common import open_scene
 
     write: Callable[..., list[Path]] = import_module(f"boom_twin.study.{KINDS[args.kind][0]}").write
-    for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture):
+    options = {"soak": True} if getattr(args, "soak", False) else {}
+    for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture, **options):
         print(path)
     return 0
