@@ -71,7 +71,7 @@ def _rho(rows: Sequence[Row]) -> str:
         return ""
     worse = sorted({row.case.label for row in _rising(of(rows, Own))})
     end = f" With too little damping the acceleration gets worse as the step gets smaller: {'; '.join(worse)}." if worse else ""
-    return f"rho, at the default step: {', '.join(text for _, text in sorted(told))} of the time's error at the tip.{end}"
+    return f"rho, at the default step, against the own reference: {', '.join(text for _, text in sorted(told))}.{end}"
 
 
 def _rising(rows: Sequence[Row]) -> list[Row]:
