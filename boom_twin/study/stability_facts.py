@@ -20,6 +20,7 @@ def against_motion(found: March, right: March, still: float) -> Facts:
     shares = _rings(found, right, late)
     return Facts(
         found.status,
+        doubt=found.doubt,
         error=_largest(found.tip - right.tip) / path,
         acceleration=_rms(found.tip_acceleration - right.tip_acceleration) / max(_rms(right.tip_acceleration), 1e-12),
         force=_rms(found.cylinder_forces - right.cylinder_forces) / max(_largest(right.cylinder_forces), 1e-12),
@@ -41,6 +42,7 @@ def against_rest(found: March, equilibrium: Array | None, still: float, every: i
     shares = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
     return Facts(
         found.status,
+        doubt=found.doubt,
         drift=float(np.linalg.norm(away)) / _path(found),
         ringing=shares[0],
         force_ringing=shares[1],
