@@ -144,7 +144,8 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     """
     at, total, jolt, shake, a = 0, 0, 0.0, 0.0, state.history[A]
     for row in range(steps.shape[0]):
-        scheme = prepare(family, parameter, steps[row], work.weights)
+        if row == 0 or steps[row] != steps[row - 1]:
+            scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
             status, count, _ = advance(

@@ -24,7 +24,9 @@ SYMBOLS = {
 INTRODUCTION = """# Stability on stiff and extreme cases
 
 Every case is marched by every method and judged against what is right there: the default method at an eighth of the step with
-a Newton tolerance of 1e-10 rad (not below 5e-6 s, where round-off takes over), or the equilibrium.
+a Newton tolerance of 1e-10 rad (not below 5e-6 s, where round-off takes over), or the equilibrium. For 50 ms after a jump of
+speed, accelerations and forces are impulses without a value of their own and are not compared; how long they disturb the
+forces is.
 
 - ● holds: every bound below is kept.
 - ◐ degrades: usable, with the symptom listed below.
@@ -42,10 +44,11 @@ def mark(cell: Cell) -> str:
 
 def text(
     rows: Sequence[Row], long_rows: Sequence[Row], limits: dict[str, Limit], losses: Sequence[Loss], turned: TurnUp,
-    told: dict[str, object],
+    move: str,
 ) -> str:  # fmt: skip
-    """The whole report; `long_rows` are holds of a day, `told` stands in the paragraph about the run."""
-    parts = [INTRODUCTION, provenance(**told), "\n## Matrix\n\n", _matrix(rows), "\n## Bounds\n\n", _bounds()]
+    """The whole report; `long_rows` are holds of a day, `move` tells of the scene's motion."""
+    parts = [INTRODUCTION, f"The move: {move}. Cases take it, or a share of it, in 1 s unless they say otherwise.\n\n"]
+    parts += [provenance(), "\n## Matrix\n\n", _matrix(rows), "\n## Bounds\n\n", _bounds()]
     parts += ["\n## Silent failures\n\n", _silent(rows), "\n## Symptoms\n\n", "".join(_symptoms(rows))]
     if long_rows:
         parts += ["\n## Holds of 24 simulated hours\n\n", _long(long_rows)]

@@ -100,7 +100,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
         right, stride = _right(setup)
         if right.status != "ok":
             return _none, f"{NOTHING}: the reference ended, {right.status}"
-        return lambda found: _against(found, right, stride, setup.still), f"default method at {_fine(setup):.3g} s"
+        return lambda found: _against(found, right, stride, setup), f"default method at {_fine(setup):.3g} s"
     rest = _equilibrium(setup) if case.truth == "equilibrium" else None
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
     return lambda found: _ended(found) or against_rest(found, rest, setup.still, setup.every), told
@@ -110,8 +110,8 @@ def _none(found: March) -> Facts:
     return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
 
 
-def _against(found: March, right: March, stride: int, still: float) -> Facts:
-    return _ended(found) or against_motion(_thinned(found, stride), right, still)
+def _against(found: March, right: March, stride: int, setup: Setup) -> Facts:
+    return _ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump)
 
 
 def _ended(found: March) -> Facts | None:

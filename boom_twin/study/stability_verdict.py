@@ -32,6 +32,8 @@ class Facts:
         Vibration in the last quarter of the hold over that in the first, as a multiple of what is right.
     drift : float
         From the equilibrium, or of the mean, at the end of a long hold, as a share of the tip's path.
+    lasting : float
+        Steps after a jump of speed until cylinder forces are right again.
     passes : float
         Newton passes per step.
     """
@@ -46,6 +48,7 @@ class Facts:
     force_ringing: float = math.nan
     growth: float = math.nan
     drift: float = math.nan
+    lasting: float = math.nan
     passes: float = math.nan
 
 
@@ -67,6 +70,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "growth": (1.2, 3.0, "vibration grows {}-fold while the drives hold"),
     "ringing": (2e-2, 0.5, "tip acceleration rings from step to step, {} of its peak"),
     "force_ringing": (2e-2, 0.5, "cylinder forces ring from step to step, {} of their peak"),
+    "lasting": (10.0, math.inf, "cylinder forces are wrong for {} steps after the jump of speed"),
     "passes": (6.0, math.inf, "slow Newton: {} passes a step"),
 }
 
