@@ -97,7 +97,7 @@ def simulate(
     rows = np.empty((len(times), 2 * n + 9))
     observe(plan.tables, state, rows[0])
     steps, counts, drives, rates = _drive(plan, times, strokes, dt)
-    status, row, passes, jolt = run(
+    status, row, passes, jolt, _ = run(
         plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     if status != OK:

@@ -29,6 +29,7 @@ def against_motion(found: March, right: March, still: float, jump: float = math.
     shares = _rings(found, right, late & smooth)
     return Facts(
         found.status,
+        doubt=found.doubt,
         error=_largest(found.tip - right.tip) / path,
         acceleration=_rms((found.tip_acceleration - right.tip_acceleration)[smooth])
         / max(_rms(right.tip_acceleration[smooth]), 1e-12),
@@ -62,6 +63,7 @@ def against_rest(found: March, equilibrium: Array | None, still: float, every: i
     shares = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
     return Facts(
         found.status,
+        doubt=found.doubt,
         drift=float(np.linalg.norm(away)) / _path(found),
         ringing=shares[0],
         force_ringing=shares[1],

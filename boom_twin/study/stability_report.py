@@ -30,8 +30,8 @@ forces is.
 
 - ● holds: every bound below is kept.
 - ◐ degrades: usable, with the symptom listed below.
-- ✕ fails: no usable numbers, and the status says so.
-- ‼ fails silently: wrong numbers while the status is "ok".
+- ✕ fails: no usable numbers, and the status or a warning says so.
+- ‼ fails silently: wrong numbers, and neither says so.
 - ○ refuses: there is no solution, and the status says so.
 
 """

@@ -107,7 +107,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
 
 
 def _none(found: March) -> Facts:
-    return Facts(found.status, solvable=False, passes=found.passes)
+    return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
 
 
 def _against(found: March, right: March, stride: int, setup: Setup) -> Facts:

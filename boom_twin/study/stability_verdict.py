@@ -19,6 +19,8 @@ class Facts:
         "ok", or why the motion did not start or ended.
     solvable : bool
         Whether there is a solution at all.
+    doubt : str
+        What the motion itself gave reason to doubt, see `analysis.doubt`.
     error : float
         Largest error of the tip, as a share of the tip's path.
     acceleration, force : float
@@ -38,6 +40,7 @@ class Facts:
 
     status: str
     solvable: bool = True
+    doubt: str = ""
     error: float = math.nan
     acceleration: float = math.nan
     force: float = math.nan
@@ -51,7 +54,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Verdict:
-    """`silent`: the numbers are wrong while the status says "ok"."""
+    """`silent`: the numbers are wrong, the status says "ok" and nothing is doubted."""
 
     word: Word
     symptom: str
@@ -76,17 +79,18 @@ def verdict(facts: Facts) -> Verdict:
     """The verdict on `facts`, by `BOUNDS`."""
     if facts.status != "ok":
         return Verdict("fails" if facts.solvable else "refuses", facts.status)
+    told = f" (it says: {facts.doubt})" if facts.doubt else ""
     if not facts.solvable:
-        return Verdict("fails", "gives numbers where there is no solution", silent=True)
+        return Verdict("fails", "gives numbers where there is no solution" + told, silent=not facts.doubt)
     beyond = {name: _grade(name, getattr(facts, name)) for name in BOUNDS}
     symptoms = {
         grade: [BOUNDS[name][2].format(_shown(getattr(facts, name))) for name, own in beyond.items() if own == grade]
         for grade in ("fails", "degrades")
     }
     if symptoms["fails"]:
-        return Verdict("fails", "; ".join(symptoms["fails"] + symptoms["degrades"]), silent=True)
+        return Verdict("fails", "; ".join(symptoms["fails"] + symptoms["degrades"]) + told, silent=not facts.doubt)
     if symptoms["degrades"]:
-        return Verdict("degrades", "; ".join(symptoms["degrades"]))
+        return Verdict("degrades", "; ".join(symptoms["degrades"]) + told)
     return Verdict("holds", "")
 
 

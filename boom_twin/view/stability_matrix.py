@@ -17,8 +17,8 @@ MARKS: dict[str, tuple[str, str, str, str]] = {
     "holds": ("H", "#DCE9F3", "#5B7F9B", "holds"),
     "refuses": ("R", "#FFFFFF", INK, "refuses: there is no solution, the status says so"),
     "degrades": ("D", "#F0C75E", INK, "degrades"),
-    "fails": ("F", "#D55E00", "#FFFFFF", "fails, the status says so"),
-    "silent": ("S", "#4A0E0E", "#FFFFFF", "fails silently: wrong numbers, status ok"),
+    "fails": ("F", "#D55E00", "#FFFFFF", "fails, and says so"),
+    "silent": ("S", "#4A0E0E", "#FFFFFF", "fails silently: wrong numbers, no word"),
 }
 ROW, TOP, BELOW = 0.25, 1.6, 0.9  # inches
 NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches

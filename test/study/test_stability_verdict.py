@@ -33,6 +33,12 @@ def test_a_failure_with_a_status_is_not_silent():
     assert (found.word, found.silent, found.symptom) == ("fails", False, "the equations did not converge")
 
 
+def test_a_failure_with_a_doubt_is_not_silent():
+    found = verdict(Facts(**{**vars(GOOD), "error": 0.5, "doubt": "the step is coarse"}))
+    assert found.word == "fails" and not found.silent
+    assert found.symptom.endswith("(it says: the step is coarse)")
+
+
 def test_without_a_solution_a_status_is_right_and_numbers_are_wrong():
     assert verdict(Facts("no equilibrium", solvable=False)).word == "refuses"
     numbers = verdict(Facts("ok", solvable=False))
