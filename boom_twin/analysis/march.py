@@ -18,6 +18,7 @@ from ..plan.compile import BasisName, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
+from .doubt import doubt
 from .simulate import PASSES, RHO, TOLERANCE
 from .statics import settle
 
@@ -88,6 +89,8 @@ class March:
         Newton passes per step, mean.
     status : str
         "ok", or why the motion ended.
+    doubt : str
+        What the motion itself gives reason to doubt: too coarse a step, ringing; see `analysis.doubt`.
     """
 
     times: Array
@@ -99,6 +102,7 @@ class March:
     steps: int
     passes: float
     status: str
+    doubt: str = ""
 
 
 def march(
@@ -149,13 +153,14 @@ def march(
         out = np.full((rows + 1, 2 * plan.joints + 9), np.nan)
         observe(plan.tables, state, out[0])
         begun = time.perf_counter()
-        status, row, total, _ = run(
+        status, row, total, jolt, shake = run(
             plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
             method.tolerance, np.int64(method.passes), product, out[1:],
         )  # fmt: skip
         seconds.append(time.perf_counter() - begun)
     n, done = plan.joints, max(int(row), 1) * every
     tip = out[:, 2 * n :].reshape(-1, 3, 3)
+    travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return March(
         times=np.asarray(step * every * np.arange(rows + 1), float),
         tip=tip[:, 0, :2],
@@ -166,6 +171,7 @@ def march(
         steps=rows * every,
         passes=total / done,
         status="ok" if status == OK else SENTENCES[status],
+        doubt=doubt(jolt, shake, travel, step * rows * every * step) if status == OK else "",
     )
 
 

@@ -41,7 +41,7 @@ def run_each(tables, states, works, first, last, steps, counts, drives, rates, f
     ends : ndarray of int, shape (booms, 3): status, row, passes of each, see `run`.
     """
     for i in range(first, last):
-        status, row, total, _ = run(
+        status, row, total, _, _ = run(
             tables_of(tables, i), state_of(states, i), work_of(works, i), steps, counts, drives[i], rates[i],
             family, parameter, tolerance, passes, None, out[i],
         )  # fmt: skip

@@ -139,10 +139,13 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         Status of the last step and the row it belongs to; total of Newton passes.
     jolt : float
         Sum over all steps of h^2 |a' - a| of the tip, m: what the error of a step is measured by, see `Simulation`.
+    shake : float
+        Sum over all steps of h^2 |a'| of the tip, m: half of `jolt` where the acceleration changes sign from step to step.
     """
-    at, total, jolt, a = 0, 0, 0.0, state.history[A]
+    at, total, jolt, shake, a = 0, 0, 0.0, 0.0, state.history[A]
     for row in range(steps.shape[0]):
-        scheme = prepare(family, parameter, steps[row], work.weights)
+        if row == 0 or steps[row] != steps[row - 1]:
+            scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
             status, count, _ = advance(
@@ -151,7 +154,8 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             total += count
             at += 1
             if status != OK:
-                return status, row, total, jolt
+                return status, row, total, jolt, shake
             jolt += steps[row] * steps[row] * math.hypot(a[t.tip] - ax, a[t.tip + 1] - ay)
+            shake += steps[row] * steps[row] * math.hypot(a[t.tip], a[t.tip + 1])
         observe(t, state, out[row])
-    return OK, steps.shape[0], total, jolt
+    return OK, steps.shape[0], total, jolt, shake

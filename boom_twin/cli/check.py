@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
-    need.refuse_alone(args)
+    need.refuse_misuse(args)
     scene, oddities = examine(args.scene)
     account = explain(scene)
     name = args.scene or DEFAULT_NAME
@@ -82,7 +82,7 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
     lines += ["", "Sections", *_indent(_sections(account))]
     lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
-    lines += ["", "Left out of the model (absent from the scene, or zero)", *_indent(_left_out(account))]
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
     lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
     lines += ["", f"Warnings: {len(oddities) or 'none'}", *(f"  {oddity}" for oddity in oddities)]
     return lines
@@ -116,7 +116,7 @@ def _section_words(section: SectionAccount) -> str:
     if section.splits:
         words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
     if len(section.parts) > len(section.splits) + 1:
-        words += f", cut evenly because fewer than {LEAST} sections bend"
+        words += f", cut evenly so that at least {LEAST} parts bend"
     parts = f"{len(section.parts)} parts with {coordinates} each" if len(section.parts) > 1 else coordinates
     return f"{words}: {parts}"
 

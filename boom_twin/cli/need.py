@@ -43,11 +43,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--against", metavar="FULL", help=purpose)
 
 
-def refuse_alone(args: Namespace) -> None:
-    """UsageError for an option that goes with ``--need``, without it."""
+def refuse_misuse(args: Namespace) -> None:
+    """UsageError for an option that goes with ``--need``, without it, and for writing over the scene that is read."""
     for option in ("out", "against"):
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
+    for source in filter(None, (args.scene, args.against)):
+        if args.out is not None and args.out.resolve() == Path(source).resolve():
+            raise UsageError(f"--out {args.out}: this is the scene that is read. Name another file.")
 
 
 def tip_error(text: str) -> float:

@@ -20,6 +20,7 @@ from .segments import Segments
 
 Solver = Literal["Radau", "BDF", "LSODA"]
 ABSOLUTE = 1e-2  # absolute tolerance of a coordinate (rad, m) over the relative one; ten times that for rates
+LONG = 2.0  # s
 MOST = 400  # coordinates; beyond, the equilibrium alone takes minutes
 
 
@@ -76,7 +77,7 @@ def follow(
     solver : str
         Of `scipy.integrate.solve_ivp`. Radau was the fastest for errors of the tip from 0.1 to 3 mm.
     repeats : int
-        How often the motion is stepped, for the time.
+        How often the motion is stepped, for the time; fewer times if that takes more than `LONG`.
 
     Raises
     ------
@@ -98,8 +99,8 @@ def follow(
 
     absolute = ABSOLUTE * tolerance * np.repeat([1.0, 10.0], size)
     span, first = (float(times[0]), float(times[-1])), np.concatenate([start, np.zeros(size)])
-    seconds = []
-    for _ in range(repeats):
+    seconds: list[float] = []
+    while not seconds or (len(seconds) < repeats and sum(seconds) < LONG):
         begun = time.perf_counter()
         try:
             found = solve_ivp(rates, span, first, solver, t_eval=times, rtol=tolerance, atol=absolute, jac=slopes)

@@ -147,13 +147,19 @@ def start_step(scheme, history, hat, offset):
 
 @inner
 def finish_step(scheme, position, hat, offset, history):
-    """Write the new history of all scalars from their `position`, shape (n,), at the instant solved for."""
+    """Write the new history of all scalars from their `position`, shape (n,), at the instant solved for.
+
+    `hat` and `offset` hold the new accelerations and velocities afterwards.
+    """
+    a, v = hat, offset
+    for i in range(position.shape[0]):
+        a[i] = scheme.gain * (position[i] - hat[i])
+        v[i] = scheme.rate * position[i] + offset[i]
     for k in range(history.shape[0]):
         row, weights = history[k], scheme.weights[ROWS + k]
         for_x, for_v, for_a, keep = weights[NEW_X], weights[NEW_V], weights[NEW_A], weights[OLD + k]
         for i in range(position.shape[0]):
-            v, a = scheme.rate * position[i] + offset[i], scheme.gain * (position[i] - hat[i])
-            row[i] = for_x * position[i] + for_v * v + for_a * a + keep * row[i]
+            row[i] = for_x * position[i] + for_v * v[i] + for_a * a[i] + keep * row[i]
         for j in range(k + 1, history.shape[0]):
             share, older = weights[OLD + j], history[j]
             if share != 0.0:

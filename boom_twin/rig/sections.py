@@ -12,7 +12,6 @@ from .assembly import Frame
 from .peer import items
 from .system import Boom, BuiltSection, Station
 
-SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect
 SAME_PLACE = 1e-9  # m
 
 
@@ -60,6 +59,7 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
     section, scene = boom.scene.sections[index], boom.scene
     assert section.A is not None and section.I is not None
     axial, bending, beta = scene.material.E * section.A, scene.material.E * section.I, section.beta or 0.0
+    shear = boom.shear_over_axial * axial
     places = np.linspace(ends[0].x, ends[1].x, elements + 1)
     inner = [boom.node(frame.point((float(x), 0.0)), frame.angle) for x in places[1:-1]]
     nodes = [ends[0].node, *inner, ends[1].node]
@@ -72,10 +72,10 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
                 crossSectionInertia=section.rho_I or 0.0,
                 bendingStiffness=bending,
                 axialStiffness=axial,
-                shearStiffness=SHEAR_OVER_AXIAL * axial,
+                shearStiffness=shear,
                 bendingDamping=beta * bending,
                 axialDamping=beta * axial,
-                shearDamping=beta * SHEAR_OVER_AXIAL * axial,
+                shearDamping=beta * shear,
             )
         )
         boom.weigh(int(beam))

@@ -55,6 +55,8 @@ class Boom:
     container, system : object
         Exudyn's SystemContainer and MainSystem.
     sections : list of BuiltSection
+    shear_over_axial : float
+        GA over EA of all beams.
     drives : list of (int, str)
         Connector of each cylinder, and the name of its length parameter.
     """
@@ -64,6 +66,7 @@ class Boom:
     system: Any
     gravity: list[float]
     ground: int
+    shear_over_axial: float
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)
 

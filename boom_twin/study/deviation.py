@@ -14,7 +14,7 @@ from ..plan.compile import Plan, compile_scene
 from ..records import Array
 from ..scene.kinematics import posture_angles, strokes_of_posture
 from ..scene.parts import Scene
-from .motion import Motion, motion_of
+from .motion import DURATION, Motion, motion_of
 
 STEP = 1e-3  # s
 EVERY = 4
@@ -85,9 +85,9 @@ class Deviation:
         return max(self.rest, self.most)
 
 
-def course_of(scene: Scene) -> Course:
-    """All postures of a scene, and `motion_of` it."""
-    motion = motion_of(scene)
+def course_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Course:
+    """All postures of a scene, and its `motion_of` from `posture` for `duration` (s)."""
+    motion = motion_of(scene, posture, duration)
     names = tuple(scene.postures)
     strokes = [*(strokes_of_posture(scene, name) for name in names), motion.first]
     angles = [*(posture_angles(scene, name) for name in names), motion.angles]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from .error_cases import Case, Own, Peer, Stiff
 from .error_problem import ROW, Path, Problem, every, path_of
 from .exudyn import load_rig
 
-OWN_REPEATS, PEER_REPEATS = 5, 3
-LONG = 4000  # steps; a run of more is timed once in a program that takes seconds for it
+ROUNDS = 5  # over all cases, so that the runs of a case lie minutes apart; the time is their median
+OWN_REPEATS = 3  # in each of them
+PEER_ROUNDS = 3
+LONG = 2.0  # s of wall time; a peer that takes longer is not run again
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class Row:
         The same of its acceleration, relative.
     seconds : float
         Of wall time per simulated second, stepping alone.
+    feeding : float
+        Share of it in which Exudyn's drives get their lengths.
     """
 
     case: Case
@@ -77,29 +82,39 @@ class Row:
 class Runner:
     """Runs cases on one problem; booms of Exudyn that are at rest are kept and moved again."""
 
-    def __init__(self, problem: Problem, own_repeats: int = OWN_REPEATS, peer_repeats: int = PEER_REPEATS) -> None:
-        self.problem, self.own_repeats, self.peer_repeats = problem, own_repeats, peer_repeats
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
         self.resting: dict[int, Any] = {}
 
-    def rows(self, cases: list[Case], tick: Callable[[], object]) -> Iterator[Row]:
-        """A row for every case; `tick` is called after each."""
-        for case in cases:
-            yield self.row(case)
-            tick()
+    def rows(self, cases: list[Case], rounds: int, tick: Callable[[], object]) -> list[Row]:
+        """A row for every case, in their order; `tick` is called after each case of each of the `rounds`."""
+        found, times = dict[Case, Row](), dict[Case, list[float]]()
+        for turn in range(rounds):
+            for case in cases:
+                if turn == 0 or self._again(case, found[case], turn):
+                    row = self.row(case)
+                    found.setdefault(case, row)
+                    times.setdefault(case, []).append(row.seconds)
+                tick()
+        return [replace(row, seconds=statistics.median(times[case])) for case, row in found.items()]
 
     def row(self, case: Case) -> Row:
-        """Run one case. Whatever it raises becomes its status."""
+        """Run one case once. Whatever it raises becomes its status."""
         try:
             timed = self._timed(case)
         except Exception as failure:  # a report on methods must survive every one of them
             return Row(case, status=_sentence(failure))
         return self._judged(case, timed)
 
+    def _again(self, case: Case, row: Row, turn: int) -> bool:
+        short = row.seconds * self.problem.motion.duration < LONG
+        return row.good and (isinstance(case, Own) or (isinstance(case, Peer) and short and turn < PEER_ROUNDS))
+
     def _judged(self, case: Case, timed: Timed) -> Row:
         span = self.problem.motion.duration
         own, independent = self.problem.errors(timed.path)
         away = (math.nan, math.nan) if independent is None else independent
-        feeding = None if timed.feeding is None else timed.feeding / span
+        feeding = None if timed.feeding is None else timed.feeding / timed.seconds
         return Row(case, *own, *away, timed.seconds / span, timed.steps, timed.passes, feeding, timed.status)
 
     def _timed(self, case: Case) -> Timed:
@@ -111,7 +126,7 @@ class Runner:
         motion = self.problem.motion
         found = march(
             case.scene(self.problem.scene), motion, motion.duration, case.step, every(case.step), case.method, case.basis,
-            motion.angles, self.own_repeats,
+            motion.angles, OWN_REPEATS,
         )  # fmt: skip
         path = Path(found.tip, found.tip_acceleration)
         return Timed(path, found.seconds, found.steps, found.passes, found.status)
@@ -125,12 +140,8 @@ class Runner:
             self.resting[case.elements] = rig.at_rest(self.problem.scene, motion.first, case.elements)
         resting, scheme = self.resting[case.elements], rig.Scheme(modified=case.modified, tolerance=case.tolerance)
         count = round(motion.duration / case.step)
-        runs = [
-            rig.move(resting, motion, motion.duration, case.step, ROW, scheme)
-            for _ in range(self.peer_repeats if count <= LONG else 1)
-        ]
-        effort = sorted((effort for _, effort in runs), key=lambda effort: effort.seconds)[len(runs) // 2]
-        return Timed(path_of(runs[0][0]), effort.seconds, count, effort.passes / count, feeding=effort.feeding)
+        columns, effort = rig.move(resting, motion, motion.duration, case.step, ROW, scheme)
+        return Timed(path_of(columns), effort.seconds, count, effort.passes / count, feeding=effort.feeding)
 
     def _scipy(self, case: Stiff) -> Timed:
         scene, motion = self.problem.scene, self.problem.motion
@@ -141,13 +152,13 @@ class Runner:
             return closed + strokes, rates, accelerations
 
         times: Array = ROW * np.arange(round(motion.duration / ROW) + 1, dtype=np.float64)
-        found = follow(scene, drive, motion.angles, times, case.fineness, case.tolerance, case.solver, self.peer_repeats)
+        found = follow(scene, drive, motion.angles, times, case.fineness, case.tolerance, case.solver, PEER_ROUNDS)
         return Timed(Path(found.tip, found.tip_acceleration), found.seconds, found.evaluations, None)
 
 
 def in_turn(problem: Problem, own: Own, peer: Peer, repeats: int) -> tuple[list[float], list[float]]:
     """Both cases in turn, so that they meet the same machine: wall seconds per simulated second of every run."""
-    runner = Runner(problem, 1, 1)
+    runner = Runner(problem)
     rows = [(runner.row(own), runner.row(peer)) for _ in range(repeats)]
     return [row.seconds for row, _ in rows], [row.seconds for _, row in rows]
 

@@ -15,10 +15,12 @@ from ..scene.parts import Scene
 from ..view.parts import Bars, parts_picture
 from .cost import step_times, unknowns
 from .deviation import FREQUENCIES, Answer, Course, Deviation, answer, course_of, deviation
+from .motion import DURATION
 from .report import machine, provenance, table, write_json
 from .variants import Variant, variants
 
-ROUNDS, QUICK_ROUNDS = 9, 3
+ROUNDS, QUICK_ROUNDS = 30, 5
+QUICK_DURATION = 2.0  # s
 NOTE = "surrogate parameters; one motion, another may differ"
 HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest mm", "f1, %", "f2, %", "f3, %", "step, us",
         "time saved, %", "unknowns", "status")  # fmt: skip
@@ -51,39 +53,39 @@ class Part:
 
 @dataclass(frozen=True)
 class Parts:
-    """A study. `full_time` is the step of the full model, s; `parts` ascend in the error of the tip."""
+    """A study. `full_times`: a step of the full model, measured twice, s; `parts` ascend in the error of the tip."""
 
     course: Course
     frequencies: Array
-    full_time: float
+    full_times: tuple[float, float]
     unknowns: int
     parts: tuple[Part, ...]
 
     def saved(self, part: Part) -> float:
         """Share of the full model's run time that leaving the part out saves; negative where it costs."""
-        return 1.0 - part.step_time / self.full_time
+        return 1.0 - part.step_time / self.full_times[0]
 
 
-def measure(scene: Scene, rounds: int = ROUNDS) -> Parts:
-    """Every variant of a scene against the scene itself.
+def measure(scene: Scene, course: Course, rounds: int = ROUNDS) -> Parts:
+    """Every variant of a scene against the scene itself, times the least of `rounds`.
 
     Raises
     ------
     SolverError
         The scene itself has no equilibrium or fails in the move. A variant that does has a status.
     """
-    course, found = course_of(scene), variants(scene)
+    found = variants(scene)
     full = answer(scene, course, FREQUENCIES)
     if full.status != "ok":
         raise SolverError(f"the scene itself fails: {full.status}")
     answers = [answer(variant.of(scene), course, FREQUENCIES) for variant in found]
     able = [k for k, one in enumerate(answers) if one.status == "ok"]
     times = np.full(len(found), np.nan)
-    least = step_times([scene, *(found[k].of(scene) for k in able)], course, rounds)
-    times[able] = least[1:]
+    least = step_times([scene, *(found[k].of(scene) for k in able), scene], course, rounds)
+    times[able] = least[1:-1]
     parts = [_part(scene, *row, full, course) for row in zip(found, answers, times.tolist(), strict=True)]
     parts.sort(key=lambda part: (part.deviation.worst, part.variant.name))
-    return Parts(course, full.frequencies, float(least[0]), unknowns(scene), tuple(parts))
+    return Parts(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
 
 
 def _part(scene: Scene, variant: Variant, found: Answer, time: float, full: Answer, course: Course) -> Part:
@@ -93,13 +95,19 @@ def _part(scene: Scene, variant: Variant, found: Answer, time: float, full: Answ
     return Part(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
 
 
-def write(scene: Scene, out: Path, quick: bool = False) -> None:
-    """Measure, and write ``parts.json``, ``parts.md`` and ``parts.png`` into the folder `out`."""
-    found = measure(scene, QUICK_ROUNDS if quick else ROUNDS)
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+    """Measure, and write ``parts.json``, ``parts.md`` and ``parts.png`` into the folder `out`; returns their paths.
+
+    The move starts at `posture`; `quick`: it is short, and times are the least of few rounds.
+    """
+    course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
+    found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "parts.json", {"machine": machine(), **as_json(found)})
-    (out / "parts.md").write_text(as_markdown(found), encoding="utf-8")
-    parts_picture(out / "parts.png", bars(found), NOTE)
+    paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
+    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    paths[1].write_text(as_markdown(found), encoding="utf-8")
+    parts_picture(paths[2], bars(found), NOTE)
+    return paths
 
 
 def as_json(found: Parts) -> dict[str, Any]:
@@ -108,7 +116,7 @@ def as_json(found: Parts) -> dict[str, Any]:
         "at_rest_in": found.course.names,
         "move": found.course.motion.label,
         "step_s": found.course.step,
-        "full": {"frequencies_Hz": found.frequencies, "step_time_s": found.full_time, "unknowns": found.unknowns},
+        "full": {"frequencies_Hz": found.frequencies, "step_times_s": found.full_times, "unknowns": found.unknowns},
         "variants": [
             {
                 "name": part.variant.name,
@@ -132,13 +140,15 @@ def as_json(found: Parts) -> dict[str, Any]:
 def as_markdown(found: Parts) -> str:
     """The report: how it was measured, and one table, ascending in the error of the tip."""
     frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies)
+    first, second = (1e6 * time for time in found.full_times)
     lines = [
         "# What the parts of a model cost, and what leaving them out changes\n",
         f"Every row is the scene after an edit (`parts.json` names it), against the scene as it is: {found.unknowns} unknowns, "
-        f"{1e6 * found.full_time:.2f} us a step, natural frequencies {frequencies} Hz.",
+        f"{first:.2f} us a step (at the end of the rounds {second:.2f} us: what differs less than that is noise), natural "
+        f"frequencies {frequencies} Hz.",
         f"At rest: the largest distance of the tips in {', '.join(found.course.names)}. Move: {found.course.motion.label}; "
         f"steps of {1e3 * found.course.step:g} ms. Frequencies: change about the rest at the start of the move. Time: stepping "
-        "alone, least of interleaved runs; what is negative costs time. Another motion may differ.\n",
+        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ.\n",
         table(HEAD, [_row(found, part) for part in found.parts]),
         provenance(),
     ]

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 from ..scene.load import load_scene
 from ..scene.parts import Scene
 from . import stability_scenes as made
 from .long_booms import long_boom, seven_sections
+from .stability_case import Case, Truth, short
 from .stability_motions import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
-
-Truth = Literal["fine steps", "equilibrium", "swing", "none"]
-"""What is right: the default method at an eighth of the step; the equilibrium of the last strokes; a vibration that does not
-grow about a mean that stays; nothing, because there is no solution."""
 
 STIFFNESSES = (1e5, 1e6, 1e7, 1e8, 1e9, 1e11, 1e13)  # N/m
 FACTORS = (1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3, 1e4)
@@ -31,53 +26,28 @@ FOLDED = (80.0, -80.0, -240.0, -400.0)  # deg
 HOLD, DAY, STEP = 600.0, 86400.0, 2e-2  # s
 
 
-@dataclass(frozen=True)
-class Case:
-    """One row of the matrix.
-
-    Attributes
-    ----------
-    group, name : str
-    varied : str
-        How scene, motion or step are derived.
-    make : callable
-        Returns the `Setup`.
-    truth : Truth
-    quick : bool
-        Whether it belongs to the quick subset.
-    """
-
-    group: str
-    name: str
-    varied: str
-    make: Callable[[], Setup]
-    truth: Truth = "fine steps"
-    quick: bool = False
-
-
-def cases(scene: Scene, soak: bool = False) -> tuple[Case, ...]:
-    """All cases of a scene; those that need a geometry of their own take the default boom. `soak` adds the holds of a day."""
+def cases(scene: Scene) -> tuple[Case, ...]:
+    """All cases of a scene but the holds of a day; those that need a geometry of their own take the default boom."""
     found = (
         Case("scene", "as it is", "nothing", partial(smooth, scene), quick=True),
         *_stiffness(scene), *_masses(scene), *_steps(scene), *_sections(), *_geometry(scene),
-        *_dead_centres(), *_stops(scene), *_holds(scene), *_payload_and_modes(scene), *(_soak(scene) if soak else ()),
+        *_dead_centres(), *_stops(scene), *_holds(scene), *_payload_and_modes(scene),
     )  # fmt: skip
     return tuple(found)
 
 
 def _stiffness(scene: Scene) -> Iterator[Case]:
-    group, light = "oil stiffness", made.lighter_gravity(made.cylinders(scene, STIFFNESSES[0]), 0.1)
-    yield Case(group, "k 1e5, g/10", "all cylinders, a tenth of gravity", partial(smooth, light))
+    group = "oil stiffness"
     for k in STIFFNESSES:
         make = partial(smooth, made.cylinders(scene, k))
-        yield Case(group, f"k {k:.0e} N/m", "all cylinders", make, quick=k in (STIFFNESSES[0], STIFFNESSES[-1]))
+        yield Case(group, f"k {short(k)} N/m", "all cylinders", make, quick=k in (STIFFNESSES[0], STIFFNESSES[-1]))
     yield Case(group, "incompressible", "cylinders without k", partial(smooth, made.cylinders(scene, None)), quick=True)
     group = "bending stiffness"
     hanging = made.posed(made.bending(load_scene(), FACTORS[0]), HANGING)
     yield Case(group, "EI x 1e-3, hanging", "default boom, sections 2 to 4 hang", partial(smooth, hanging, "case", 0.4))
     for factor in FACTORS:
         make = partial(smooth, made.bending(scene, factor))
-        yield Case(group, f"EI x {factor:.0e}", "all sections", make, quick=factor in (FACTORS[0], FACTORS[-1]))
+        yield Case(group, f"EI x {short(factor)}", "all sections", make, quick=factor in (FACTORS[0], FACTORS[-1]))
     yield Case(group, "rigid", "no section bends", partial(smooth, made.with_modes(scene, 0)))
     stiffest = made.cylinders(made.bending(scene, FACTORS[-1]), STIFFNESSES[-1])
     yield Case(group, "EI x 1e4, k 1e13", "all sections and cylinders", partial(smooth, stiffest))
@@ -86,7 +56,7 @@ def _stiffness(scene: Scene) -> Iterator[Case]:
 def _masses(scene: Scene) -> Iterator[Case]:
     group = "small masses"
     for factor in (1e-6, 0.0):
-        shown = f"x {factor:.0e}" if factor else "0"
+        shown = f"x {short(factor)}" if factor else "0"
         yield Case(group, f"links {shown}", "mL, mR", partial(smooth, made.links(scene, factor)))
         for key in ("barrel", "rod"):
             lighter = made.cylinder_parts(scene, (key,), factor)
@@ -98,19 +68,19 @@ def _masses(scene: Scene) -> Iterator[Case]:
 def _steps(scene: Scene) -> Iterator[Case]:
     for step, rise, duration, share in STEPS:
         make = partial(smooth, scene, None, share, rise, duration, step)
-        yield Case("time step", f"dt {step:.0e} s", f"{share:g} of the move in {rise:g} s", make, quick=step >= 2e-2)
-    yield Case("time step", "dt 5e-02 s, fast", "the move in 1 s", partial(smooth, scene, None, 1.0, 1.0, 4.0, 5e-2))
+        yield Case("time step", f"dt {short(step)} s", f"{share:g} of the move in {rise:g} s", make, quick=step >= 2e-2)
+    yield Case("time step", "dt 5e-2 s, fast", "the move in 1 s", partial(smooth, scene, None, 1.0, 1.0, 4.0, 5e-2))
 
 
 def _sections() -> Iterator[Case]:
     for count in COUNTS:
         make = partial(_long, count)
-        yield Case("length", f"{count} sections", "20 m in all, cylinder 1 moves", make, quick=count in (2, 20))
-    yield Case("length", "101 m", "seven sections, cylinder 1 moves", partial(_large), quick=True)
+        yield Case("length", f"{count} sections", "20 m in all, cylinder 1 moves, dt 1 ms", make, quick=count in (2, 20))
+    yield Case("length", "101 m", "seven sections, cylinder 1 moves, dt 5 ms", partial(_large), quick=True)
 
 
 def _long(count: int) -> Setup:
-    return first_cylinder(long_boom(count), "test", 0.05, 5e-3, duration=2.0 if count <= 20 else 1.25)
+    return first_cylinder(long_boom(count), "test", 0.03, 1e-3, 0.5, 1.0 if count <= 20 else 0.6)
 
 
 def _large() -> Setup:
@@ -146,7 +116,7 @@ def _stops(scene: Scene) -> Iterator[Case]:
     yield Case(group, "k 1e11 N/m", stops, partial(dead_stop, made.cylinders(scene, 1e11)))
     yield Case(group, "incompressible", stops, partial(dead_stop, made.cylinders(scene, None)))
     yield Case(group, "rigid sections", stops, partial(dead_stop, made.with_modes(scene, 0)))
-    yield Case(group, "dt 2e-02 s", stops, partial(dead_stop, scene, STEP))
+    yield Case(group, "dt 2e-2 s", stops, partial(dead_stop, scene, STEP))
 
 
 def _holds(scene: Scene) -> Iterator[Case]:
@@ -167,13 +137,13 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
         yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODES[-1])
 
 
-def _soak(scene: Scene) -> Iterator[Case]:
-    for name, boom, truth in _DAYS:
-        make = partial(smooth, boom(scene), None, 1.0, 1.5, DAY, STEP, 50)
-        yield Case("hold", name, "dt 20 ms, after the move", make, truth)
-
-
-_DAYS: tuple[tuple[str, Callable[[Scene], Scene], Truth], ...] = (
-    ("24 h", lambda scene: scene, "equilibrium"),
-    ("24 h, undamped", made.undamped, "swing"),
-)
+def days(scene: Scene) -> tuple[Case, ...]:
+    """Holds of 24 simulated hours."""
+    booms: tuple[tuple[str, Scene, Truth], ...] = (
+        ("24 h", scene, "equilibrium"),
+        ("24 h, undamped", made.undamped(scene), "swing"),
+    )
+    return tuple(
+        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, STEP, 50), truth)
+        for name, boom, truth in booms
+    )

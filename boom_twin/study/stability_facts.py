@@ -5,39 +5,65 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.march import March
 from ..records import Array
 from .stability_verdict import Facts
 
+Mask = NDArray[np.bool_]
+
 QUIET = 1e-3  # share of the peak acceleration below which vibration is not followed
+IMPULSE = 0.05  # s after a jump of speed
+WRONG = 0.05  # of the largest cylinder force, above which an impulse still rings
 SHORTEST_PATH = 1e-9  # m
 
 
-def against_motion(found: March, right: March, still: float) -> Facts:
-    """Compare with a motion at the same rows; the drives hold from `still` (s) on."""
+def against_motion(found: March, right: March, still: float, jump: float = math.nan) -> Facts:
+    """Compare with a motion at the same rows; the drives hold from `still` (s) on.
+
+    Accelerations and forces are not compared right after a `jump` (s) of speed, where they are impulses.
+    """
     path, late = _path(right), right.times > still
-    shares = _rings(found, right, late)
+    smooth = ~(np.abs(right.times - jump - 0.5 * IMPULSE) <= 0.5 * IMPULSE + 1e-9)
+    shares = _rings(found, right, late & smooth)
     return Facts(
         found.status,
+        doubt=found.doubt,
         error=_largest(found.tip - right.tip) / path,
-        acceleration=_rms(found.tip_acceleration - right.tip_acceleration) / max(_rms(right.tip_acceleration), 1e-12),
-        force=_rms(found.cylinder_forces - right.cylinder_forces) / max(_largest(right.cylinder_forces), 1e-12),
+        acceleration=_rms((found.tip_acceleration - right.tip_acceleration)[smooth])
+        / max(_rms(right.tip_acceleration[smooth]), 1e-12),
+        force=_rms((found.cylinder_forces - right.cylinder_forces)[smooth])
+        / max(_largest(right.cylinder_forces[smooth]), 1e-12),
         ringing=shares[0],
         force_ringing=shares[1],
         growth=growth(found, still) / max(growth(right, still), 1e-3),
+        lasting=_lasting(found, right, jump, smooth),
         passes=found.passes,
     )
 
 
-def against_rest(found: March, equilibrium: Array | None, still: float) -> Facts:
-    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself."""
+def _lasting(found: March, right: March, jump: float, smooth: Mask) -> float:
+    """Rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
+    if math.isnan(jump):
+        return math.nan
+    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1)
+    beyond = (wrong > WRONG * _largest(right.cylinder_forces[smooth])) & (right.times >= jump - 1e-9)
+    return float((right.times[beyond].max() - jump) / right.times[1]) if beyond.any() else 0.0
+
+
+def against_rest(found: March, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
+    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself.
+
+    `every` steps lie between rows; ringing is seen only where there is a row for each.
+    """
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
     away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
-    shares = _rings(found, None, found.times > still)
+    shares = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
     return Facts(
         found.status,
+        doubt=found.doubt,
         drift=float(np.linalg.norm(away)) / _path(found),
         ringing=shares[0],
         force_ringing=shares[1],
@@ -58,10 +84,10 @@ def growth(motion: March, still: float) -> float:
 
 def alternating(values: Array) -> Array:
     """The part of rows (m, c) that changes sign from row to row, (m - 2, c); a smooth curve leaves next to nothing."""
-    return np.asarray(0.25 * (values[2:] - 2.0 * values[1:-1] + values[:-2]))
+    return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
-def _rings(found: March, right: March | None, late: np.ndarray) -> tuple[float, float]:
+def _rings(found: March, right: March | None, late: Mask) -> tuple[float, float]:
     """Ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of what is right."""
     shares = []
     for name in ("tip_acceleration", "cylinder_forces"):

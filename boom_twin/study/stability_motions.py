@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +34,8 @@ class Setup:
         s, from here on the drives hold.
     every : int
         Steps to a row.
+    jump : float
+        When the drives' speed jumps, s; NaN if it does not. Accelerations and forces there are impulses, which have no value.
     """
 
     scene: Scene
@@ -42,6 +45,7 @@ class Setup:
     step: float
     still: float
     every: int = 1
+    jump: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,12 @@ def smooth(
     return Setup(scene, move, own.angles, duration, step, rise, every)
 
 
+def move_in_words(scene: Scene) -> str:
+    """Strokes of the study's move on a scene."""
+    travel = motion_of(scene).travel
+    return "from rest, " + ", ".join(f"stroke {i + 1} by {1e3 * travel[i]:+.1f} mm" for i in np.flatnonzero(travel))
+
+
 def first_cylinder(scene: Scene, posture: str, turn: float, step: float, rise: float = 1.0, duration: float = 2.0) -> Setup:
     """Cylinder 1 turns joint 1 by `turn` (rad) in `rise` (s), then holds."""
     return one_cylinder(scene, posture, 0, _stroke_for(scene, posture, turn), step, rise, duration)
@@ -92,7 +102,7 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
     own = motion_of(scene)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     drive = DeadStop(own.first, np.sign(own.travel) * full, 0.3, 0.8)
-    return Setup(scene, drive, own.angles, 2.0, step, 0.8)
+    return Setup(scene, drive, own.angles, 2.0, step, 0.8, jump=0.8)
 
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..analysis.march import March, Method, march
 from ..analysis.statics import settle
-from ..errors import BoomTwinError, SolverError
+from ..errors import SolverError
 from ..plan.compile import compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
-from .stability_cases import Case
+from .stability_case import Case
 from .stability_facts import against_motion, against_rest
 from .stability_motions import Setup
 from .stability_verdict import Facts, Verdict, verdict
@@ -32,6 +32,7 @@ METHODS: dict[str, Method] = {
     "plain product": Method(product="plain"),
 }
 RIGHT = Method(tolerance=1e-10)
+NOTHING = "there is no solution"
 FINER, FINEST = 8, 5e-6  # steps of what is right: an eighth, but not below this (s), where round-off takes over
 
 
@@ -68,9 +69,9 @@ def one(case: Case, methods: dict[str, Method]) -> Row:
     try:
         setup = case.make()
         judge, told = _judge(case, setup)
-    except BoomTwinError as error:
-        reason = str(error)
-        return Row(case, "no solution", {name: _cell(Facts(reason, solvable=False)) for name in methods})
+    except SolverError as error:
+        refused = _cell(Facts(str(error), solvable=False))
+        return Row(case, NOTHING, dict.fromkeys(methods, refused))
     return Row(case, told, {name: _cell(_facts(case, setup, method, judge)) for name, method in methods.items()})
 
 
@@ -93,21 +94,24 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
     SolverError
         No equilibrium to start from.
     """
+    if case.truth == "none":
+        return _none, NOTHING
     if case.truth == "fine steps":
         right, stride = _right(setup)
         if right.status != "ok":
-            raise SolverError(f"the reference ended: {right.status}")
-        step = setup.step / round(setup.step / _fine(setup)) if setup.step > FINEST else FINEST
-        return lambda found: _against(found, right, stride, setup.still), f"default method at {step:.3g} s"
-    if case.truth == "none":
-        return lambda found: Facts(found.status, solvable=False, passes=found.passes), "there is no solution"
+            return _none, f"{NOTHING}: the reference ended, {right.status}"
+        return lambda found: _against(found, right, stride, setup), f"default method at {_fine(setup):.3g} s"
     rest = _equilibrium(setup) if case.truth == "equilibrium" else None
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
-    return lambda found: _ended(found) or against_rest(found, rest, setup.still), told
+    return lambda found: _ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
 
-def _against(found: March, right: March, stride: int, still: float) -> Facts:
-    return _ended(found) or against_motion(_thinned(found, stride), right, still)
+def _none(found: March) -> Facts:
+    return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
+
+
+def _against(found: March, right: March, stride: int, setup: Setup) -> Facts:
+    return _ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump)
 
 
 def _ended(found: March) -> Facts | None:
@@ -132,9 +136,8 @@ def _right(setup: Setup) -> tuple[March, int]:
 
 def _thinned(motion: March, stride: int) -> March:
     """Every `stride`-th row."""
-    names: Sequence[str] = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
-    arrays = {name: getattr(motion, name)[::stride] for name in names}
-    return March(**arrays, seconds=motion.seconds, steps=motion.steps, passes=motion.passes, status=motion.status)
+    names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
+    return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
 
 def _equilibrium(setup: Setup) -> Array:

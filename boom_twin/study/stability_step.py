@@ -152,7 +152,7 @@ class _System:
             if not now < change:
                 break
             x, change = x + more, now
-        return x, change
+        return np.asarray(x), change
 
     def condition(self) -> float:
         """Estimate from the factors."""

@@ -66,7 +66,7 @@ def _savings(axes: Axes, bars: Bars, rows: Array) -> None:
     saved = 100.0 * bars.saved
     axes.barh(rows, saved, 0.6, color=np.where(saved >= 0.0, GREEN, GREY))
     axes.axvline(0.0, color=INK, linewidth=0.8)
-    for row, value in zip(rows, saved, strict=True):
+    for row, value in zip(rows, np.round(saved) + 0.0, strict=True):
         side = "left" if value >= 0.0 else "right"
         axes.text(value + np.copysign(1.0, value), row, f"{value:+.0f}", va="center", ha=side, fontsize=10)
     reach = max(10.0, float(np.abs(saved).max()))

@@ -6,7 +6,7 @@ Run ``python test/bench/parts.py`` on an idle machine; least of 30 interleaved r
 from __future__ import annotations
 
 from boom_twin import load_scene
-from boom_twin.study.cost import step_times, unknowns
+from boom_twin.study.cost import size, step_times, unknowns
 from boom_twin.study.deviation import course_of
 from boom_twin.study.variants import KINDS, without
 
@@ -29,6 +29,9 @@ def main() -> None:
 
     booms = {
         "flexible, as the default scene": full,
+        "flexible, modes: 1": full.model_copy(update={"modes": 1}),
+        "flexible, modes: 2": full.model_copy(update={"modes": 2}),
+        "flexible, modes: 4": full.model_copy(update={"modes": 4}),
         "flexible, without axial coordinate": less("axial coordinate"),
         "flexible, without geometric stiffness": less("geometric stiffness"),
         "flexible, links and cylinders massless, no rotary inertia": less(*MASSES),
@@ -37,9 +40,10 @@ def main() -> None:
         "rigid, links massless, cylinders massless and incompressible": less("bending", "cylinder compliance", *BARE),
     }
     times = step_times(list(booms.values()), course_of(full), ROUNDS)
-    print("| boom | unknowns | step of 1 ms, us | times cheaper |\n|---|---|---|---|")
+    print("| boom | unknowns | step of 1 ms, us | times cheaper | counted share of the cost |\n|---|---|---|---|---|")
     for (name, scene), seconds in zip(booms.items(), times, strict=True):
-        print(f"| {name} | {unknowns(scene)} | {1e6 * seconds:.2f} | {times[0] / seconds:.2f} |")
+        counted = size(scene) / size(full)
+        print(f"| {name} | {unknowns(scene)} | {1e6 * seconds:.2f} | {times[0] / seconds:.2f} | {counted:.2f} |")
 
 
 if __name__ == "__main__":

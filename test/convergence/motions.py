@@ -38,7 +38,7 @@ def follow(scene, drive, angles, step, count, every=1, rho=RHO):
     times = step * np.arange(1, count + 1)[:, None]
     lengths, rates, _ = drive(times)
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, _, _, _ = run(
+    status, _, _, _, _ = run(
         plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     assert status == 0

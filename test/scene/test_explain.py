@@ -94,3 +94,21 @@ def test_what_is_not_named_is_listed(bench: Any) -> None:
     assert "massless" in left_out["joints[1].mL"]
     assert "no damping" in left_out["joints[2].cylinder.d"]
     assert "incompressible" in left_out["joints[3].cylinder.k"]
+
+
+def test_parts_without_axial_coordinate_have_one_unknown_less(bench: Any) -> None:
+    all_of_it = explain(load_scene())
+    scene = load_scene(bench.edited(lambda v: v.update(axial=False, geometric=False)))
+    assert explain(scene).unknowns == all_of_it.unknowns - 7
+    keys = [item.key for item in explain(scene).left_out]
+    assert "sections[*].axial" in keys and "sections[*].geometric" in keys
+    scene = load_scene(bench.edited(lambda v: v["sections"][3].update(axial=False)))
+    assert [section.axial for section in explain(scene).sections] == [1, 1, 1, 0]
+    assert "sections[3].axial" in [item.key for item in explain(scene).left_out]
+
+
+def test_axial_is_true_or_false(bench: Any) -> None:
+    (fault,) = bench.faults(lambda v: v.update(axial="maybe"))
+    assert fault.path == "axial" and "true or false is needed, not text" in fault.bound
+    (fault,) = bench.faults(lambda v: v["sections"][1].update(geometric=3))
+    assert fault.path == "sections[1].geometric" and "whether flexible parts have geometric stiffness" in fault.remedy

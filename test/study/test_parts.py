@@ -18,7 +18,7 @@ from boom_twin.study.variants import KINDS, Variant, variants, without
 
 @pytest.fixture(scope="module")
 def found(two_sections: Scene) -> parts.Parts:
-    return parts.measure(two_sections, rounds=1)
+    return parts.measure(two_sections, deviation.course_of(two_sections), rounds=1)
 
 
 def test_every_variant_is_there_ascending_in_error(found: parts.Parts, two_sections: Scene) -> None:
@@ -61,7 +61,7 @@ def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, mon
     answers = iter([good, replace(good, status="a sentence", frequencies=np.zeros(0))])
     monkeypatch.setattr(parts, "variants", lambda _: (Variant("without all", "test", (Edit(("modes",), 1),)),))
     monkeypatch.setattr(parts, "answer", lambda *_: next(answers))
-    result = parts.measure(two_sections, rounds=1)
+    result = parts.measure(two_sections, deviation.course_of(two_sections), rounds=1)
     assert result.parts[0].status == "a sentence" and np.isinf(result.parts[0].deviation.worst)
     row = next(line for line in parts.as_markdown(result).splitlines() if "without all" in line)
     assert "a sentence" in row and "nan" not in row and "inf" not in row
@@ -69,8 +69,9 @@ def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, mon
 
 def test_the_files(found: parts.Parts, two_sections: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "measure", lambda *_: found)
-    parts.write(two_sections, tmp_path / "deep" / "out", quick=True)
     out = tmp_path / "deep" / "out"
+    written = parts.write(two_sections, out, quick=True)
+    assert sorted(written) == sorted(out.iterdir())
     values = json.loads((out / "parts.json").read_text())
     assert len(values["variants"]) == len(found.parts) and values["machine"]["cpu"]
     first = values["variants"][0]

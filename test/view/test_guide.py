@@ -60,6 +60,18 @@ def test_statics_prints_what_is_quoted(boom: Path, capsys: pytest.CaptureFixture
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-3, abs=2e-3)
 
 
+def test_the_leanest_model_is_the_one_quoted(boom: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = "boom_twin check my_boom.yaml --need tip=1mm --out my_lean.yaml"
+    assert main(command.split()[1:]) == 0
+    printed, told = capsys.readouterr().out, quoted(command)
+    printed = printed[printed.index("Leanest") :].strip()
+    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", told).split()
+    parts = [text.partition("Run time")[0] for text in (printed, told)]
+    numbers = [[float(number) for number in NUMBER.findall(text)] for text in parts]
+    assert numbers[0] == pytest.approx(numbers[1], rel=5e-3)
+    load_scene("my_lean.yaml")
+
+
 @pytest.mark.parametrize(("right", "wrong", "message"), MISTAKES, ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
 def test_mistakes_give_the_quoted_messages(boom: Path, right: str, wrong: str, message: str) -> None:
     assert WHOLE.count(right) >= 1
@@ -91,6 +103,8 @@ def test_table_of_what_leaving_out_does(boom: Path) -> None:
         "no `k`, no `d`": without_k,
         "`modes: 0`": WHOLE + "modes: 0\n",
         "both": without_k + "\nmodes: 0\n",
+        "`axial: false`": WHOLE + "axial: false\n",
+        "`geometric: false`": WHOLE + "geometric: false\n",
         "no `barrel`, `rod`, `mL`, `mR`": without_mass,
         "no `tip`": re.sub("tip: .*", "", WHOLE),
         "`line_fill: 20.0`": WHOLE + "line_fill: 20.0\n",

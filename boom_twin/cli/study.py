@@ -1,0 +1,46 @@
+"""``boom_twin study``: reports on the methods: error against run time, and others."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+# Before numpy is loaded, hence before the scene's modules: threads slow small matrices down ten times and more, and every
+# program is timed on one core.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# kind: (module in boom_twin.study with write(scene, out, quick, posture) -> paths, what it does)
+KINDS: dict[str, tuple[str, str]] = {
+    "error": ("error", "error against run time of all methods, beside two other programs"),
+    "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
+    "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """A parser for every kind."""
+    from .common import add_scene
+
+    kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
+    for name, (_, purpose) in KINDS.items():
+        own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
+        add_scene(own)
+        own.add_argument("--out", required=True, metavar="DIR", help="folder for tables, numbers and pictures")
+        own.add_argument("--posture", metavar="NAME", help="where the motion starts (default: arch, or the first)")
+        own.add_argument("--quick", action="store_true", help="few cases on a short motion")
+        if name == "stability":
+            own.add_argument("--soak", action="store_true", help="also the holds of 24 simulated hours, some minutes more")
+
+
+def run(args: Namespace) -> int:
+    """Compute and write the report; prints the files."""
+    from .common import open_scene
+
+    write: Callable[..., list[Path]] = import_module(f"boom_twin.study.{KINDS[args.kind][0]}").write
+    options = {"soak": True} if getattr(args, "soak", False) else {}
+    for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture, **options):
+        print(path)
+    return 0

@@ -1,0 +1,52 @@
+"""Doubts that a motion raises about its own step: coarse, ringing, and none where neither is the case."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from boom_twin.analysis.march import Method, march
+from boom_twin.scene import load_scene
+from boom_twin.study.motion import motion_of
+from boom_twin.study.stability_motions import dead_stop, smooth
+from boom_twin.study.stability_scenes import cylinders
+
+SCENE = load_scene()
+
+
+def marched(step, duration=4.0, method=None, scene=SCENE, every=1):
+    move = motion_of(scene)
+    return march(scene, move, duration, step, every, method, angles=move.angles)
+
+
+def test_the_default_step_raises_no_doubt():
+    assert marched(1e-3).doubt == ""
+    assert marched(1e-4, duration=2.0, every=10).doubt == ""
+
+
+@pytest.mark.parametrize("step", [2e-2, 4e-2])
+def test_the_estimate_is_near_the_error(step):
+    """The doubt names a share of the tip's path; the true one is within a factor of three."""
+    own = smooth(SCENE, None, 1.0, 0.4, 2.0, step)
+    coarse = march(SCENE, own.drive, 2.0, step, 1, angles=own.angles)
+    fine = march(SCENE, own.drive, 2.0, step / 20, 20, angles=own.angles)
+    path = np.linalg.norm(fine.tip - fine.tip[0], axis=1).max()
+    error = np.linalg.norm(coarse.tip - fine.tip, axis=1).max() / path
+    assert coarse.doubt.startswith("the step is coarse")
+    said = float(coarse.doubt.split("about ")[1].split("%")[0]) / 100
+    assert error / 3 < said < 3 * error
+
+
+def test_ringing_is_doubted():
+    stop = dead_stop(cylinders(SCENE, None))
+    found = march(stop.scene, stop.drive, 1.0, stop.step, 1, Method(parameter=1.0), angles=stop.angles)
+    calm = march(stop.scene, stop.drive, 1.0, stop.step, 1, angles=stop.angles)
+    assert "change sign from step to step" in found.doubt and calm.doubt == ""
+
+
+def test_a_boom_at_rest_raises_no_doubt():
+    move = motion_of(SCENE)
+    still = replace(move, travel=0.0 * move.travel)
+    assert march(SCENE, still, 2.0, 2e-2, angles=move.angles).doubt == ""

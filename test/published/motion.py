@@ -1,0 +1,92 @@
+"""A boom let go from rest anywhere, in equilibrium or not, and stepped along drives in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from boom_twin.analysis.posture import set_undeformed
+from boom_twin.analysis.simulate import PASSES, RHO
+from boom_twin.chain.place import place
+from boom_twin.chain.program import State, Work
+from boom_twin.chain.step import advance, observe, run
+from boom_twin.physics.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
+from boom_twin.plan.compile import Plan, compile_scene
+
+INSTANT = 1e-4  # s, over which accelerations at rest are found; their relative error is about its square
+TOLERANCE = 1e-11  # rad in the last pass of a step
+
+
+@dataclass(frozen=True)
+class Start:
+    """A compiled boom at rest with consistent accelerations."""
+
+    plan: Plan
+    state: State
+    work: Work
+
+    @property
+    def lengths(self):
+        """Of the cylinders, m, shape (n,)."""
+        return np.array([self.work.position[cylinder.history] for cylinder in self.plan.tables.cylinders])
+
+
+def released(scene, angles):
+    """The undeformed boom at joint `angles` (rad), let go from rest.
+
+    At rest the jerk is zero, so x = x0 + a t^2/2 to the fourth order of t: one solve over an instant gives a.
+    """
+    plan = compile_scene(scene)
+    start = Start(plan, plan.state(), plan.work())
+    state, work = start.state, start.work
+    set_undeformed(plan, state, np.asarray(angles, dtype=float))
+    place(plan.tables, state, work)
+    state.history[X] = work.position
+    weights = new_weights(DEPTH)
+    weights[HAT, X] = weights[X, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
+    instant = Scheme(0.0, 2.0 / INSTANT**2, 0.0, weights)
+    still = np.zeros(plan.joints)
+    status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None)
+    assert status == 0
+    return start
+
+
+def stepped(start, step, count, every, drive=None, rho=RHO):
+    """Tip x, y, angle and their rates and accelerations, shape (count/every + 1, 3, 3), from t = 0.
+
+    `drive` gives lengths (m) and rates (m/s) of the cylinders, each (m, n), at times (m,); without it they keep their length.
+    """
+    plan, state, work = start.plan, State(*(array.copy() for array in start.state)), start.work
+    rows = np.empty((count // every + 1, 2 * plan.joints + 9))
+    observe(plan.tables, state, rows[0])
+    if drive is None:
+        lengths = np.tile(start.lengths, (count, 1))
+        rates = np.zeros_like(lengths)
+    else:
+        lengths, rates = drive(step * np.arange(1, count + 1))
+    steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
+    status, row, _, _ = run(
+        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
+    )
+    assert status == 0, f"status {status} in row {row}"
+    return rows[:, 2 * plan.joints :].reshape(-1, 3, 3)
+
+
+def halved(start, step, duration, rows, drive=None, halvings=3, rho=RHO):
+    """Results of `stepped` at equal distances for `step` and its halves, shape (halvings + 1, rows + 1, 3, 3)."""
+    count = round(duration / step)
+    assert count % rows == 0 and abs(count * step - duration) < 1e-9
+    return np.array(
+        [stepped(start, step / 2**k, count * 2**k, count * 2**k // rows, drive, rho) for k in range(halvings + 1)]
+    )
+
+
+def orders(errors):
+    """Orders of convergence from errors of steps that halve, along the first axis."""
+    return np.log2(errors[:-1] / errors[1:])
+
+
+def extrapolated(results):
+    """Richardson's limit of the two finest of results that converge with the square of the step."""
+    return (4.0 * results[-1] - results[-2]) / 3.0

@@ -1,0 +1,101 @@
+"""Verdicts of the stability study on made-up data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin.analysis.march import March
+from boom_twin.study.stability_facts import against_motion, against_rest, alternating, growth
+from boom_twin.study.stability_verdict import BOUNDS, Facts, verdict
+
+GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force_ringing=0.0, growth=1.0, drift=0.0, passes=1.0)
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_each_quantity_has_its_bounds(name):
+    low, high, symptom = BOUNDS[name]
+    holds, degrades = (verdict(facts_with(name, share * low)) for share in (0.99, 1.01))
+    assert (holds.word, holds.symptom) == ("holds", "")
+    assert degrades.word == "degrades" and not degrades.silent
+    assert degrades.symptom.startswith(symptom.split("{")[0])
+    if np.isfinite(high):
+        failed = verdict(facts_with(name, 1.01 * high))
+        assert failed.word == "fails" and failed.silent
+
+
+def facts_with(name, value):
+    return Facts(**{**vars(GOOD), name: value})
+
+
+def test_a_failure_with_a_status_is_not_silent():
+    found = verdict(Facts("the equations did not converge"))
+    assert (found.word, found.silent, found.symptom) == ("fails", False, "the equations did not converge")
+
+
+def test_a_failure_with_a_doubt_is_not_silent():
+    found = verdict(Facts(**{**vars(GOOD), "error": 0.5, "doubt": "the step is coarse"}))
+    assert found.word == "fails" and not found.silent
+    assert found.symptom.endswith("(it says: the step is coarse)")
+
+
+def test_without_a_solution_a_status_is_right_and_numbers_are_wrong():
+    assert verdict(Facts("no equilibrium", solvable=False)).word == "refuses"
+    numbers = verdict(Facts("ok", solvable=False))
+    assert numbers.word == "fails" and numbers.silent
+
+
+def test_what_is_not_finite_fails_and_what_has_no_meaning_does_not_count():
+    assert verdict(facts_with("error", np.inf)).silent
+    assert verdict(facts_with("drift", np.nan)).word == "holds"
+
+
+def test_the_worst_symptom_stands_first():
+    found = verdict(Facts(**{**vars(GOOD), "error": 0.02, "growth": 50.0}))
+    assert found.word == "fails" and found.symptom.startswith("vibration grows 50-fold")
+    assert "tip wrong by 0.02" in found.symptom
+
+
+# -- facts ------------------------------------------------------------------------------------------------------------
+
+
+def made_up(step=1e-2, duration=4.0, growing=0.0, ring=0.0, shift=0.0):
+    """A tip that vibrates at 1 Hz by 0.1 m, after a shift; `growing` (1/s), alternating acceleration `ring` (m/s^2)."""
+    times = step * np.arange(round(duration / step) + 1)
+    wave = 0.1 * np.exp(growing * times) * np.cos(2 * np.pi * times)
+    signs = ring * (-1.0) ** np.arange(len(times))
+    tip = np.stack([wave + shift, 0.0 * wave], axis=1)
+    acceleration = np.stack([-((2 * np.pi) ** 2) * wave + signs, 0.0 * wave], axis=1)
+    forces = np.full((len(times), 2), 1e4)
+    return March(times, tip, acceleration, forces * 0.0, forces, 1.0, len(times) - 1, 1.5, "ok")
+
+
+def test_the_same_motion_has_no_error():
+    facts = against_motion(made_up(), made_up(), 1.0)
+    assert (facts.error, facts.acceleration, facts.force, facts.ringing) == (0.0, 0.0, 0.0, 0.0)
+    assert facts.growth == pytest.approx(1.0) and facts.passes == 1.5
+
+
+def test_error_is_a_share_of_the_path():
+    right = made_up()
+    assert against_motion(made_up(shift=0.01), right, 1.0).error == pytest.approx(0.05)
+
+
+def test_ringing_is_what_changes_sign_from_row_to_row():
+    facts = against_motion(made_up(ring=2.0), made_up(), 1.0)
+    assert facts.ringing == pytest.approx(2.0 / (0.1 * (2 * np.pi) ** 2), rel=1e-3)
+    times = np.linspace(0.0, 1.0, 101)[:, None]
+    assert np.abs(alternating(np.sin(2 * np.pi * times))).max() < 1.1e-3
+    assert alternating((-1.0) ** np.arange(5)[:, None])[:, 0] == pytest.approx([-1, 1, -1])
+
+
+def test_growth_compares_last_quarter_with_first():
+    assert growth(made_up(growing=0.5), 0.0) == pytest.approx(np.exp(0.5 * 3.0), rel=1e-2)
+    assert against_motion(made_up(growing=-0.5), made_up(growing=-0.5), 0.0).growth == pytest.approx(1.0)
+    assert against_rest(made_up(growing=0.5), None, 0.0).growth > 3.0
+
+
+def test_drift_is_from_the_equilibrium_or_of_the_mean():
+    calm = made_up(growing=-30.0)
+    assert against_rest(calm, np.array([1e-3, 0.0]), 0.0).drift == pytest.approx(1e-2, rel=1e-3)
+    assert against_rest(made_up(), None, 0.0).drift < 1e-6
