@@ -7,12 +7,14 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo test lint test-extra session figures clean
+.PHONY: help setup warm demo test lint test-extra study soak session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, and checks that need more than PyPI"
+	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
+	@echo "make soak        a hold of 24 simulated hours"
 	@echo "make session     make the bundled session anew on the virtual rig"
 	@echo "make figures     make the pictures of the documentation anew"
 
@@ -43,6 +45,13 @@ lint: $(READY)
 test-extra: $(READY)
 	$(BIN)/python -m pytest -m slow
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
+
+study: warm
+	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study || exit 1; done
+	mkdir -p docs/study && cp out/study/*.md out/study/*.png docs/study/
+
+soak: warm
+	$(BIN)/boom_twin study stability --soak --out out/soak
 
 session: $(READY)
 	rm -rf bags/arch_session

@@ -16,6 +16,7 @@ from ..plan.compile import Plan, compile_scene
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
+from .doubt import doubt
 from .pchip import pchip
 from .statics import checked_strokes, settle
 
@@ -41,6 +42,8 @@ class Simulation:
     step_error : float
         Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
+    doubt : str
+        What the motion gives reason to doubt: too coarse a step, ringing. Empty if nothing; see `analysis.doubt`.
     """
 
     times: Array
@@ -52,6 +55,7 @@ class Simulation:
     tip_acceleration: Array
     passes: float
     step_error: float
+    doubt: str
 
     def columns(self) -> dict[str, Array]:
         """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
@@ -97,15 +101,16 @@ def simulate(
     rows = np.empty((len(times), 2 * n + 9))
     observe(plan.tables, state, rows[0])
     steps, counts, drives, rates = _drive(plan, times, strokes, dt)
-    status, row, passes, jolt, _ = run(
+    status, row, passes, jolt, shake = run(
         plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     if status != OK:
         raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
     tip = rows[:, 2 * n :].reshape(-1, 3, 3)
+    travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return Simulation(
         times, strokes, rows[:, :n], rows[:, n : 2 * n], tip[:, 0], tip[:, 1], tip[:, 2], passes / max(int(counts.sum()), 1),
-        abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt,
+        abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt, doubt(jolt, shake, travel, float(counts @ steps**2)),
     )  # fmt: skip
 
 

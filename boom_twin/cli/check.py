@@ -116,7 +116,7 @@ def _section_words(section: SectionAccount) -> str:
     if section.splits:
         words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
     if len(section.parts) > len(section.splits) + 1:
-        words += f", cut evenly because fewer than {LEAST} sections bend"
+        words += f", cut evenly so that at least {LEAST} parts bend"
     parts = f"{len(section.parts)} parts with {coordinates} each" if len(section.parts) > 1 else coordinates
     return f"{words}: {parts}"
 

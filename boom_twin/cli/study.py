@@ -8,9 +8,8 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from .common import add_scene, open_scene
-
-# Before numpy is loaded: small matrices are slowed down by threads, and every program is timed on one core.
+# Before numpy is loaded, hence before the scene's modules: threads slow small matrices down ten times and more, and every
+# program is timed on one core.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # kind: (module in boom_twin.study with write(scene, out, quick, posture) -> paths, what it does)
@@ -23,6 +22,8 @@ KINDS: dict[str, tuple[str, str]] = {
 
 def add_arguments(parser: ArgumentParser) -> None:
     """A parser for every kind."""
+    from .common import add_scene
+
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
     for name, (_, purpose) in KINDS.items():
         own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
@@ -36,6 +37,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compute and write the report; prints the files."""
+    from .common import open_scene
+
     write: Callable[..., list[Path]] = import_module(f"boom_twin.study.{KINDS[args.kind][0]}").write
     options = {"soak": True} if getattr(args, "soak", False) else {}
     for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture, **options):

@@ -18,6 +18,8 @@ AXIAL = 0.35  # an axial coordinate; other unknowns count as one
 OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
 SHARE = 0.05  # a coordinate of a mass, or a point that turns finitely
 
+STEPS = 400  # that are timed
+
 
 def unknowns(scene: Scene) -> int:
     """Unknowns of one step."""
@@ -34,10 +36,13 @@ def size(scene: Scene) -> float:
 
 
 def step_times(scenes: Sequence[Scene], course: Course, rounds: int) -> Array:
-    """Time (s) of a step of every scene on the move of a course, shape (scenes,): the least of `rounds` interleaved runs."""
+    """Time (s) of a step of every scene, shape (scenes,): the least of `rounds` interleaved runs.
+
+    Each steps the beginning of the move: short runs are more often left alone by what else the machine does.
+    """
     motion, least = course.motion, np.full(len(scenes), np.inf)
     for _ in range(rounds):
         for k, scene in enumerate(scenes):
-            run = march(scene, motion, motion.duration, course.step, every=course.every, angles=motion.angles)
+            run = march(scene, motion, STEPS * course.step, course.step, every=STEPS, angles=motion.angles)
             least[k] = min(least[k], run.seconds / run.steps)
     return least

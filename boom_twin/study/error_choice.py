@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..scene.parts import Scene
-from .error_cases import DEFAULT_STEP, Own
-from .error_front import NOISE, acceleration, better, fastest, front, of, tip
+from .error_cases import DEFAULT_STEP, Own, with_modes
+from .error_front import NOISE, SAME, acceleration, better, fastest, front, of, tip
 from .error_run import Row
 from .error_text import name, run_time
 
-SAME = 1.1  # errors that differ by less than a tenth count as equal
 GOALS = ((1.0, 0.03), (0.1, 0.01))  # mm, relative: what a user may want, for the advice on steps
 
 
@@ -33,9 +32,10 @@ def _standing(rows: Sequence[Row], row: Row) -> str:
     says = f"The default ({name(row.case)}): {_errors(row)}, {run_time(row):.3g} ms per simulated second."
     other = better(rows, row)
     if other is not None:
-        share = 100 * other.seconds / row.seconds
-        return f"{says} It is not on the front: {name(other.case)} errs no more ({_errors(other)}) in {share:.0f} % of its time."
-    place = "on the front" if row in front(rows, tip) or row in front(rows, acceleration) else "at the front, within timing noise"
+        beside = f"{name(other.case)} errs no more ({_errors(other)})"
+        return f"{says} It is not on the front: {beside} in {100 * other.seconds / row.seconds:.0f} % of its time."
+    exactly = row in front(rows, tip) or row in front(rows, acceleration)
+    place = "on the front" if exactly else "at the front, within timing noise"
     return f"{says} It is {place}: nothing that errs no more in both takes less than {100 * NOISE:.0f} % of its time."
 
 
@@ -71,7 +71,7 @@ def _rho(rows: Sequence[Row]) -> str:
         return ""
     worse = sorted({row.case.label for row in _rising(of(rows, Own))})
     end = f" With too little damping the acceleration gets worse as the step gets smaller: {'; '.join(worse)}." if worse else ""
-    return f"rho, at the default step: {', '.join(text for _, text in sorted(told))} of the time's error at the tip.{end}"
+    return f"rho, at the default step, against the own reference: {', '.join(text for _, text in sorted(told))}.{end}"
 
 
 def _rising(rows: Sequence[Row]) -> list[Row]:
@@ -98,8 +98,9 @@ def _passes(rows: Sequence[Row]) -> str:
     pairs.sort(key=lambda pair: _own(pair[0]).step)
     alike = [newton for newton, row in pairs if row.tip_mm < SAME * newton.tip_mm]
     counted = ", ".join(f"{newton.passes or 0.0:.2f} at {1e3 * _own(newton).step:g} ms" for newton, _ in pairs)
-    end = f"a single one errs the same up to {1e3 * _own(alike[-1]).step:g} ms" if alike else "a single one errs more throughout"
-    last = pairs[-1]
+    end, last = "a single one errs more throughout", pairs[-1]
+    if alike:
+        end = f"a single one errs the same up to {1e3 * _own(alike[-1]).step:g} ms"
     return (
         f"Passes: Newton makes {counted}; {end}, and takes {100 * last[1].seconds / last[0].seconds:.0f} % of the time at "
         f"{1e3 * _own(last[0]).step:g} ms. Newton is the default because it costs nothing where one pass suffices, and notices "
@@ -112,14 +113,15 @@ def _modes(rows: Sequence[Row], row: Row, scene: Scene) -> str:
     told, listed = [], []
     for modes in range(1, 7):
         shapes, cantilever = (find(rows, Own(modes=modes, basis=basis)) for basis in ("end-shapes", "cantilever"))
+        shapes = row if with_modes(scene, modes) == scene else shapes
         if shapes is not None:
             beside = f" (cantilever modes: {cantilever.tip_mm:.2g} mm)" if cantilever is not None else ""
             told.append(f"{modes}: {_errors(shapes)}, {run_time(shapes):.3g} ms{beside}")
             listed.append(shapes)
     if not told:
         return ""
-    fewest = min((r for r in listed if r.tip_mm < SAME * row.tip_mm), key=lambda r: _own(r).modes or 0, default=None)
-    end = "" if fewest is None else f" The fewest that err as little as the default: {_own(fewest).modes}."
+    fewest = min((r for r in listed if r.tip_mm < SAME * row.tip_mm), key=lambda r: r.seconds, default=None)
+    end = "" if fewest is None else f" The fastest that errs as little as the default: {_own(fewest).modes or scene.modes}."
     return f"Modes a part at {1e3 * DEFAULT_STEP:g} ms (the scene has {scene.modes}): {'; '.join(told)}.{end}"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +12,7 @@ from .error_run import Row
 
 EQUAL = (0.3, 1.0, 3.0, 10.0)  # mm
 NOISE = 0.9  # a run must take less than this share of another's time to be called faster
+SAME = 1.1  # errors that differ by less than a tenth count as equal
 Measure = Callable[[Row], float]
 
 
@@ -42,6 +45,12 @@ def of(rows: Sequence[Row], kind: type) -> list[Row]:
     return [row for row in rows if isinstance(row.case, kind)]
 
 
+def best_way(rows: Sequence[Row], elements: int, step: float) -> Row | None:
+    """Exudyn's fastest way to solve a step that errs at the tip at most a tenth more than its best, None if none ran."""
+    here = [row for row in rows if isinstance(row.case, Peer) and (row.case.elements, row.case.step) == (elements, step)]
+    return fastest(here, SAME * min((row.tip_mm for row in here if row.good), default=0.0))
+
+
 @dataclass(frozen=True)
 class Match:
     """The fastest of both programs at an error of the tip (mm); a row is None where none reaches it."""
@@ -62,6 +71,35 @@ def matches(rows: Sequence[Row], kind: type = Peer) -> list[Match]:
     return [Match(most, fastest(own, most), fastest(other, most)) for most in EQUAL]
 
 
+@dataclass(frozen=True)
+class Duel:
+    """The default against a case of Exudyn at its step, run in turn: wall seconds per simulated second of all runs."""
+
+    case: Peer
+    own: tuple[float, ...]
+    other: tuple[float, ...]
+
+    @property
+    def medians(self) -> tuple[float, float]:
+        """Of the own runs and of the other's."""
+        return statistics.median(self.own), statistics.median(self.other)
+
+    @property
+    def ratio_of_minima(self) -> float:
+        """The other's fastest run over the own one."""
+        return min(self.other) / min(self.own)
+
+    @property
+    def told(self) -> dict[str, object]:
+        """Everything as one flat object."""
+        own, other = self.medians
+        return {
+            "step_s": self.case.step, "elements": self.case.elements, "exudyn_method": self.case.label,
+            "boom_twin_s": self.own, "exudyn_s": self.other, "ratio_of_medians": other / own,
+            "ratio_of_minima": self.ratio_of_minima,
+        }  # fmt: skip
+
+
 def better(rows: Sequence[Row], row: Row) -> Row | None:
     """The fastest own row that is clearly faster than `row` and no worse in both errors; None if `row` is on the front."""
     faster = [
@@ -77,13 +115,11 @@ def better(rows: Sequence[Row], row: Row) -> Row | None:
 
 def order(rows: Sequence[Row]) -> list[tuple[Row, float | None]]:
     """Rows of one method by falling step, each with the order of its own tip error from the step before."""
-    from math import log
-
     found: list[tuple[Row, float | None]] = []
     for row in sorted(rows, key=lambda row: -row.case.step if isinstance(row.case, Own | Peer) else 0.0):
         last = found[-1][0] if found else None
         slope = None
         if last is not None and last.good and row.good and isinstance(row.case, Own) and isinstance(last.case, Own):
-            slope = log(last.own_mm / row.own_mm) / log(last.case.step / row.case.step)
+            slope = math.log(last.own_mm / row.own_mm) / math.log(last.case.step / row.case.step)
         found.append((row, slope))
     return found

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-from ..view.work_precision import Curve, Panel
-from .error_cases import Case, Own, Peer, Stiff
+from ..scene.parts import Scene
+from ..view.work_precision import TONES, Curve, Panel
+from .error_cases import PAPERS, Case, Own, Peer, Stiff
 from .error_choice import find
-from .error_front import Measure, acceleration, fastest, front, of, tip
+from .error_front import Measure, acceleration, best_way, front, of, tip
 from .error_problem import Problem
 from .error_run import Row
+
+PAPERS_NAME = "as in the papers"
 
 
 def main_panels(problem: Problem, rows: Sequence[Row]) -> tuple[Panel, Panel]:
     """Tip and acceleration, all programs; of Exudyn's ways to solve a step, the fastest at each number of elements."""
-    apart = (None, None) if problem.exudyn is None else problem.own.path.away(problem.exudyn.path)
+    apart = problem.apart or (None, None)
     percent: Measure = lambda row: 100.0 * acceleration(row)  # noqa: E731
     return (
         _panel("Tip", "error of the tip, mm rms", rows, tip, apart[0]),
@@ -48,14 +52,13 @@ def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _exudyn(rows: Sequence[Row]) -> list[list[Row]]:
-    """One curve per number of elements: at every step the fastest way that errs no more than a tenth above the best."""
+    """One curve per number of elements: at every step its best way."""
     curves = []
     cases = [row.case for row in rows if isinstance(row.case, Peer)]
     for elements in sorted({case.elements for case in cases}):
         curve = []
         for step in sorted({case.step for case in cases}):
-            here = [r for r in rows if isinstance(r.case, Peer) and (r.case.elements, r.case.step) == (elements, step)]
-            best = fastest(here, 1.1 * min((r.tip_mm for r in here if r.good), default=0.0))
+            best = best_way(rows, elements, step)
             curve += [best] if best is not None else []
         curves += [curve] if curve else []
     return curves
@@ -80,38 +83,44 @@ def _notes(rows: list[Row]) -> tuple[str, ...]:
         return tuple(f"{1e3 * row.case.step:g} ms" if isinstance(row.case, Own) else "" for row in rows)
     if isinstance(case, Own):
         return ()
-    text = f"{case.elements} el." if isinstance(case, Peer) else f"{4 * case.fineness} seg."
+    text = f"{case.elements}" if isinstance(case, Peer) else f"{4 * case.fineness}"
     slowest = max(range(len(rows)), key=lambda i: rows[i].seconds)
     return tuple(text if i == slowest else "" for i in range(len(rows)))
 
 
-def method_panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
+def method_panels(scene: Scene, rows: Sequence[Row]) -> tuple[Panel, ...]:
     """Own methods by what they vary, against the own reference."""
-    titles: tuple[tuple[str, Callable[[Own], bool]], ...] = (
-        ("Integrators", _varies_integrator),
-        ("Shapes", lambda case: case == Own(case.step, modes=case.modes, basis=case.basis) and case.modes is not None),
-        ("Passes, product, what a beam has", _varies_rest),
-    )
-    return tuple(_method_panel(title, rows, choose) for title, choose in titles)
-
-
-def _method_panel(title: str, rows: Sequence[Row], choose: Callable[[Own], bool]) -> Panel:
+    groups = {"Integrators": _varies_integrator, "Shapes a part": _varies_shapes, "Passes, product, beams": _varies_rest}
     default = find(rows, Own())
-    listed = [r for r in of(rows, Own) if isinstance(r.case, Own) and (choose(r.case) or r.case == Own(r.case.step))]
-    curves = [
-        Curve(label, _family(group[0].case), tuple(r.seconds for r in group), tuple(r.own_mm for r in group))
-        for label, group in _by_label(listed).items()
-    ]
-    chosen = None if default is None or not default.good else (default.seconds, default.own_mm)
-    return Panel(title, "error of the tip against the own reference, mm rms", tuple(curves), (), chosen)
+    chosen = None if default is None else (default.seconds, default.own_mm)
+    label = "error of the tip against the own reference, mm rms"
+    return tuple(Panel(title, label, _method_curves(scene, rows, choose), (), chosen) for title, choose in groups.items())
+
+
+def _method_curves(scene: Scene, rows: Sequence[Row], choose: Callable[[Own], bool]) -> tuple[Curve, ...]:
+    default, curves, shapes = Own().label, list[Curve](), choose is _varies_shapes
+    listed = [r for r in of(rows, Own) if isinstance(r.case, Own) and (choose(r.case) or r.case.label == default)]
+    for number, (label, group) in enumerate(_by_label(listed).items()):
+        case = group[0].case
+        assert isinstance(case, Own)
+        tone, dashed = number % len(TONES), number >= len(TONES)
+        if shapes:
+            tone, dashed = (case.modes or scene.modes) - 1, case.basis == "cantilever"
+            label = f"{case.modes or scene.modes}, {'cantilever' if dashed else 'end shapes'}"
+        text = PAPERS_NAME if case == replace(PAPERS, step=case.step) else label.removeprefix(f"{default}, ")
+        seconds, errors = tuple(r.seconds for r in group), tuple(r.own_mm for r in group)
+        curves.append(Curve(text, _family(case), seconds, errors, (), tone % len(TONES), dashed))
+    return tuple(sorted(curves, key=lambda curve: (curve.dashed, curve.tone)) if shapes else curves)
 
 
 def _varies_integrator(case: Own) -> bool:
     return case == Own(case.step, case.method) and case.method.passes > 1 and case.method.product == "riccati"
 
 
+def _varies_shapes(case: Own) -> bool:
+    return case.modes is not None and case == Own(case.step, modes=case.modes, basis=case.basis)
+
+
 def _varies_rest(case: Own) -> bool:
     lean = case.method.passes == 1 or case.method.product == "plain"
-    return (lean or not (case.axial and case.geometric)) and (case.modes is None or lean)
-
-
+    return lean or not (case.axial and case.geometric)

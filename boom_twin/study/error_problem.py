@@ -53,6 +53,11 @@ class Problem:
     exudyn: Reference | None
     missing: str
 
+    @property
+    def apart(self) -> tuple[float, float] | None:
+        """How far the references are from each other: tip (mm), acceleration (relative)."""
+        return None if self.exudyn is None else self.own.path.away(self.exudyn.path)
+
     def errors(self, path: Path) -> tuple[tuple[float, float], tuple[float, float] | None]:
         """Against the own and the independent reference."""
         return path.away(self.own.path), None if self.exudyn is None else path.away(self.exudyn.path)
@@ -111,6 +116,7 @@ def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Referen
     )
     added = longer.away(best)
     what = f"Exudyn, extrapolated from {few} and {many} elements a section and steps of {1e3 * coarse:g} and {1e3 * fine:g} ms"
+    what += f", GA = {SHEAR_OVER_AXIAL:g} EA"
     return Reference(best, 0.1 * added[0], 0.1 * added[1], what)
 
 

@@ -18,6 +18,7 @@ from .error_problem import ROW, Path, Problem, every, path_of
 from .exudyn import load_rig
 
 ROUNDS = 5  # over all cases, so that the runs of a case lie minutes apart; the time is their median
+OWN_REPEATS = 3  # in each of them
 PEER_ROUNDS = 3
 LONG = 2.0  # s of wall time; a peer that takes longer is not run again
 
@@ -125,7 +126,7 @@ class Runner:
         motion = self.problem.motion
         found = march(
             case.scene(self.problem.scene), motion, motion.duration, case.step, every(case.step), case.method, case.basis,
-            motion.angles,
+            motion.angles, OWN_REPEATS,
         )  # fmt: skip
         path = Path(found.tip, found.tip_acceleration)
         return Timed(path, found.seconds, found.steps, found.passes, found.status)

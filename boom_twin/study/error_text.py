@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Callable, Iterable, Sequence
 
 from .error_cases import Case, Own, Peer, Stiff
@@ -30,7 +31,7 @@ def equal_error_table(found: Sequence[Match], other: str) -> str:
 
 
 def _match(match: Match) -> tuple[object, ...]:
-    ratio = None if match.ratio is None else f"{match.ratio:.3g} times as long"
+    ratio = None if match.ratio is None else f"{match.ratio:.{0 if match.ratio > 10.0 else 1}f} times as long"
     own, theirs = (_or_none(row) for row in (match.own, match.other))
     return f"{match.most:g}", own, run_time(match.own), theirs, run_time(match.other), ratio
 
@@ -98,8 +99,9 @@ def _why(row: Row) -> str:
 
 
 def feeding_share(rows: Sequence[Row]) -> float | None:
-    """Largest share of Exudyn's run time that its drives' Python function takes."""
-    return max((row.feeding for row in of(rows, Peer) if row.good and row.feeding), default=None)
+    """Share of Exudyn's run time that its drives' Python function takes, median."""
+    shares = [row.feeding for row in of(rows, Peer) if row.good and row.feeding]
+    return statistics.median(shares) if shares else None
 
 
 def _or_none(row: Row | None) -> str:

@@ -22,7 +22,7 @@ from .edits import Edit, edited, merged
 from .variants import FEWER_MODES, KINDS, Kind, Variant, without
 
 GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
-ROUNDS = 7
+ROUNDS = 30
 
 Progress = Callable[[str], None]
 

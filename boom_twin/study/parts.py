@@ -19,7 +19,7 @@ from .motion import DURATION
 from .report import machine, provenance, table, write_json
 from .variants import Variant, variants
 
-ROUNDS, QUICK_ROUNDS = 9, 3
+ROUNDS, QUICK_ROUNDS = 30, 5
 QUICK_DURATION = 2.0  # s
 NOTE = "surrogate parameters; one motion, another may differ"
 HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest mm", "f1, %", "f2, %", "f3, %", "step, us",
@@ -148,7 +148,7 @@ def as_markdown(found: Parts) -> str:
         f"frequencies {frequencies} Hz.",
         f"At rest: the largest distance of the tips in {', '.join(found.course.names)}. Move: {found.course.motion.label}; "
         f"steps of {1e3 * found.course.step:g} ms. Frequencies: change about the rest at the start of the move. Time: stepping "
-        "alone, least of interleaved runs; what is negative costs time. Another motion may differ.\n",
+        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ.\n",
         table(HEAD, [_row(found, part) for part in found.parts]),
         provenance(),
     ]

@@ -17,7 +17,7 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; floats with 3 significant digits, None and NaN as a dash. Ends with a newline."""
+    """A Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
     lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
@@ -37,7 +37,9 @@ def write_json(path: Path, content: Any) -> None:
 def _text(value: object) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
-    return (f"{value:.3g}" if isinstance(value, float) else str(value)).replace("|", "\\|")
+    if isinstance(value, float):
+        return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+    return str(value).replace("|", "\\|")
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Picture of errors over run time, both logarithmic: every method a curve, the Pareto front and the default marked."""
+"""Pictures of errors over run time, both logarithmic: every method a curve, the Pareto front and the default marked."""
 
 from __future__ import annotations
 
@@ -13,15 +13,27 @@ from .style import BLUE, GREEN, INK, ORANGE, PALE, PURPLE, SKY, picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MARKERS = "osD^vP<X>h"
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK)
+TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
+STAR: dict[str, Any] = {"marker": "*", "markersize": 20, "color": PURPLE, "markeredgecolor": "white", "linewidth": 0}
+RING: dict[str, Any] = {"marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgewidth": 1.2}
+SMALL = 10.5  # points, of notes and of long legends
+WIDE = 25  # characters; legends with a longer entry have one column
+
+# family: (legend, line and marker, where its notes stand)
+FAMILIES: dict[str, tuple[str, dict[str, Any], tuple[float, float]]] = {
+    "own": ("boom_twin, all other methods", {"color": SKY, "linewidth": 0, "marker": ".", "markersize": 6}, (0, 0)),
+    "default": ("boom_twin, default method", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
+    "exudyn": ("Exudyn, by elements a section", {"color": ORANGE, "linewidth": 1.6, "marker": "s"}, (7, -4)),
+    "scipy": ("SciPy's Radau, by segments", {"color": GREEN, "linewidth": 1.6, "marker": "^", "markersize": 7}, (7, 3)),
+}
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One method at several steps: wall seconds per simulated second and errors, each (k,); `notes` stand at its points.
+    """One method at several steps: wall seconds per simulated second and errors, each (k,).
 
-    ``family`` is the legend's entry that it belongs to: a key of `FAMILIES`.
+    ``family`` is the legend's entry that it belongs to, a key of `FAMILIES`; `notes` stand at its points. Among own methods
+    ``tone`` is its colour and marker (0 to 5, of `TONES`), and it may be `dashed`.
     """
 
     label: str
@@ -29,6 +41,8 @@ class Curve:
     seconds: tuple[float, ...]
     errors: tuple[float, ...]
     notes: tuple[str, ...] = ()
+    tone: int = 0
+    dashed: bool = False
 
 
 @dataclass(frozen=True)
@@ -53,45 +67,38 @@ class Panel:
     floor: float | None = None
 
 
-# family: (legend, line and marker)
-FAMILIES: dict[str, tuple[str, dict[str, Any]]] = {
-    "own": ("boom_twin, other methods", {"color": SKY, "linewidth": 0.7, "marker": ".", "markersize": 5, "alpha": 0.75}),
-    "default": ("boom_twin, default method", {"color": BLUE, "linewidth": 2.4, "marker": "o", "markersize": 7, "zorder": 5}),
-    "exudyn": ("Exudyn", {"color": ORANGE, "linewidth": 1.6, "marker": "s", "markersize": 6}),
-    "scipy": ("SciPy on a finite-segment boom", {"color": GREEN, "linewidth": 1.6, "marker": "^", "markersize": 7}),
-}
-
-
 def work_precision_picture(path: Path, title: str, note: str, panels: tuple[Panel, ...]) -> Path:
-    """Write the picture; returns `path`."""
-    with picture(path, title, note, (16.0, 9.4)) as figure:
+    """Write the picture of all programs; returns `path`."""
+    with picture(path, title, note, (16.0, 9.8)) as figure:
         grid = figure.subplots(1, len(panels), squeeze=False)[0]
         for axes, panel in zip(grid, panels, strict=True):
             _frame(axes, panel)
             for curve in panel.curves:
-                _, look = FAMILIES[curve.family]
+                _, look, offset = FAMILIES[curve.family]
                 axes.plot(_ms(curve.seconds), curve.errors, **look)
-                _notes(axes, curve, str(look["color"]))
+                _notes(axes, curve, str(look["color"]), offset)
             _marks(axes, panel)
-        grid[-1].legend(handles=_legend(panels[0]), loc="upper right", framealpha=0.9, frameon=True, edgecolor="none")
+        figure.legend(handles=_legend(panels[0]), loc="outside lower center", ncols=4)
     return path
 
 
 def methods_picture(path: Path, title: str, note: str, panels: tuple[Panel, ...]) -> Path:
-    """The same for own methods among themselves: every curve with its own colour and marker; returns `path`."""
-    with picture(path, title, note, (19.0, 8.4)) as figure:
+    """Write the picture of own methods among themselves, every curve with a look of its own; returns `path`."""
+    with picture(path, title, note, (19.0, 10.0)) as figure:
         grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
         for axes, panel in zip(grid, panels, strict=True):
             _frame(axes, panel)
-            for i, curve in enumerate(panel.curves):
+            for curve in panel.curves:
+                colour, marker = TONES[curve.tone]
                 bold = curve.family == "default"
-                style = "-" if i < len(COLOURS) else "--"
                 axes.plot(
-                    _ms(curve.seconds), curve.errors, color=COLOURS[i % len(COLOURS)], marker=MARKERS[i % len(MARKERS)],
-                    markersize=6, linewidth=2.4 if bold else 1.2, linestyle=style, label=curve.label, zorder=5 if bold else 3,
+                    _ms(curve.seconds), curve.errors, color=colour, marker=marker, markersize=7 if bold else 5.5,
+                    linewidth=2.6 if bold else 1.2, linestyle=(0, (4, 2)) if curve.dashed else "-",
+                    markerfacecolor="white" if curve.dashed else colour, label=curve.label, zorder=5 if bold else 3,
                 )  # fmt: skip
             _marks(axes, panel)
-            axes.legend(loc="lower left", fontsize=10.5, frameon=True, framealpha=0.9, edgecolor="none")
+            columns = 1 if max(len(curve.label) for curve in panel.curves) > WIDE else 2
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=columns, fontsize=SMALL)
         for axes in grid[1:]:
             axes.set_ylabel("")
     return path
@@ -102,32 +109,33 @@ def _ms(seconds: tuple[float, ...]) -> Any:
 
 
 def _frame(axes: Axes, panel: Panel) -> None:
+    from matplotlib.ticker import StrMethodFormatter
+
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.set_title(panel.title)
-    axes.set_xlabel("run time of the stepping, ms per simulated second")
+    axes.set_xlabel("run time, ms per simulated second")
     axes.set_ylabel(panel.label)
-    axes.grid(True, which="minor", color="#F3F3F3", linewidth=0.6)
+    axes.grid(True, which="minor", color="#F4F4F4", linewidth=0.6)
 
 
-def _notes(axes: Axes, curve: Curve, colour: str) -> None:
-    """Small print beside the points of a curve that has any; a single note stands at its last point."""
+def _notes(axes: Axes, curve: Curve, colour: str, offset: tuple[float, float]) -> None:
+    """Small print beside those points of a curve that have any."""
+    paper = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
     for note, x, y in zip(curve.notes, _ms(curve.seconds), curve.errors, strict=False):
         if note:
-            axes.annotate(
-                note, (x, y), xytext=(5, 6), textcoords="offset points", fontsize=10.5, color=colour, zorder=6
-            )  # fmt: skip
+            axes.annotate(note, (x, y), offset, textcoords="offset points", fontsize=SMALL, color=colour, bbox=paper, zorder=6)
 
 
 def _marks(axes: Axes, panel: Panel) -> None:
     """Front, default, floor."""
     if panel.front:
         x, y = np.array(panel.front).T
-        axes.plot(1e3 * x, y, color=INK, linewidth=1.0, linestyle=(0, (2, 2)), zorder=4)
-        axes.plot(1e3 * x, y, "o", markersize=12, markerfacecolor="none", markeredgecolor=INK, markeredgewidth=1.3, zorder=6)
+        axes.plot(1e3 * x, y, color=INK, linewidth=1.0, linestyle=(0, (2, 2)), markeredgecolor=INK, zorder=4, **RING)
     if panel.chosen:
-        x0, y0 = 1e3 * panel.chosen[0], panel.chosen[1]
-        axes.plot([x0], [y0], "*", markersize=20, color=PURPLE, markeredgecolor="white", zorder=7)
+        axes.plot([1e3 * panel.chosen[0]], [panel.chosen[1]], zorder=7, **STAR)
     if panel.floor:
         low, _ = axes.get_ylim()
         axes.axhspan(min(low, panel.floor), panel.floor, color=PALE, alpha=0.5, linewidth=0, zorder=0.5)
@@ -139,13 +147,10 @@ def _legend(panel: Panel) -> list[Any]:
     from matplotlib.patches import Patch
 
     used = {curve.family for curve in panel.curves}
-    found: list[Any] = [Line2D([], [], label=text, **look) for name, (text, look) in FAMILIES.items() if name in used]
-    found.append(Line2D([], [], color=PURPLE, marker="*", markersize=15, linewidth=0, label="the default: step 1 ms"))
-    ring: dict[str, Any] = {"marker": "o", "markersize": 11, "markerfacecolor": "none", "linestyle": (0, (2, 2))}
-    found.append(Line2D([], [], color=INK, label="Pareto front", **ring))
+    found: list[Any] = [Line2D([], [], label=text, **look) for name, (text, look, _) in FAMILIES.items() if name in used]
+    if panel.chosen:
+        found.append(Line2D([], [], label="the default, step 1 ms", **STAR | {"markersize": 15}))
+    found.append(Line2D([], [], color=INK, linestyle=(0, (2, 2)), label="Pareto front", **RING))
     if panel.floor:
         found.append(Patch(color=PALE, alpha=0.5, label="less than the references differ"))
     return found
-
-
-

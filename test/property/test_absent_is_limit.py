@@ -117,7 +117,7 @@ def test_a_single_section_becomes_rigid(section):
 
 @pytest.mark.parametrize("section", EVERYWHERE)
 def test_a_rigid_section_of_a_short_boom_cuts_the_others_but_moves_nothing(section):
-    """The default boom has just as many flexible sections as need no cuts, see `scene.splits`."""
+    """The default boom has just as many flexible parts as need no cuts, see `scene.splits`."""
     rest, move = distances(
         DEFAULT, left_out(DEFAULT, "bending", [section]), lambda f: scaled(DEFAULT, BEAM_KEYS, f, [section]), [1e6]
     )

@@ -8,11 +8,10 @@ import numpy as np
 
 from boom_twin.analysis.posture import set_undeformed
 from boom_twin.analysis.simulate import PASSES, RHO
-from boom_twin.chain.newton import newton
 from boom_twin.chain.place import place
-from boom_twin.chain.program import Motion, State, Work
-from boom_twin.chain.step import observe, rest, run
-from boom_twin.physics.integrators import GENERALISED_ALPHA, A, P
+from boom_twin.chain.program import State, Work
+from boom_twin.chain.step import advance, observe, run
+from boom_twin.physics.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
 from boom_twin.plan.compile import Plan, compile_scene
 
 INSTANT = 1e-4  # s, over which accelerations at rest are found; their relative error is about its square
@@ -43,15 +42,13 @@ def released(scene, angles):
     state, work = start.state, start.work
     set_undeformed(plan, state, np.asarray(angles, dtype=float))
     place(plan.tables, state, work)
-    rest(state, work)
-    z, before = state.z.copy(), work.position.copy()
-    motion = Motion(2.0 / INSTANT**2, 0.0, before, np.zeros_like(before))
+    state.history[X] = work.position
+    weights = new_weights(DEPTH)
+    weights[HAT, X] = weights[X, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
+    instant = Scheme(0.0, 2.0 / INSTANT**2, 0.0, weights)
     still = np.zeros(plan.joints)
-    status, _, _ = newton(plan.tables, state, work, motion, start.lengths, still, TOLERANCE, PASSES, 1.0, None)
+    status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None)
     assert status == 0
-    state.history[A] = state.history[P] = motion.gain * (work.position - before)
-    state.z[:] = np.where(plan.tables.moving > 0, z, state.z)
-    place(plan.tables, state, work)
     return start
 
 
@@ -69,7 +66,7 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
     else:
         lengths, rates = drive(step * np.arange(1, count + 1))
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, row, _ = run(
+    status, row, _, _ = run(
         plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     assert status == 0, f"status {status} in row {row}"

@@ -12,7 +12,7 @@ from boom_twin.study.report import provenance, table, write_json
 
 def test_table():
     text = table(("a", "b | c"), [(1, 0.123456), ("x|y", float("nan")), (None, 12345.6)])
-    assert text == "| a | b | c |\n| --- | --- |\n| 1 | 0.123 |\n| x\\|y | - |\n| - | 1.23e+04 |\n"
+    assert text == "| a | b | c |\n| --- | --- |\n| 1 | 0.123 |\n| x\\|y | - |\n| - | 12346 |\n"
 
 
 def test_json_holds_no_numbers_that_are_none(tmp_path):

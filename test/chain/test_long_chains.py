@@ -1,0 +1,74 @@
+"""Booms of up to 200 sections: cost in proportion to them, and results that a dense solve of the same step confirms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bench.long_chains import Runner, boom, costs
+from chain.dense import NUDGE, Dense
+
+from boom_twin.chain.program import Motion, State
+from boom_twin.chain.step import advance
+from boom_twin.physics.integrators import GENERALISED_ALPHA, prepare
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles
+from boom_twin.study.stability_step import one_step
+
+STEP, RHO, STEPS = 1e-3, 0.8, 20
+LENGTH = 20.0  # m, of every boom
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize("count", [2, 10, 50, 100, pytest.param(200, marks=pytest.mark.slow)])
+def test_sweeps_round_off_no_more_than_elimination_of_the_whole(count):
+    """One linear step from rest; LU with pivoting of all unknowns at once, and an exact solution of the same system.
+
+    Measured up to 200 sections: at most 1.4 times the error of LU, which is 3e-13 of the tip's increment there.
+    """
+    scene = boom(count)
+    found = one_step(scene, posture_angles(scene, "test"), STEP, RHO)
+    assert found.exact < 1e-15
+    assert found.riccati < 5.0 * found.dense + 1e-14
+    assert found.riccati < 1e-12
+
+
+@pytest.mark.parametrize("count", [2, 10, 50, 100, pytest.param(200, marks=pytest.mark.slow)])
+def test_a_step_in_motion_solves_the_equations_of_all_unknowns(count):
+    """Bent, loaded and moving: what is left of the forces is the rounding of positions.
+
+    Positions are rounded to `EPS * LENGTH`. The witness divides that by its nudge, times forces of cylinders; accelerations
+    multiply it by the gain, times masses.
+    """
+    runner = Runner(boom(count))
+    plan, work, state = runner.plan, runner.work, State(*(array.copy() for array in runner.start))
+    scheme = prepare(GENERALISED_ALPHA, RHO, STEP, work.weights)
+    for drive, rate in zip(runner.drives[:STEPS], runner.rates[:STEPS], strict=True):
+        status, _, size = advance(plan.tables, state, work, scheme, drive, rate, 1e-11, np.int64(20), 0.5, None)
+        assert status == 0
+    assert size < 2e-12  # rad: increments of the last pass, all of them rounding
+    motion = Motion(scheme.gain, scheme.rate, work.hat.copy(), work.offset.copy())
+    left = np.abs(Dense(plan, motion, drive, rate).residual(state.z.copy()))
+    moving = plan.tables.moving > 0
+    forces, inertia = np.abs(state.z[~moving]).max() / NUDGE, scheme.gain * plan.masses.max() * LENGTH
+    assert left[moving].max() < EPS * LENGTH * (forces + inertia)  # N m
+    assert left[~moving].max() < 50 * EPS * LENGTH  # m; pins that meet, lengths of cylinders
+
+
+def test_everything_that_is_stepped_grows_in_proportion():
+    """From four sections on; shorter booms have their beams cut evenly."""
+    plans = [compile_scene(boom(count)) for count in (5, 6, 105)]
+    for amount in (
+        lambda plan: len(plan.names),
+        lambda plan: len(plan.masses),
+        lambda plan: sum(array.nbytes for array in (*plan.state(), *plan.work())),
+        lambda plan: len(plan.tables.operations),
+    ):
+        sizes = [amount(plan) for plan in plans]
+        assert sizes[2] - sizes[1] == 99 * (sizes[1] - sizes[0])
+
+
+def test_a_section_of_a_long_boom_costs_no_more_than_one_of_a_short_boom():
+    """A square law would give a ratio of 5; beyond the caches' sizes a section takes a little longer."""
+    runners = [Runner(boom(count)) for count in (20, 100)]
+    short, long = costs(runners, 40) / [20, 100]
+    assert long < 1.5 * short

@@ -1,0 +1,192 @@
+"""The error report of the default scene: well-formed, consistent with itself, and honest about failures."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle import booms
+
+from boom_twin.analysis.march import Method
+from boom_twin.cli.main import main
+from boom_twin.scene import load_scene
+from boom_twin.study import error, error_problem, error_run
+from boom_twin.study.error_cases import Own, Peer, Stiff, own_cases, peer_cases, stiff_cases, with_modes
+from boom_twin.study.error_front import Match, better, fastest, front, matches, order
+from boom_twin.study.error_problem import Problem, pose
+from boom_twin.study.error_run import Row, Runner
+from boom_twin.study.motion import motion_of
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory) -> Path:
+    """The quick report, made by the command."""
+    pytest.importorskip("exudyn")
+    out = tmp_path_factory.mktemp("report")
+    assert main(["study", "error", "--quick", "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def content(report):
+    return json.loads((report / "error.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """Half a second without Exudyn."""
+    scene = load_scene()
+    motion = motion_of(scene, duration=0.48)
+    return Problem(scene, motion, error_problem._own(scene, motion, True), None, "left out")
+
+
+def rows_of(content, **wanted):
+    return [row for row in content["rows"] if all(row.get(key) == value for key, value in wanted.items())]
+
+
+def test_rows_are_complete(content):
+    rows = content["rows"]
+    assert len(rows) == len(own_cases(load_scene(), True)) + len(peer_cases(True)) + len(stiff_cases(True))
+    assert {row["program"] for row in rows} == {"boom_twin", "exudyn", "scipy"}
+    for row in rows:
+        assert row["status"] == "ok", row
+        assert row["seconds"] > 0.0 and row["steps"] > 0
+        assert row["tip_mm"] == pytest.approx(max(row["own_mm"], row["independent_mm"]))
+        assert row["acceleration"] == pytest.approx(max(row["own_acceleration"], row["independent_acceleration"]))
+    assert all(row["step"] and row["passes"] >= 1.0 for row in rows_of(content, program="boom_twin"))
+
+
+def test_witnesses_agree(content):
+    """Exudyn extrapolated, finite segments, and the transfer-matrix boom with many shapes: one motion."""
+    assert content["references_differ"]["tip_mm"] < 0.1
+    assert content["references_differ"]["acceleration"] < 1e-3
+    assert min(row["own_mm"] for row in rows_of(content, program="exudyn")) < 1.5
+    assert min(row["own_mm"] for row in rows_of(content, program="scipy")) < 1.5
+
+
+@pytest.mark.parametrize(("method", "expected"), [("generalised-alpha 0.8", 2.0), ("newmark 0.6", 1.0)])
+def test_errors_fall_with_the_order_of_the_scheme(content, method, expected):
+    rows = [row for row in rows_of(content, method=method) if row["step"] >= 2e-3]
+    steps, errors = np.array([[row["step"], row["own_mm"]] for row in rows]).T
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(expected, abs=0.15)
+
+
+@pytest.mark.parametrize("measure", ["tip", "acceleration"])
+def test_front_is_a_front(content, measure):
+    key = {"tip": "tip_mm", "acceleration": "acceleration"}[measure]
+    points = [(row["seconds"], row[key], row[f"on_front_{measure}"]) for row in content["rows"]]
+    for seconds, wrong, on_front in points:
+        beaten = any(s <= seconds and w <= wrong and (s, w) != (seconds, wrong) for s, w, _ in points)
+        assert on_front != beaten
+
+
+def test_same_step_is_compared(content):
+    duel = content["same_step"]
+    assert duel["step_s"] == 1e-3 and duel["elements"] == 4
+    assert duel["ratio_of_minima"] == pytest.approx(min(duel["exudyn_s"]) / min(duel["boom_twin_s"]))
+    assert duel["ratio_of_minima"] > 5.0
+
+
+def test_text_and_pictures(report):
+    text = (report / "error.md").read_text()
+    for part in ("## The default", "Pareto front", "At equal error", "Exudyn, 4 elements", "SciPy Radau", "surrogates"):
+        assert part in text
+    assert "nan" not in text and "What failed" not in text
+    from matplotlib.image import imread
+
+    for name in ("error.png", "error_methods.png"):
+        image = np.asarray(imread(report / name)[:, :, :3], dtype=float)
+        assert image.std() > 0.05 and (image.max(axis=2) - image.min(axis=2) > 0.3).mean() > 0.002
+
+
+def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
+    reason = "boom_twin.rig needs the package exudyn, which is not installed"
+    for module in (error_problem, error_run):
+        monkeypatch.setattr(module, "load_rig", lambda: (None, reason))
+    error.write(booms.random_boom(8), tmp_path, quick=True)
+    content = json.loads((tmp_path / "error.json").read_text())
+    assert content["exudyn_missing"] == reason and content["same_step"] is None
+    assert {row["program"] for row in content["rows"]} == {"boom_twin", "scipy"}
+    assert all(row["tip_mm"] == row["own_mm"] for row in content["rows"])
+    assert reason in (tmp_path / "error.md").read_text()
+
+
+def test_independent_reference_that_fails_is_told(monkeypatch):
+    from boom_twin.errors import SolverError
+
+    def fail(*_):
+        raise SolverError("The rig stopped.")
+
+    monkeypatch.setattr(error_problem, "load_rig", lambda: (object(), ""))
+    monkeypatch.setattr(error_problem, "_independent", fail)
+    scene = load_scene()
+    found = pose(scene, motion_of(scene, duration=0.2), True)
+    assert found.exudyn is None and found.missing == "The rig stopped."
+
+
+def test_failures_are_rows(problem, monkeypatch):
+    runner = Runner(problem)
+    lost = runner.row(Own(2.5e-4, Method(product="plain")))
+    assert not lost.good and "lost its digits" in lost.status and math.isnan(lost.tip_mm)
+    refused = runner.row(Own(3e-3))
+    assert refused.status.startswith("UsageError: duration") and not refused.good
+    monkeypatch.setattr(error_run, "load_rig", lambda: (None, "no exudyn"))
+    assert runner.row(Peer(1e-3, 4, True, 1e-6)).status == "RuntimeError: no exudyn"
+    assert "645" not in runner.row(Stiff(1, 1e-3, "Radau")).status
+    assert "coordinates" in runner.row(Stiff(20, 1e-3, "Radau")).status
+
+
+def test_rounds_give_the_median(problem, monkeypatch):
+    runner, turns = Runner(problem), iter([3.0, 9.0, 1.0, 2.0, 5.0])
+    monkeypatch.setattr(runner, "row", lambda case: Row(case, 1.0, 0.1, seconds=next(turns)))
+    ticks = []
+    (row,) = runner.rows([Own()], 5, lambda: ticks.append(1))
+    assert row.seconds == 3.0 and len(ticks) == 5
+
+
+def made(seconds, wrong, acceleration=0.1, case=None):
+    """A row with given numbers."""
+    return Row(case or Own(), wrong, acceleration, math.nan, math.nan, seconds)
+
+
+def test_front_and_fastest_of_made_up_rows():
+    a, b, c, d = made(1.0, 4.0), made(2.0, 2.0), made(3.0, 3.0), made(4.0, 1.0)
+    failed = Row(Own(), status="no")
+    assert front([d, c, failed, b, a]) == [a, b, d]
+    assert fastest([d, c, b, a], 3.0) is b and fastest([a], 3.0) is None
+    assert better([a, b, c, d], c) is b and better([a, b, c, d], d) is None
+    assert better([a, b, made(1.9, 2.0)], b) is None, "a twentieth faster is noise"
+
+
+def test_equal_error_of_made_up_rows():
+    peer = Peer(1e-3, 4, True, 1e-6)
+    found = {match.most: match for match in matches([made(0.5, 0.9), made(0.1, 2.0), made(5.0, 0.8, case=peer)])}
+    assert found[0.3].ratio is None and found[1.0].ratio == pytest.approx(10.0) and found[3.0].ratio == pytest.approx(50.0)
+    assert Match(1.0, None, None).ratio is None
+
+
+def test_order_of_made_up_rows():
+    rows = [made(1.0, 4.0, case=Own(2e-3)), made(2.0, 1.0, case=Own(1e-3))]
+    assert [slope for _, slope in order(rows[::-1])] == [None, pytest.approx(2.0)]
+
+
+def test_modes_leave_rigid_sections_rigid():
+    scene = load_scene()
+    sections = tuple(s.model_copy(update={"modes": m}) for s, m in zip(scene.sections, (None, 0, 2, 5), strict=True))
+    changed = with_modes(scene.model_copy(update={"sections": sections}), 6)
+    assert [changed.modes_of(i) for i in range(4)] == [6, 0, 6, 6]
+    assert Own(axial=False).scene(scene).axial is False and Own().scene(scene) is scene
+
+
+def test_cases_are_distinct():
+    cases = [*own_cases(load_scene(), False), *peer_cases(False), *stiff_cases(False)]
+    assert len(set(cases)) == len(cases)
+    assert cases[0].label == "generalised-alpha 0.8"
+    assert {case.label for case in cases if isinstance(case, Own)} >= {
+        "houbolt", "park", "wilson 1.4", "newmark 0.5", "generalised-alpha 0.8, one pass",
+        "generalised-alpha 0.8, plain product", "generalised-alpha 0.8, 6 modes, cantilever modes",
+        "generalised-alpha 0.8, no axial coordinate, no geometric stiffness",
+    }  # fmt: skip
