@@ -86,7 +86,7 @@ def _silent(rows: Sequence[Row]) -> str:
                 found.setdefault(method, []).append(_title(row))
     lines = [f"- {method}: {'; '.join(cases)}.\n" for method, cases in found.items()]
     default = "" if "default" in found else "- default: none.\n"
-    return default + "".join(lines)
+    return default + "".join(lines) if found else "None: no method, in no case.\n"
 
 
 def _symptoms(rows: Sequence[Row]) -> Iterator[str]:

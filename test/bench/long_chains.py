@@ -22,6 +22,7 @@ from boom_twin.physics.integrators import GENERALISED_ALPHA
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.parts import Scene
+from boom_twin.scene.splits import LEAST
 from boom_twin.study.long_booms import long_boom
 from boom_twin.study.stability_step import one_step
 
@@ -71,9 +72,12 @@ def costs(runners: list[Runner], rounds: int = ROUNDS) -> np.ndarray:
 
 
 def line(counts: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fixed and per-section cost (s) of least relative squares, and the relative residuals."""
-    terms = np.stack([np.ones(len(counts)), counts], axis=1)
-    share = np.linalg.lstsq(terms / seconds[:, None], np.ones(len(counts)), rcond=None)[0]
+    """Fixed and per-section cost (s) of least relative squares, and relative residuals of all.
+
+    Beams of booms of few sections are cut, so those are left out of the line.
+    """
+    terms, whole = np.stack([np.ones(len(counts)), counts], axis=1), counts >= LEAST
+    share = np.linalg.lstsq((terms / seconds[:, None])[whole], np.ones(whole.sum()), rcond=None)[0]
     return share, seconds / (terms @ share) - 1.0
 
 

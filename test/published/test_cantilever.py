@@ -30,8 +30,8 @@ def frequency_errors(modes):
 
 
 def test_frequencies_of_the_default_modes():
-    """Three shapes in each of the four parts that a single beam is cut into; measured 6.8e-8, 1.9e-5, 3.5e-4, 3.0e-3."""
-    assert np.all(np.abs(frequency_errors(3)) < [1e-7, 3e-5, 5e-4, 4e-3])
+    """Three shapes in each of the parts that a single beam is cut into; measured 1e-9, 6.6e-7, 1.2e-5, 8.6e-5."""
+    assert np.all(np.abs(frequency_errors(3)) < [1e-8, 1e-6, 2e-5, 1.5e-4])
 
 
 def test_frequencies_fall_to_the_printed_digits():

@@ -99,7 +99,7 @@ def test_files_hold_the_matrix_and_its_symptoms(tmp_path, two_sections):
     found = json.loads((tmp_path / "stability.json").read_text())
     assert [case["methods"]["default"]["word"] for case in found["cases"]] == ["holds", "refuses"]
     text = (tmp_path / "stability.md").read_text()
-    assert "| scene: short | ● holds | ● holds |" in text and "- default: none." in text and "no equilibrium" in text
+    assert "| scene: short | ● holds | ● holds |" in text and "None: no method" in text and "no equilibrium" in text
     for name in ("stability.png", "stability_roundoff.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
