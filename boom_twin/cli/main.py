@@ -21,6 +21,7 @@ from ..errors import BoomTwinError
 # name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
 COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("check", "validate a scene and tell what its model consists of"),
+    "info": ("info", "what a recorded session holds and what it lacks"),
     "play": ("play", "publish the inputs of a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
     "scene": ("scene", "print the default scene file"),

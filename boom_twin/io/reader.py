@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BagError
-from .bagmeta import FILE_NAME, read_metadata
+from .bagmeta import FILE_NAME, BagMetadata, read_metadata
 from .blocks import messages
 from .damage import RESCUE, STUMBLES, blame, compare_counts
 from .definitions import check_encoding
@@ -50,6 +50,8 @@ class Session:
         a value cannot be noticed.
     notes : dict of str to str
         What the writer noted, for instance that the session is synthetic.
+    metadata : BagMetadata or None
+        What ``metadata.yaml`` says; None without one.
     """
 
     path: Path
@@ -59,6 +61,7 @@ class Session:
     end: int
     checked: bool
     notes: dict[str, str]
+    metadata: BagMetadata | None
 
     def find(self, name: str) -> TopicInfo | None:
         """The topic of that name, with or without its leading slash."""
@@ -74,7 +77,7 @@ def scan(path: Path) -> Session:
         If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
     metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else _mcap_files(path)
+    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
@@ -93,6 +96,7 @@ def scan(path: Path) -> Session:
         end=max((file.end for file in filled), default=0),
         checked=all(file.checked for file in filled),
         notes=notes,
+        metadata=metadata,
     )
 
 
@@ -119,14 +123,14 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
     """
     asked: dict[str, str] = {}
     for name, type_name in wanted.items():
-        asked[_check_topic(session, name, type_name).name] = name
+        asked[check_topic(session, name, type_name).name] = name
     for file in session.files:
         check_encoding(file, asked)
     streams = [_decoded(file, asked) for file in session.files]
     return heapq.merge(*streams, key=itemgetter(1))
 
 
-def _mcap_files(path: Path) -> list[Path]:
+def mcap_files(path: Path) -> list[Path]:
     """The files of a session without metadata."""
     if path.is_file():
         return [path]
@@ -156,7 +160,7 @@ def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
     return tuple(TopicInfo(name, types[name], counts[name]) for name in sorted(types))
 
 
-def _check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
+def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     """The topic, if it is there, of that type and not empty."""
     topic = session.find(name)
     if topic is None:

@@ -18,11 +18,15 @@ from mcap.writer import MCAP0_MAGIC
 
 from ..errors import BagError
 from .blocks import chunk_at, records
+from .content import LARGEST
 from .damage import RESCUE, blame, compare_counts
 
 PROFILE = "ros2"
 NOTES = "boom_twin"
 """Name of the metadata record that holds the notes on a session."""
+
+BLOCK = 2**20
+"""Bytes that are read at a time where a file may be of any size."""
 
 _FOOTER = struct.Struct("<BQQQI8s")
 
@@ -76,7 +80,7 @@ def survey(path: Path) -> McapFile:
     with blame(path), path.open("rb") as file:
         _check_ends(path, file)
         file.seek(0)
-        reader = SeekingReader(file, validate_crcs=True, record_size_limit=path.stat().st_size)
+        reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))
         if (profile := reader.get_header().profile) != PROFILE:
             raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
         summary = reader.get_summary()
@@ -106,10 +110,17 @@ def _check_ends(path: Path, file: BinaryIO) -> None:
     if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
         raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
     _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
-    file.seek(start or size - _FOOTER.size)
-    covered = file.read()[: -len(MCAP0_MAGIC) - 4]
-    if checksum not in (0, zlib.crc32(covered)):
+    if checksum not in (0, _checksum(file, start or size - _FOOTER.size, size - len(MCAP0_MAGIC) - 4)):
         raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
+
+
+def _checksum(file: BinaryIO, start: int, end: int) -> int:
+    """CRC-32 of the bytes from `start` up to `end`, a block at a time."""
+    total = 0
+    file.seek(start)
+    while (left := end - file.tell()) > 0 and (block := file.read(min(left, BLOCK))):
+        total = zlib.crc32(block, total)
+    return total
 
 
 def _is_complete(summary: Summary, told: Statistics) -> bool:
