@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("info", "what a recorded session holds and what it lacks"),
     "play": ("play", "publish the inputs of a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
+    "recover": ("recover", "save what is whole of a damaged session"),
     "scene": ("scene", "print the default scene file"),
     "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),
     "simulate": ("simulate", "the boom's answer to a stroke history"),

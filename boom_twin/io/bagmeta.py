@@ -126,8 +126,10 @@ def _count(document: Any) -> int:
 
 
 def write_metadata(path: Path, metadata: BagMetadata) -> None:
-    """Write `metadata` as Jazzy does; the same values give the same bytes."""
-    path.write_text(dump({_ROOT: metadata.model_dump()}), encoding="utf-8")
+    """Write `metadata` as Jazzy does, all of it or nothing; the same values give the same bytes."""
+    draft = path.with_name(f".{path.name}.draft")
+    draft.write_text(dump({_ROOT: metadata.model_dump()}), encoding="utf-8")
+    draft.replace(path)
 
 
 def offered_qos(qos: Qos) -> list[dict[str, Any]]:

@@ -18,6 +18,9 @@ from mcap.stream_reader import StreamReader
 from .content import LARGEST, MESSAGE_HEAD, definition_of, message_of, parts, unpack
 from .damage import STUMBLES
 
+TOGETHER = 2**30
+"""Bytes of messages that are held together, where the file does not keep them in order, at most."""
+
 
 def records(path: Path) -> Iterator[McapRecord]:
     """All records in the order of the file; those inside a chunk follow it."""
@@ -36,12 +39,25 @@ def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
     """
     by_time = attrgetter("log_time")
     if not chunks:
-        yield from sorted((record for record in records(path) if isinstance(record, Message)), key=by_time)
+        yield from sorted(_all_messages(path), key=by_time)
         return
     with path.open("rb") as file:
         for group in _overlapping(chunks):
+            if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
+                raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
             content = [record for index in group for record in _content(chunk_at(file, index))]
             yield from sorted((record for record in content if isinstance(record, Message)), key=by_time)
+
+
+def _all_messages(path: Path) -> Iterator[Message]:
+    """In the order of the file, as long as they may be held together."""
+    size = 0
+    for record in records(path):
+        if isinstance(record, Message):
+            size += len(record.data)
+            if size > TOGETHER:
+                raise McapError(f"more than {TOGETHER} bytes of messages without an index")
+            yield record
 
 
 def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, bytes]]:

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema
 from zstandard import ZstdDecompressor
 
-LARGEST = 256 * 2**20
+LARGEST = 64 * 2**20
 """Bytes of one record, and of one chunk unpacked, that are read at most."""
 
 PREFIX = struct.Struct("<BQ")
@@ -74,6 +74,17 @@ def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
         if place > size:
             raise McapError(f"record of {length} bytes at byte {start - PREFIX.size} of a chunk ends after the chunk")
         yield opcode, content[start:place]
+
+
+def whole_parts(content: bytes) -> bytes:
+    """The start of `content` up to where its last whole record ends."""
+    end = 0
+    try:
+        for _, body in parts(content):
+            end += PREFIX.size + len(body)
+    except McapError:
+        pass
+    return content[:end]
 
 
 def message_of(body: bytes) -> Message:

@@ -1,0 +1,223 @@
+"""A rosbag2 directory of one or more .mcap files, written from encoded messages; the same bytes for the same input."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from ..errors import BagError
+from . import bagmeta
+from .survey import NOTES, PROFILE
+
+CHUNK_SIZE = 64 * 1024
+"""Bytes of messages that wait in memory: about one second of a 200 Hz session."""
+LIBRARY = "boom_twin"
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One topic as it stands in a bag.
+
+    Attributes
+    ----------
+    topic, type : str
+        Absolute name; ``package/msg/Name``.
+    definition : bytes
+        Of the type and all types in it, in the language that `definition_encoding` names.
+    details : dict of str to str
+        Kept with the channel.
+    qos : object
+        Offered profiles, for ``metadata.yaml``.
+    type_hash : str
+    encoding, definition_encoding : str
+    """
+
+    topic: str
+    type: str
+    definition: bytes
+    details: Mapping[str, str] = field(default_factory=dict)
+    qos: Any = ()
+    type_hash: str = ""
+    encoding: str = "cdr"
+    definition_encoding: str = "ros2msg"
+
+
+class BagWriter:
+    """Writes a bag; `close` completes it.
+
+    Parameters
+    ----------
+    directory : Path
+        Made if it is not there.
+    notes : dict of str to str, optional
+        Kept in every file and in ``custom_data``.
+    compression : CompressionType, optional
+        Of the chunks.
+    distro : str, optional
+        Of ROS.
+
+    Raises
+    ------
+    BagError
+        If `directory` holds anything, or cannot be made.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        notes: Mapping[str, str] | None = None,
+        compression: CompressionType = CompressionType.ZSTD,
+        distro: str = "jazzy",
+    ) -> None:
+        self.directory, self._distro, self._compression = directory, distro, compression
+        self._notes = dict(notes or {})
+        self.topics: list[Recorded] = []
+        self._channels: list[int] = []
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self.counts: Counter[int] = Counter()
+        self._files: list[bagmeta.FileInformation] = []
+        self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
+        claim(directory)
+        self._open()
+
+    @property
+    def has_messages(self) -> bool:
+        """Whether anything was written to the open file."""
+        return self._span is not None
+
+    @property
+    def file(self) -> Path:
+        """The file that is being written."""
+        return self.directory / file_name(len(self._files))
+
+    def add(self, *topics: Recorded) -> list[int]:
+        """Register topics; gives the keys that `write` takes."""
+        first = len(self.topics)
+        self.topics += topics
+        self._register(list(topics))
+        return list(range(first, len(self.topics)))
+
+    def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
+        """Append one encoded message; times in ns, the publish time by default the log time."""
+        self.counts[key] += 1
+        first, last, count = self._span or (log_time, log_time, 0)
+        self._span = min(first, log_time), max(last, log_time), count + 1
+        published = log_time if publish_time is None else publish_time
+        self._writer.add_message(self._channels[key], log_time, data, published, sequence)
+
+    def flush(self) -> None:
+        """Put all messages so far on the disk, to survive the loss of the process and of power."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        os.fsync(self._stream.fileno())
+
+    def tell(self) -> int:
+        """Bytes of the open file so far, without the chunk in memory."""
+        return self._stream.tell()
+
+    def split(self) -> None:
+        """Complete the open file, tell of it in ``metadata.yaml``, and begin the next one."""
+        self._finish()
+        self._write_metadata()
+        self._open()
+
+    def close(self) -> None:
+        """Complete the file, then write ``metadata.yaml``."""
+        self._finish()
+        self._write_metadata()
+
+    def _open(self) -> None:
+        self._stream: BinaryIO = self.file.open("xb")
+        self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
+        self._writer.start(profile=PROFILE, library=LIBRARY)
+        if self._notes:
+            self._writer.add_metadata(NOTES, self._notes)
+        self._channels, self._schemas, self._span = [], {}, None
+        self._register(self.topics)
+
+    def _register(self, topics: list[Recorded]) -> None:
+        """All new schemas, then the channels, in the open file."""
+        for each in topics:
+            schema = each.type, each.definition_encoding, each.definition
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(*schema)
+        for each in topics:
+            number = self._schemas[each.type, each.definition_encoding, each.definition]
+            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
+
+    def _finish(self) -> None:
+        """Complete the open file, down to the disk."""
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+        finally:
+            self._stream.close()
+        first, last, count = self._span or (0, 0, 0)
+        self._files.append(
+            bagmeta.FileInformation(
+                path=file_name(len(self._files)),
+                starting_time=bagmeta.Start(nanoseconds_since_epoch=first),
+                duration=bagmeta.Duration(nanoseconds=last - first),
+                message_count=count,
+            )
+        )
+
+    def _write_metadata(self) -> None:
+        bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, self._metadata())
+
+    def _metadata(self) -> bagmeta.BagMetadata:
+        filled = [file for file in self._files if file.message_count]
+        first = min((file.starting_time.nanoseconds_since_epoch for file in filled), default=0)
+        last = max((file.starting_time.nanoseconds_since_epoch + file.duration.nanoseconds for file in filled), default=0)
+        return bagmeta.BagMetadata(
+            version=bagmeta.VERSION,
+            storage_identifier="mcap",
+            duration=bagmeta.Duration(nanoseconds=last - first),
+            starting_time=bagmeta.Start(nanoseconds_since_epoch=first),
+            message_count=self.counts.total(),
+            topics_with_message_count=[self._topic_count(key, topic) for key, topic in enumerate(self.topics)],
+            relative_file_paths=[file.path for file in self._files],
+            files=self._files,
+            custom_data=self._notes or None,
+            ros_distro=self._distro,
+        )
+
+    def _topic_count(self, key: int, topic: Recorded) -> bagmeta.TopicCount:
+        return bagmeta.TopicCount(
+            topic_metadata=bagmeta.TopicMetadata(
+                name=topic.topic,
+                type=topic.type,
+                serialization_format=topic.encoding,
+                offered_qos_profiles=topic.qos,
+                type_description_hash=topic.type_hash,
+            ),
+            message_count=self.counts[key],
+        )
+
+
+def file_name(number: int) -> str:
+    """Of the .mcap file with that number, from 0."""
+    return f"session_{number}.mcap"
+
+
+def claim(directory: Path) -> None:
+    """Make the directory; refuse one that holds anything.
+
+    Raises
+    ------
+    BagError
+        It is not empty, or cannot be made.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        taken = sorted(entry.name for entry in directory.iterdir())
+    except OSError as error:
+        raise BagError(f"{directory}: cannot be made ({error.strerror}). Choose another place.") from error
+    if taken:
+        raise BagError(f"{directory}: holds {taken[0]} already, and nothing is overwritten. Choose a new directory.")
