@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from io import BufferedWriter
 from pathlib import Path
-from typing import Any, BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
 from ..errors import BagError
 from . import bagmeta
+from .claim import claim
+from .recorded import Recorded
 from .survey import NOTES, PROFILE
 
 CHUNK_SIZE = 64 * 1024
@@ -20,36 +22,10 @@ CHUNK_SIZE = 64 * 1024
 LIBRARY = "boom_twin"
 
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """One topic as it stands in a bag.
-
-    Attributes
-    ----------
-    topic, type : str
-        Absolute name; ``package/msg/Name``.
-    definition : bytes
-        Of the type and all types in it, in the language that `definition_encoding` names.
-    details : dict of str to str
-        Kept with the channel.
-    qos : object
-        Offered profiles, for ``metadata.yaml``.
-    type_hash : str
-    encoding, definition_encoding : str
-    """
-
-    topic: str
-    type: str
-    definition: bytes
-    details: Mapping[str, str] = field(default_factory=dict)
-    qos: Any = ()
-    type_hash: str = ""
-    encoding: str = "cdr"
-    definition_encoding: str = "ros2msg"
-
-
 class BagWriter:
-    """Writes a bag; `close` completes it.
+    """Writes a bag; `close` completes it, `abandon` leaves it as it is.
+
+    Every method raises BagError if the disk is full or fails; then only `abandon` is left to do.
 
     Parameters
     ----------
@@ -109,36 +85,53 @@ class BagWriter:
         first, last, count = self._span or (log_time, log_time, 0)
         self._span = min(first, log_time), max(last, log_time), count + 1
         published = log_time if publish_time is None else publish_time
-        self._writer.add_message(self._channels[key], log_time, data, published, sequence)
+        try:
+            self._writer.add_message(self._channels[key], log_time, data, published, sequence)
+        except OSError as error:
+            raise self._fault(error) from error
 
     def flush(self) -> None:
         """Put all messages so far on the disk, to survive the loss of the process and of power."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
-        os.fsync(self._stream.fileno())
+        with self._told():
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            os.fsync(self._raw.fileno())
 
-    def tell(self) -> int:
-        """Bytes of the open file so far, without the chunk in memory."""
-        return self._stream.tell()
+    @property
+    def size(self) -> int:
+        """Bytes of the open file on the disk, without what is in memory."""
+        return self._raw.tell()
+
+    @property
+    def first(self) -> int | None:
+        """The first log time (ns) of the open file; None without messages."""
+        return self._span[0] if self._span else None
 
     def split(self) -> None:
         """Complete the open file, tell of it in ``metadata.yaml``, and begin the next one."""
-        self._finish()
-        self._write_metadata()
+        self.close()
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
-        self._finish()
-        self._write_metadata()
+        with self._told():
+            self._finish()
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, self._metadata())
+
+    def abandon(self) -> None:
+        """Let go of the open file; what waits in memory is given up."""
+        with suppress(OSError):
+            self._raw.close()
 
     def _open(self) -> None:
-        self._stream: BinaryIO = self.file.open("xb")
-        self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
-        self._writer.start(profile=PROFILE, library=LIBRARY)
-        if self._notes:
-            self._writer.add_metadata(NOTES, self._notes)
-        self._channels, self._schemas, self._span = [], {}, None
-        self._register(self.topics)
+        with self._told():
+            self._raw = self.file.open("xb", buffering=0)
+            buffered = BufferedWriter(self._raw)
+            self._writer = Writer(buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
+            self._writer.start(profile=PROFILE, library=LIBRARY)
+            if self._notes:
+                self._writer.add_metadata(NOTES, self._notes)
+            self._channels, self._schemas, self._span = [], {}, None
+            self._register(self.topics)
 
     def _register(self, topics: list[Recorded]) -> None:
         """All new schemas, then the channels, in the open file."""
@@ -152,12 +145,9 @@ class BagWriter:
 
     def _finish(self) -> None:
         """Complete the open file, down to the disk."""
-        try:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.flush()
-            os.fsync(self._stream.fileno())
-        finally:
-            self._stream.close()
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self.flush()
+        self._raw.close()
         first, last, count = self._span or (0, 0, 0)
         self._files.append(
             bagmeta.FileInformation(
@@ -168,8 +158,18 @@ class BagWriter:
             )
         )
 
-    def _write_metadata(self) -> None:
-        bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, self._metadata())
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._fault(error) from error
+
+    def _fault(self, error: OSError) -> BagError:
+        return BagError(
+            f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
+            f"`boom_twin recover {self.directory} --out DIR` saves what was written before."
+        )
 
     def _metadata(self) -> bagmeta.BagMetadata:
         filled = [file for file in self._files if file.message_count]
@@ -204,20 +204,3 @@ class BagWriter:
 def file_name(number: int) -> str:
     """Of the .mcap file with that number, from 0."""
     return f"session_{number}.mcap"
-
-
-def claim(directory: Path) -> None:
-    """Make the directory; refuse one that holds anything.
-
-    Raises
-    ------
-    BagError
-        It is not empty, or cannot be made.
-    """
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        taken = sorted(entry.name for entry in directory.iterdir())
-    except OSError as error:
-        raise BagError(f"{directory}: cannot be made ({error.strerror}). Choose another place.") from error
-    if taken:
-        raise BagError(f"{directory}: holds {taken[0]} already, and nothing is overwritten. Choose a new directory.")

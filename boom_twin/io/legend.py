@@ -14,9 +14,9 @@ from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
 from ..errors import BagError
 from .bagmeta import BagMetadata, offered_qos
-from .bagwriter import Recorded
 from .content import LARGEST, definition_of, parts
 from .offered import profiles
+from .recorded import Recorded
 from .salvage import Piece, walk
 from .survey import NOTES, PROFILE, checksum_of, summary_start
 

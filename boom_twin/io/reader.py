@@ -79,6 +79,8 @@ def scan(path: Path) -> Session:
     metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
+    if metadata is not None:
+        _check_listed(path, named)
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
@@ -141,6 +143,15 @@ def mcap_files(path: Path) -> list[Path]:
         there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
         raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
     return files
+
+
+def _check_listed(path: Path, named: list[Path]) -> None:
+    """Refuse to pass over a file that a recorder left behind when it was killed."""
+    if unlisted := sorted(file.name for file in path.glob("*.mcap") if file not in named):
+        raise BagError(
+            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
+            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
+        )
 
 
 def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:

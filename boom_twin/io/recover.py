@@ -12,12 +12,13 @@ from mcap.opcode import Opcode
 
 from ..errors import BagError
 from .bagmeta import FILE_NAME, BagMetadata, read_metadata
-from .bagwriter import BagWriter, Recorded, file_name
+from .bagwriter import BagWriter, file_name
 from .blocks import heads
 from .content import message_of, parts
 from .damage import blame
 from .legend import Legend, legend_of
 from .reader import mcap_files, scan
+from .recorded import Recorded
 from .salvage import Fault, walk
 
 MOST_FAULTS = 1000
@@ -88,8 +89,10 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
                 bag.split()
             with blame(file):
                 _copy(file, legend, bag, keys, outcome, metadata, unverified)
-    finally:
         bag.close()
+    except BaseException:
+        bag.abandon()
+        raise
     if not bag.counts.total():
         _remove(out)
         raise BagError(f"{path}: nothing can be saved: {_first(outcome)}. {out} was not kept.")

@@ -11,7 +11,8 @@ from typing import Any, Self
 from mcap.writer import CompressionType
 
 from . import bagmeta
-from .bagwriter import BagWriter, Recorded, file_name
+from .bagwriter import BagWriter, file_name
+from .recorded import Recorded
 from .topics import Topic
 from .typestore import jazzy
 
@@ -70,10 +71,6 @@ class SessionWriter:
         """Append a message that is CDR already."""
         self._counts[key] += 1
         self._bag.write(self._keys[key], stamp_ns, data, sequence=self._counts[key])
-
-    def flush(self) -> None:
-        """Put all messages so far on the disk, to survive the loss of the process and of power."""
-        self._bag.flush()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
