@@ -22,7 +22,7 @@ from ..errors import BoomTwinError
 COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("check", "validate a scene and tell what its model consists of"),
     "info": ("info", "what a recorded session holds and what it lacks"),
-    "play": ("play", "publish the inputs of a recorded session over ROS 2"),
+    "play": ("play", "publish a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
     "recover": ("recover", "save what is whole of a damaged session"),
     "scene": ("scene", "print the default scene file"),

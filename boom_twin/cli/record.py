@@ -9,6 +9,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .. import __version__
 from ..errors import BoomTwinError
 from ..io.topics import Topic, load_topics
 from ..ros.require import require_rclpy
@@ -47,7 +48,7 @@ def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
     require_rclpy()
     from ..io.bagwriter import BagWriter
-    from ..io.sheet import write_sheet
+    from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
     from ..ros.context import on_stop_signal, ros
     from ..ros.recorder import record
@@ -57,7 +58,8 @@ def run(args: Namespace) -> int:
     wanted, scene, parameters = _wanted(args), _scene_text(args.scene), _parameters_text(args.params)
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
-    write_sheet(args.out, scene, parameters, {each.name: each.type for each in wanted}, args.note, args.origin)
+    types = {each.name: each.type for each in wanted}
+    Sheet(__version__, scene, parameters, types, args.note, args.origin).write(args.out)
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration

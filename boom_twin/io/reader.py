@@ -123,6 +123,11 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
         At once if a topic is missing, empty, or of another type, encoding or definition; while iterating if a checksum
         does not fit or a message cannot be decoded; at the end if the files did not hold what their statistics say.
     """
+    return ((name, time, message) for name, time, _, message in read_both(session, wanted))
+
+
+def read_both(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
+    """As `read`, with the encoded message before the decoded one, which is None for a type that Jazzy does not have."""
     asked: dict[str, str] = {}
     for name, type_name in wanted.items():
         asked[check_topic(session, name, type_name).name] = name
@@ -186,8 +191,9 @@ def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     return topic
 
 
-def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
     """The wanted messages of one file; all others are counted."""
+    known = jazzy().types
     channels = file.channels
     seen: Counter[int] = Counter()
     decode = jazzy().deserialize_cdr
@@ -197,10 +203,11 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
             seen[message.channel_id] += 1
             if (name := asked.get(channel.topic)) is None:
                 continue
+            kind = file.schemas[channel.schema_id].name
             try:
-                decoded = decode(message.data, file.schemas[channel.schema_id].name)
+                decoded = decode(message.data, kind) if kind in known else None
             except STUMBLES as error:
                 place = f"{file.path}: topic {channel.topic} at log time {message.log_time} ns"
                 raise BagError(f"{place}: {error} {RESCUE}") from error
-            yield name, message.log_time, decoded
+            yield name, message.log_time, message.data, decoded
         compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))
