@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .common import add_json, print_json
 
 if TYPE_CHECKING:
-    from ..io.recover import Outcome
+    from ..io.outcome import Outcome
 
 SHOWN = 20
 """Faults that are printed one by one."""

@@ -15,6 +15,7 @@ from ..errors import BagError
 from . import bagmeta
 from .claim import claim
 from .recorded import Recorded
+from .summary import file_information, metadata_of
 from .survey import NOTES, PROFILE
 
 CHUNK_SIZE = 64 * 1024
@@ -115,7 +116,8 @@ class BagWriter:
         """Complete the file, then write ``metadata.yaml``."""
         with self._told():
             self._finish()
-            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, self._metadata())
+            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
 
     def abandon(self) -> None:
         """Let go of the open file; what waits in memory is given up."""
@@ -149,14 +151,7 @@ class BagWriter:
         self.flush()
         self._raw.close()
         first, last, count = self._span or (0, 0, 0)
-        self._files.append(
-            bagmeta.FileInformation(
-                path=file_name(len(self._files)),
-                starting_time=bagmeta.Start(nanoseconds_since_epoch=first),
-                duration=bagmeta.Duration(nanoseconds=last - first),
-                message_count=count,
-            )
-        )
+        self._files.append(file_information(file_name(len(self._files)), first, last, count))
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -169,35 +164,6 @@ class BagWriter:
         return BagError(
             f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
             f"`boom_twin recover {self.directory} --out DIR` saves what was written before."
-        )
-
-    def _metadata(self) -> bagmeta.BagMetadata:
-        filled = [file for file in self._files if file.message_count]
-        first = min((file.starting_time.nanoseconds_since_epoch for file in filled), default=0)
-        last = max((file.starting_time.nanoseconds_since_epoch + file.duration.nanoseconds for file in filled), default=0)
-        return bagmeta.BagMetadata(
-            version=bagmeta.VERSION,
-            storage_identifier="mcap",
-            duration=bagmeta.Duration(nanoseconds=last - first),
-            starting_time=bagmeta.Start(nanoseconds_since_epoch=first),
-            message_count=self.counts.total(),
-            topics_with_message_count=[self._topic_count(key, topic) for key, topic in enumerate(self.topics)],
-            relative_file_paths=[file.path for file in self._files],
-            files=self._files,
-            custom_data=self._notes or None,
-            ros_distro=self._distro,
-        )
-
-    def _topic_count(self, key: int, topic: Recorded) -> bagmeta.TopicCount:
-        return bagmeta.TopicCount(
-            topic_metadata=bagmeta.TopicMetadata(
-                name=topic.topic,
-                type=topic.type,
-                serialization_format=topic.encoding,
-                offered_qos_profiles=topic.qos,
-                type_description_hash=topic.type_hash,
-            ),
-            message_count=self.counts[key],
         )
 
 

@@ -15,10 +15,11 @@ from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 from ..errors import BagError
 from .bagmeta import BagMetadata, offered_qos
 from .content import LARGEST, definition_of, parts
+from .ends import checksum_of, summary_start
 from .offered import profiles
 from .recorded import Recorded
 from .salvage import Piece, walk
-from .survey import NOTES, PROFILE, checksum_of, summary_start
+from .survey import NOTES, PROFILE
 
 
 @dataclass(slots=True)

@@ -19,6 +19,7 @@ from .bagmeta import FILE_NAME, BagMetadata, read_metadata
 from .blocks import messages
 from .damage import RESCUE, STUMBLES, blame, compare_counts
 from .definitions import check_encoding
+from .files import check_listed, mcap_files
 from .survey import McapFile, survey
 from .typestore import jazzy
 
@@ -80,7 +81,7 @@ def scan(path: Path) -> Session:
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
     if metadata is not None:
-        _check_listed(path, named)
+        check_listed(path, named)
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
@@ -135,28 +136,6 @@ def read_both(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str
         check_encoding(file, asked)
     streams = [_decoded(file, asked) for file in session.files]
     return heapq.merge(*streams, key=itemgetter(1))
-
-
-def mcap_files(path: Path) -> list[Path]:
-    """The files of a session without metadata."""
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
-    files = sorted(path.glob("*.mcap"))
-    if not files:
-        there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
-        raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
-    return files
-
-
-def _check_listed(path: Path, named: list[Path]) -> None:
-    """Refuse to pass over a file that a recorder left behind when it was killed."""
-    if unlisted := sorted(file.name for file in path.glob("*.mcap") if file not in named):
-        raise BagError(
-            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
-            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
-        )
 
 
 def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:

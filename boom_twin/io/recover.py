@@ -2,60 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap.opcode import Opcode
 
 from ..errors import BagError
-from .bagmeta import FILE_NAME, BagMetadata, read_metadata
+from .bagmeta import FILE_NAME, BagMetadata
 from .bagwriter import BagWriter, file_name
 from .blocks import heads
 from .content import message_of, parts
 from .damage import blame
+from .files import sources
 from .legend import Legend, legend_of
-from .reader import mcap_files, scan
+from .outcome import Outcome
+from .reader import scan
 from .recorded import Recorded
 from .salvage import Fault, walk
-
-MOST_FAULTS = 1000
-"""Faults that are told one by one."""
-
-
-@dataclass(slots=True)
-class Outcome:
-    """What a rescue brought.
-
-    Attributes
-    ----------
-    saved : Counter
-        Messages by topic, counted in the new session after it was written.
-    unvouched : Counter
-        Those of them that were under no checksum.
-    lost : dict of str to int, or None
-        By topic; None where no sound count of the source says how many there were.
-    nameless : int
-        Sound messages that were left out, because the definition of their topic is lost.
-    faults : list of (Path, Fault)
-        The first `MOST_FAULTS`.
-    fault_count : int
-    """
-
-    saved: Counter[str] = field(default_factory=Counter)
-    unvouched: Counter[str] = field(default_factory=Counter)
-    lost: dict[str, int] | None = None
-    nameless: int = 0
-    faults: list[tuple[Path, Fault]] = field(default_factory=list)
-    fault_count: int = 0
-
-    def note(self, path: Path, fault: Fault) -> None:
-        """Count a fault; the first ones are kept."""
-        self.fault_count += 1
-        if len(self.faults) < MOST_FAULTS:
-            self.faults.append((path, fault))
 
 
 def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
@@ -99,25 +63,6 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
     outcome.saved = _count(out)
     outcome.lost = _lost(outcome.saved, legends, metadata, files)
     return outcome
-
-
-def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
-    """The .mcap files of a session: those that its metadata names, then all others by number; and the metadata."""
-    metadata: BagMetadata | None = None
-    try:
-        metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
-    except BagError:
-        if path.is_file():
-            raise
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else []
-    there = [file for file in named if file.is_file()]
-    others = [] if there and not any(path.glob("*.mcap")) else mcap_files(path)
-    return there + sorted(set(others) - set(there), key=_by_number), metadata
-
-
-def _by_number(path: Path) -> list[tuple[int, str]]:
-    """Sorts ``session_10`` behind ``session_9``."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _check_place(path: Path, out: Path) -> None:

@@ -17,7 +17,7 @@ from mcap.writer import MCAP0_MAGIC
 from .chunkhead import ChunkHead, head_at, loose_start, sound_content
 from .content import LARGEST, MESSAGE_HEAD, PREFIX
 from .damage import STUMBLES
-from .survey import BLOCK
+from .ends import BLOCK
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""

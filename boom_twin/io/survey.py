@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
-from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
 from mcap.summary import Summary
-from mcap.writer import MCAP0_MAGIC
 
 from ..errors import BagError
 from .blocks import chunk_at, records
 from .content import LARGEST
-from .damage import RESCUE, blame, compare_counts
+from .damage import blame, compare_counts
+from .ends import check_ends
 
 PROFILE = "ros2"
 NOTES = "boom_twin"
 """Name of the metadata record that holds the notes on a session."""
-
-BLOCK = 2**20
-"""Bytes that are read at a time where a file may be of any size."""
-
-_FOOTER = struct.Struct("<BQQQI8s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +69,7 @@ def survey(path: Path) -> McapFile:
         If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
     """
     with blame(path), path.open("rb") as file:
-        _check_ends(path, file)
+        check_ends(path, file)
         file.seek(0)
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))
         if (profile := reader.get_header().profile) != PROFILE:
@@ -98,45 +89,6 @@ def survey(path: Path) -> McapFile:
             checked=chunk_at(file, summary.chunk_indexes[0]).uncompressed_crc != 0,
             notes=_notes(reader.iter_metadata()),
         )
-
-
-def _check_ends(path: Path, file: BinaryIO) -> None:
-    """Magic at both ends, footer, checksum of the summary."""
-    size = path.stat().st_size
-    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-        raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
-    if (ends := _footer(file, size)) is None:
-        raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
-    start, is_sound = ends
-    if not is_sound:
-        raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
-
-
-def summary_start(path: Path) -> int | None:
-    """Where the summary of a file begins, if it has a whole one that no checksum denies."""
-    with path.open("rb") as file:
-        ends = _footer(file, path.stat().st_size)
-    return ends[0] if ends and ends[1] else None
-
-
-def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
-    """Start of the summary, and whether its checksum fits or is absent; None without a whole footer."""
-    file.seek(max(0, size - _FOOTER.size))
-    tail = file.read()
-    if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
-        return None
-    _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
-    start = start or size - _FOOTER.size
-    return start, checksum in (0, checksum_of(file, start, size - len(MCAP0_MAGIC) - 4))
-
-
-def checksum_of(file: BinaryIO, start: int, end: int) -> int:
-    """CRC-32 of the bytes from `start` up to `end`, a block at a time."""
-    total = 0
-    file.seek(start)
-    while (left := end - file.tell()) > 0 and (block := file.read(min(left, BLOCK))):
-        total = zlib.crc32(block, total)
-    return total
 
 
 def _is_complete(summary: Summary, told: Statistics) -> bool:

@@ -14,15 +14,12 @@ from rclpy.publisher import Publisher
 from ..errors import BagError
 from ..io.publishable import publishable
 from ..io.reader import Session, read_both
-from ..io.typestore import jazzy
+from .clock import CLOCK, CLOCK_TYPE, clock_message
 from .definition import installed_class
 from .qos import qos_profile
 from .types import message_class
 
 NAME = "boom_twin_player"
-CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
-CLOCK_RATE = 40.0
-"""Messages per second on ``/clock``, as ``ros2 bag play --clock`` has it."""
 LOOK = 0.05
 """Time (s) between looks for listeners."""
 SETTLE = 0.5
@@ -163,7 +160,7 @@ class Player:
         while is_held():
             was_held = True
             if self._clock is not None:
-                self._clock.publish(_clock(stamp))
+                self._clock.publish(clock_message(stamp))
             time.sleep(LOOK if self._clock_rate is None else min(LOOK, 1.0 / self._clock_rate))
         return time.monotonic() - began if was_held else 0.0
 
@@ -190,14 +187,6 @@ class Player:
             if not first <= stamp < end:
                 continue
             while period and tick <= stamp:
-                yield tick, CLOCK, _clock(tick)
+                yield tick, CLOCK, clock_message(tick)
                 tick += period
             yield stamp, name, data
-
-
-def _clock(stamp: int) -> bytes:
-    """A message for ``/clock`` in CDR."""
-    types = jazzy().types
-    time_class, clock_class = types["builtin_interfaces/msg/Time"], types[CLOCK_TYPE]
-    now = time_class(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
-    return bytes(jazzy().serialize_cdr(clock_class(clock=now), CLOCK_TYPE))

@@ -23,8 +23,9 @@ from rosbags.highlevel import AnyReader
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
 from boom_twin.io import content
+from boom_twin.io.outcome import Outcome
 from boom_twin.io.reader import scan
-from boom_twin.io.recover import Outcome, recover
+from boom_twin.io.recover import recover
 from boom_twin.io.writer import FILE_NAME
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
