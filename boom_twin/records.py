@@ -54,6 +54,10 @@ class Prediction:
         rad; m (as estimated); N (positive in tension).
     shape : ndarray, shape (k, 2), or None
         Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 50 ms.
+    undeflected : ndarray, shape (k, 2), or None
+        The same points of rigid sections on incompressible cylinders at the same strokes, m; when `shape` is there.
+    pins : ndarray, shape (n, 4), or None
+        Barrel pin (x, y) and rod pin (x, y) of every cylinder of the deflected boom, m; when `shape` is there.
     """
 
     stamp: int
@@ -68,6 +72,8 @@ class Prediction:
     strokes: Array
     cylinder_forces: Array
     shape: Array | None
+    undeflected: Array | None = None
+    pins: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

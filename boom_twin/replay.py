@@ -94,11 +94,11 @@ def replay(
     BagError
         The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written.
     """
-    session, out = scan(Path(bag)), Path(out)
+    session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
     wanted = _wanted(session)
     _clear(out)
     recording = Recording()
-    with _unhurried_collector(), _ends(session, wanted, len(scene.joints), out / "bag") as (ahead, behind):
+    with _unhurried_collector(), _ends(session, wanted, scene, settings, out / "bag") as (ahead, behind):
         twin = _ready_twin(scene, settings)
         ahead.wait_ready()
         behind.wait_ready()
@@ -151,10 +151,12 @@ def _clear(out: Path) -> None:
 
 
 @contextmanager
-def _ends(session: Session, wanted: dict[str, Stream], joints: int, bag: Path) -> Iterator[tuple[Ahead, Behind]]:
+def _ends(
+    session: Session, wanted: dict[str, Stream], scene: Scene, settings: Settings, bag: Path
+) -> Iterator[tuple[Ahead, Behind]]:
     """The processes that read and write, as they start."""
-    ahead = Ahead(session.path, wanted, joints)
-    behind = Behind(bag, session.notes)
+    ahead = Ahead(session.path, wanted, len(scene.joints))
+    behind = Behind(bag, session.notes, scene, settings)
     try:
         yield ahead, behind
     finally:
@@ -162,7 +164,7 @@ def _ends(session: Session, wanted: dict[str, Stream], joints: int, bag: Path) -
         behind.stop()
 
 
-def _ready_twin(scene: Scene, settings: Settings | None) -> Twin:
+def _ready_twin(scene: Scene, settings: Settings) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from .twin import Twin
 

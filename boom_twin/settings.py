@@ -36,6 +36,8 @@ class Settings(BaseModel):
     gap: Positive = Field(default=0.1, description="longer pauses between strokes are flagged, s")
     restart_gap: Positive = Field(default=5.0, description="longer pauses start again from rest, s")
     jump_back: Positive = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
+    exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
+    force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @property
     def stroke_variance(self) -> float:

@@ -18,6 +18,7 @@ from .records import Array, Prediction, Report, Residuals, Sample, Stream
 from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
+from .undeflected import Undeflected
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -81,6 +82,7 @@ class Twin:
         )
         lengths = np.array([section.length for section in scene.sections])
         self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
+        self._undeflected = Undeflected(scene, self.plan)
         self._track = new_track(self.plan, lengths)
         self._row = np.zeros(4 * self.plan.joints + 11)
         self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
@@ -164,6 +166,7 @@ class Twin:
     def _prediction(self, run: _Run, stamp: int) -> Prediction:
         n, row = self.plan.joints, self._row.copy()
         tip = row[2 * n : 2 * n + 9]
+        shape, undeflected, pins = self._lines(run, stamp)
         return Prediction(
             stamp=stamp,
             tip_position=tip[0:2],
@@ -176,13 +179,21 @@ class Twin:
             joints=row[:n],
             strokes=row[2 * n + 9 : 3 * n + 9],
             cylinder_forces=row[n : 2 * n],
-            shape=self._shape(run, stamp),
+            shape=shape,
+            undeflected=undeflected,
+            pins=pins,
         )
 
-    def _shape(self, run: _Run, stamp: int) -> Array | None:
-        """The centre line at the first stamp of its slot of time: a rule of the stamps only, indifferent to jitter."""
+    def _lines(self, run: _Run, stamp: int) -> tuple[Array, Array, Array] | tuple[None, None, None]:
+        """Centre line, the undeflected one, and cylinder pins, at the first stamp of its slot of time.
+
+        A rule of the stamps only, indifferent to jitter.
+        """
         before, run.slot = run.slot, stamp // SHAPE_PERIOD
-        return outline(self.plan, self._live, self._work.position) if run.slot != before else None
+        if run.slot == before:
+            return None, None, None
+        line, straight = outline(self.plan, self._live, self._work.position), self._undeflected.at(self._track.angles)
+        return line, straight, self._live.pins.copy()
 
     def _remember(self, run: _Run, prediction: Prediction) -> None:
         """Keep what residuals need."""

@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "record": ("record", "record the session topics from ROS 2"),
     "recover": ("recover", "save what is whole of a damaged session"),
     "scene": ("scene", "print the default scene file"),
+    "urdf": ("urdf", "print a scene as a URDF, for robot_state_publisher"),
     "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),
     "simulate": ("simulate", "the boom's answer to a stroke history"),
     "replay": ("replay", "a recorded session through the twin"),

@@ -11,6 +11,8 @@ import numpy as np
 
 from ..errors import BoomTwinError
 from ..records import Array, Prediction, Report, Residuals, Stream
+from ..scene.parts import Scene
+from ..settings import Settings
 from .factory import RosbagsTypes
 from .outlet import Outlet
 from .pipe import Pipe, say_ready
@@ -18,7 +20,7 @@ from .topics import Output, Topic, load_topics
 from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
-Packed = tuple[int, bytes | None, bytes | None, list[tuple[str, int, tuple[str, ...], bytes, bytes]]]
+Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, list[tuple[str, int, tuple[str, ...], bytes, bytes]]]
 
 
 def pack(report: Report) -> Packed:
@@ -30,21 +32,24 @@ def pack(report: Report) -> Packed:
     turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
     tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
     numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
-    return report.stamp, numbers, None if p.shape is None else p.shape.tobytes(), residuals
+    if p.shape is None or p.undeflected is None or p.pins is None:
+        return report.stamp, numbers, None, residuals
+    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals
 
 
 def unpack(packed: Packed) -> Report:
     """What `pack` was given, less what it leaves out."""
-    stamp, numbers, line, rows = packed
+    stamp, numbers, lines, rows = packed
     residuals = tuple(
         Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
         for stream, at, names, values, sigmas in rows
     )
-    return Report(stamp, True, None if numbers is None else _prediction(stamp, np.frombuffer(numbers), line), residuals)
+    return Report(stamp, True, None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines), residuals)
 
 
-def _prediction(stamp: int, row: Array, line: bytes | None) -> Prediction:
+def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:
     n = (len(row) - 11) // 3
+    line, undeflected, pins = lines or (None, None, None)
     turn, velocity, acceleration = (float(value) for value in row[8:11])
     joints, strokes, forces = (row[11 + i * n : 11 + (i + 1) * n] for i in range(3))
     return Prediction(
@@ -59,8 +64,14 @@ def _prediction(stamp: int, row: Array, line: bytes | None) -> Prediction:
         joints=joints,
         strokes=strokes,
         cylinder_forces=forces,
-        shape=None if line is None else np.frombuffer(line).reshape(-1, 2),
+        shape=_table(line, 2),
+        undeflected=_table(undeflected, 2),
+        pins=_table(pins, 4),
     )
+
+
+def _table(data: bytes | None, columns: int) -> Array | None:
+    return None if data is None else np.frombuffer(data).reshape(-1, columns)
 
 
 class Behind:
@@ -72,6 +83,10 @@ class Behind:
         Of the bag; must be new or empty.
     notes : mapping of str to str
         Kept in the bag.
+    scene : Scene
+        What the reports are about.
+    settings : Settings
+        How it is drawn.
 
     Raises
     ------
@@ -79,10 +94,10 @@ class Behind:
         From any method: the bag could not be written; says why.
     """
 
-    def __init__(self, directory: Path, notes: Mapping[str, str]) -> None:
+    def __init__(self, directory: Path, notes: Mapping[str, str], scene: Scene, settings: Settings) -> None:
         self._batch: list[Packed] = []
         self._pipe = Pipe(__name__, str(directory))
-        self._pipe.send(dict(notes))
+        self._pipe.send((dict(notes), scene, settings))
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
@@ -109,10 +124,12 @@ class Behind:
 
 def main(directory: Path) -> int:
     """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
-    stream, outlet = sys.stdin.buffer, Outlet(RosbagsTypes())
+    stream = sys.stdin.buffer
     outputs: dict[str, Topic] = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
     try:
-        with SessionWriter(directory, outputs, pickle.load(stream)) as writer:
+        notes, scene, settings = pickle.load(stream)
+        outlet = Outlet(RosbagsTypes(), scene, settings)
+        with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             while True:
                 try:

@@ -5,18 +5,19 @@ The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a posi
 
 from __future__ import annotations
 
-from functools import lru_cache
 from math import nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..records import Array, Prediction, Report, Residuals
-from .factory import Types
+from ..records import Prediction, Report, Residuals
+from ..scene.parts import Scene
+from ..scene.passive import PassiveJoints
+from ..settings import Settings
+from .markers import ShapeMarkers
+from .places import fill_header, fill_xz
 from .topics import TYPES, Output
 
-FRAME = "base_link"
-LINE_WIDTH = 0.12
-LINE_COLOUR = (0.90, 0.45, 0.10, 1.0)
-_LINE_STRIP, _ADD = 4, 0
+if TYPE_CHECKING:
+    from .factory import Types
 
 Messages = list[tuple[Output, Any]]
 
@@ -30,10 +31,17 @@ class Outlet:
     ----------
     types : Types
         Makes the empty messages.
+    scene : Scene
+        What the reports are about.
+    settings : Settings
+        How ``shape`` is drawn.
     """
 
-    def __init__(self, types: Types) -> None:
-        self._types = types
+    def __init__(self, types: Types, scene: Scene, settings: Settings) -> None:
+        self._types, count = types, len(scene.joints)
+        self._passive = PassiveJoints(scene)
+        self._names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
+        self._markers = ShapeMarkers(types, settings.exaggeration, settings.force_scale)
         self._made: dict[tuple[Output, int], Any] = {}
 
     def fill(self, report: Report) -> Messages:
@@ -56,7 +64,7 @@ class Outlet:
         for place, residuals in enumerate(report.residuals):
             messages.append((Output.RESIDUALS, self._residuals(residuals, place)))
         if prediction is not None and prediction.shape is not None:
-            messages.append((Output.SHAPE, self._shape(prediction.stamp, prediction.shape)))
+            messages.append((Output.SHAPE, self._markers.fill(prediction)))
         return messages
 
     def _message(self, key: Output, stamp: int, place: int = 0) -> Any:
@@ -69,26 +77,29 @@ class Outlet:
 
     def _displacement(self, prediction: Prediction) -> Any:
         msg = self._message(Output.TIP_DISPLACEMENT, prediction.stamp)
-        _fill_xz(msg.vector, prediction.tip_displacement)
+        fill_xz(msg.vector, prediction.tip_displacement)
         return msg
 
     def _position(self, prediction: Prediction) -> Any:
         msg = self._message(Output.TIP_POSITION, prediction.stamp)
-        _fill_xz(msg.point, prediction.tip_position)
+        fill_xz(msg.point, prediction.tip_position)
         return msg
 
     def _acceleration(self, prediction: Prediction) -> Any:
         msg = self._message(Output.TIP_ACCELERATION, prediction.stamp)
-        _fill_xz(msg.accel.linear, prediction.tip_acceleration)
+        fill_xz(msg.accel.linear, prediction.tip_acceleration)
         msg.accel.angular.y = -float(prediction.tip_angular_acceleration)
         return msg
 
     def _joint_states(self, prediction: Prediction) -> Any:
-        """Joints first, cylinders after them; a joint has no effort of its own."""
+        """Joints first, cylinders after them, passive joints last where there is a shape; only cylinders have an effort."""
         msg, count = self._message(Output.JOINT_STATES, prediction.stamp), len(prediction.joints)
-        msg.name = list(_joint_state_names(count))
-        msg.position = self._types.doubles(prediction.joints.tolist() + prediction.strokes.tolist())
-        msg.effort = self._types.doubles([nan] * count + prediction.cylinder_forces.tolist())
+        names, passive = self._names, []
+        if prediction.shape is not None:
+            names, passive = [*self._names, *self._passive.names], self._passive.positions(prediction.joints)
+        msg.name = names
+        msg.position = self._types.doubles(prediction.joints.tolist() + prediction.strokes.tolist() + passive)
+        msg.effort = self._types.doubles([nan] * count + prediction.cylinder_forces.tolist() + [nan] * len(passive))
         return msg
 
     def _residuals(self, residuals: Residuals, place: int) -> Any:
@@ -99,35 +110,3 @@ class Outlet:
         msg.velocity = self._types.doubles(residuals.normalised)
         msg.effort = self._types.doubles(residuals.sigmas)
         return msg
-
-    def _shape(self, stamp: int, line: Array) -> Any:
-        msg = self._types.make(TYPES[Output.SHAPE])
-        marker = self._types.make("visualization_msgs/msg/Marker")
-        fill_header(marker.header, stamp)
-        marker.ns, marker.type, marker.action = "boom", _LINE_STRIP, _ADD
-        marker.pose.orientation.w, marker.scale.x = 1.0, LINE_WIDTH
-        marker.color.r, marker.color.g, marker.color.b, marker.color.a = LINE_COLOUR
-        marker.points = [self._point(place) for place in line]
-        msg.markers = [marker]
-        return msg
-
-    def _point(self, place: Array) -> Any:
-        point = self._types.make("geometry_msgs/msg/Point")
-        _fill_xz(point, place)
-        return point
-
-
-@lru_cache(maxsize=8)
-def _joint_state_names(count: int) -> tuple[str, ...]:
-    return tuple(f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1))
-
-
-def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
-    """Put a stamp (nanoseconds) and a frame into a ``std_msgs/Header``."""
-    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-    header.frame_id = frame
-
-
-def _fill_xz(target: Any, values: Array) -> None:
-    """Model x to x, model y to z; y is 0."""
-    target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..records import Array, Stream
 from .factory import RosbagsTypes
-from .outlet import FRAME, fill_header
+from .places import FRAME, fill_header
 from .topics import TYPES, load_topics
 from .writer import SessionWriter
 

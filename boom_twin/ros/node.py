@@ -42,7 +42,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
         self._topics = load_topics()
-        self._outlet = Outlet(RclpyTypes())
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
@@ -122,11 +121,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         scene, oddities = examine(path)
         for oddity in oddities:
             self.get_logger().warning(str(oddity))
-        twin = Twin(scene, settings_of(self))
+        settings = settings_of(self)
+        twin = Twin(scene, settings)
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, Intake(twin.plan.joints)
+        self._outlet = Outlet(RclpyTypes(), scene, settings)
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
 

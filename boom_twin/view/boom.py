@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.posture import set_undeformed
-from ..analysis.statics import Equilibrium, outline
-from ..chain.place import place
+from ..analysis.statics import Equilibrium
 from ..plan.compile import compile_scene
 from ..records import Array
+from ..scene.depth import section_depth
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
+from ..undeflected import Undeflected
 from .drawing import draw_base, draw_cylinder, draw_link, draw_pin, draw_section
 from .skeleton import Skeleton, skeleton
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 EXAGGERATION = 10.0
 TIMES = "\N{MULTIPLICATION SIGN}"
-DEEP = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
 
 
 def boom_picture(
@@ -66,18 +65,14 @@ def boom_picture(
 
 def undeformed_outline(scene: Scene, angles: Array) -> Array:
     """Points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    set_undeformed(plan, state, angles)
-    place(plan.tables, state, work)
-    return outline(plan, state, work.position)
+    return Undeflected(scene, compile_scene(scene)).at(angles)
 
 
 def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
     """Base, sections, cylinders, links and pins of an undeformed boom."""
     size = 0.035 * float(sum(section.length for section in scene.sections))
     for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), depth(scene, i), alpha)
+        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
     for joint, part in zip(bones.joints, scene.joints, strict=True):
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
         for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
@@ -99,14 +94,6 @@ def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Ar
     return [(stops[k], stops[k + 1], k == 1 and scene.is_flexible(i)) for k in range(3)]
 
 
-def depth(scene: Scene, i: int) -> float:
-    """Depth (m) to draw section `i` (0-based) with: that of a box with its A and I, else a share of its length."""
-    section = scene.sections[i]
-    if section.A is None or section.I is None:
-        return 0.05 * section.length
-    return DEEP * float(np.sqrt(section.I / section.A))
-
-
 def _deflected(axes: Axes, straight: Array, equilibrium: Equilibrium) -> None:
     bent = equilibrium.outline
     large = straight + EXAGGERATION * (bent - straight)
@@ -120,7 +107,7 @@ def _deflected(axes: Axes, straight: Array, equilibrium: Equilibrium) -> None:
 def _lengths(axes: Axes, scene: Scene, bones: Skeleton) -> None:
     """Number and length of every section, beside its middle."""
     for i, section in enumerate(scene.sections):
-        lift = depth(scene, i) + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
+        lift = section_depth(scene, i) + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
         where = bones.point(i, 0.5 * section.length, lift)
         degrees = float(np.degrees(bones.headings[i]))
         axes.text(
@@ -136,7 +123,7 @@ def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
     draw_boom(axes, scene, bones)
     pins = [pin for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q) if pin is not None]
     low, high = np.min(pins, axis=0), np.max(pins, axis=0)
-    middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + depth(scene, i)
+    middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + section_depth(scene, i)
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - 0.8 * reach, middle[1] + 0.8 * reach)

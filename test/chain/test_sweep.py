@@ -35,8 +35,6 @@ def boom_beside_equilibrium(scene, posture, seed=0, size=2e-3):
     return plan, state, work, still
 
 
-
-
 @pytest.mark.parametrize("name, seed", [("default", None), ("boom 4", 4), ("boom 8", 8)])
 def test_plain_product_solves_the_same_step(name, seed):
     """A long step, where the product still has digits: the same increments as the Riccati form; a short one says it has not."""

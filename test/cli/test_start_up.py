@@ -31,12 +31,12 @@ def imported_by(*arguments: str) -> tuple[int, set[str]]:
     return code, set(SLOW) & set(modules)
 
 
-@pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["--help"], ["statics", "--help"]])
+@pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["urdf"], ["--help"], ["statics", "--help"]])
 def test_what_does_not_step_needs_no_compiler(arguments: list[str]) -> None:
     assert imported_by(*arguments) == (0, set())
 
 
-@pytest.mark.parametrize("command", ["check", "statics", "simulate", "replay", "rig", "info", "recover", "play", "record"])
+@pytest.mark.parametrize("command", ["check", "statics", "simulate", "replay", "rig", "info", "recover", "play", "record", "urdf"])
 def test_usage_errors_are_told_at_once(command: str) -> None:
     code, slow = imported_by(command, "--no-such-option")
     assert code == 2 and slow <= {"rosbags"}

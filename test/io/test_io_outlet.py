@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.factory import RosbagsTypes, Types
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.topics import TYPES, Output
 from boom_twin.io.typestore import jazzy
 from boom_twin.records import Prediction, Report, Residuals, Stream
+from boom_twin.scene import load_scene
+from boom_twin.settings import Settings
 
 STAMP = 1_700_000_000_123_456_789
 
@@ -35,6 +37,8 @@ def prediction(stamp: int = STAMP) -> Prediction:
         strokes=np.array([0.31, 0.22, 0.13]),
         cylinder_forces=np.array([-9e4, 8e3, 7e2]),
         shape=np.array([[0.0, 0.0], [4.0, 1.0], [12.5, 3.25]]),
+        undeflected=np.array([[0.0, 0.0], [4.0, 1.0], [12.49, 3.37]]),
+        pins=np.array([[0.5, -1.25, 0.6, -0.1], [3.0, 1.1, 4.0, 1.2], [6.0, 2.0, 7.0, 2.5]]),
     )
 
 
@@ -49,9 +53,16 @@ def report(stamp: int = STAMP) -> Report:
     return Report(stamp=stamp, accepted=True, prediction=prediction(stamp), residuals=(residuals,))
 
 
+def outlet(types: Types) -> Outlet:
+    """One for the first three sections of the default boom."""
+    scene = load_scene()
+    three = scene.model_copy(update={"sections": scene.sections[:3], "joints": scene.joints[:3], "postures": {}})
+    return Outlet(types, three, Settings())
+
+
 @pytest.fixture(scope="module")
 def filled() -> dict[Output, Any]:
-    return dict(Outlet(RosbagsTypes()).fill(report()))
+    return dict(outlet(RosbagsTypes()).fill(report()))
 
 
 def test_displacement(filled: dict[Output, Any]) -> None:
@@ -72,17 +83,28 @@ def test_acceleration_turns_about_minus_y(filled: dict[Output, Any]) -> None:
 
 def test_angular_sign_fits_the_axes() -> None:
     """A turn that speeds up anticlockwise in the model lifts a point ahead: omega' x r must point up in base_link."""
-    accel = dict(Outlet(RosbagsTypes()).fill(report()))[Output.TIP_ACCELERATION].accel
+    accel = dict(outlet(RosbagsTypes()).fill(report()))[Output.TIP_ACCELERATION].accel
     lift = np.cross([accel.angular.x, accel.angular.y, accel.angular.z], [1.0, 0.0, 0.0])
     np.testing.assert_allclose(lift, [0.0, 0.0, 0.7])
 
 
+SWIVELS = ["cylinder_1_swivel", *(f"{name}_{i}_swivel" for i in (2, 3) for name in ("cylinder", "link_l", "link_r"))]
+
+
 def test_joint_states(filled: dict[Output, Any]) -> None:
     msg = filled[Output.JOINT_STATES]
-    assert msg.name == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3"]
-    assert msg.position.tolist() == [1.0, -0.5, -0.25, 0.31, 0.22, 0.13]
+    assert msg.name == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3", *SWIVELS]
+    assert msg.position.tolist()[:6] == [1.0, -0.5, -0.25, 0.31, 0.22, 0.13]
+    assert np.all(np.abs(msg.position[6:]) <= np.pi)
     assert len(msg.velocity) == 0
-    np.testing.assert_array_equal(msg.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2])
+    np.testing.assert_array_equal(msg.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2, *[np.nan] * len(SWIVELS)])
+
+
+def test_passive_joints_come_with_a_shape_only() -> None:
+    """Both lengths in turn, from one outlet."""
+    own, bare = outlet(RosbagsTypes()), replace(report(), prediction=replace(prediction(), shape=None))
+    counts = [len(dict(own.fill(each))[Output.JOINT_STATES].name) for each in (report(), bare, report())]
+    assert counts == [13, 6, 13]
 
 
 def test_residuals_are_named(filled: dict[Output, Any]) -> None:
@@ -93,34 +115,24 @@ def test_residuals_are_named(filled: dict[Output, Any]) -> None:
     assert msg.effort.tolist() == [1e-4, 2e-4]
 
 
-def test_shape_is_one_line(filled: dict[Output, Any]) -> None:
-    (marker,) = filled[Output.SHAPE].markers
-    assert (marker.type, marker.action, marker.pose.orientation.w) == (marker.LINE_STRIP, marker.ADD, 1.0)
-    assert [(point.x, point.y, point.z) for point in marker.points] == [
-        (0.0, 0.0, 0.0),
-        (4.0, 0.0, 1.0),
-        (12.5, 0.0, 3.25),
-    ]
-    assert marker.scale.x > 0 and marker.color.a == 1.0
-
-
 def test_every_message_has_the_stamp_of_its_cause(filled: dict[Output, Any]) -> None:
-    (marker,) = filled.pop(Output.SHAPE).markers
-    stamps = {key: stamp_of(msg) for key, msg in filled.items()} | {Output.SHAPE: stamp_of(marker)}
+    markers = filled[Output.SHAPE].markers
+    stamps = {key: stamp_of(msg) for key, msg in filled.items() if key is not Output.SHAPE}
     assert stamps.pop(Output.RESIDUALS) == STAMP - 1_000_000
-    assert len(stamps) == 5 and set(stamps.values()) == {STAMP}
-    assert {msg.header.frame_id for msg in [*filled.values(), marker]} == {"base_link"}
+    assert len(stamps) == 4 and {*stamps.values(), *map(stamp_of, markers)} == {STAMP}
+    headers = [msg.header for key, msg in filled.items() if key is not Output.SHAPE]
+    assert {header.frame_id for header in [*headers, *(marker.header for marker in markers)]} == {"base_link"}
 
 
 def test_without_prediction_only_residuals() -> None:
     bare = Report(stamp=STAMP, accepted=True, residuals=report().residuals)
-    assert [key for key, _ in Outlet(RosbagsTypes()).fill(bare)] == [Output.RESIDUALS]
-    assert Outlet(RosbagsTypes()).fill(Report(stamp=STAMP, accepted=False)) == []
+    assert [key for key, _ in outlet(RosbagsTypes()).fill(bare)] == [Output.RESIDUALS]
+    assert outlet(RosbagsTypes()).fill(Report(stamp=STAMP, accepted=False)) == []
 
 
 def test_no_shape_without_a_line() -> None:
     bare = replace(report(), prediction=replace(report().prediction, shape=None))
-    assert Output.SHAPE not in dict(Outlet(RosbagsTypes()).fill(bare))
+    assert Output.SHAPE not in dict(outlet(RosbagsTypes()).fill(bare))
 
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
@@ -152,7 +164,7 @@ class RclpyTypes:
 def test_both_worlds_get_the_same_numbers() -> None:
     pytest.importorskip("visualization_msgs.msg")
     for (key, one), (other_key, other) in zip(
-        Outlet(RosbagsTypes()).fill(report()), Outlet(RclpyTypes()).fill(report()), strict=True
+        outlet(RosbagsTypes()).fill(report()), outlet(RclpyTypes()).fill(report()), strict=True
     ):
         assert key is other_key
         assert_same(one, other, key.value)

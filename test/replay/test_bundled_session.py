@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Stream, Twin, load_scene, replay
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
@@ -75,7 +75,8 @@ def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
     inputs, outputs = load_topics().inputs, load_topics().outputs
     wanted = {inputs[stream].name: inputs[stream].type for stream in Stream}
     roles = {inputs[stream].name: stream for stream in Stream}
-    twin, intake, outlet, store = Twin(load_scene()), Intake(4), Outlet(RosbagsTypes()), jazzy()
+    scene, store = load_scene(), jazzy()
+    twin, intake, outlet = Twin(scene), Intake(4), Outlet(RosbagsTypes(), scene, Settings())
     expected = []
     for name, log_time, message in read(scan(SESSION), wanted):
         sample = intake.put(roles[name], stamp_of(message), message)

@@ -75,8 +75,9 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     """What intake, twin and outlet make here of the strokes that the node answered, and of all other samples."""
     answered = {stamp for stamp, _ in outputs[Output.TIP_POSITION]}
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
-    twin = Twin(load_scene(), load_settings(PARAMETERS))
-    intake, outlet = Intake(twin.plan.joints), Outlet(RosbagsTypes())
+    scene, settings = load_scene(), load_settings(PARAMETERS)
+    twin = Twin(scene, settings)
+    intake, outlet = Intake(twin.plan.joints), Outlet(RosbagsTypes(), scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     for name, _, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):
         stream, stamp = inputs[name], stamp_of(msg)

@@ -164,6 +164,7 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, still, order):
     rng = np.random.default_rng(3)
     first = [strokes(ms, moved(still, ms * 1e-3)) for ms in range(0, 400, 5)]
     second = [angles(ms + 1.7, rng.normal(0.0, 1.0, 4)) for ms in range(0, 390, 5)]
+
     def residuals(samples):
         twin = Twin(scene)
         return {r.stamp: r.values for sample in samples for r in twin.update(sample).residuals}

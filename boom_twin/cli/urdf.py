@@ -1,0 +1,21 @@
+"""`boom_twin urdf`: a scene as a URDF, for robot_state_publisher."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+
+from .common import add_scene, open_scene
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The scene."""
+    add_scene(parser)
+
+
+def run(args: Namespace) -> int:
+    """Print the document."""
+    from ..io.urdf import urdf
+
+    sys.stdout.write(urdf(open_scene(args.scene)))
+    return 0

@@ -1,0 +1,20 @@
+"""Stamps, frames and points in messages: the model plane in REP-103 axes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..records import Array
+
+FRAME = "base_link"
+
+
+def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
+    """Put a stamp (nanoseconds) and a frame into a ``std_msgs/Header``."""
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    header.frame_id = frame
+
+
+def fill_xz(target: Any, values: Array) -> None:
+    """Model x to x, model y to z; y is 0."""
+    target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

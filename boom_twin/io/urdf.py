@@ -1,0 +1,173 @@
+"""A URDF of a scene: undeformed sections, links and cylinders as a tree, for robot_state_publisher, RViz and Foxglove."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from ..physics.linkage import LINK_L
+from ..scene.depth import section_depth
+from ..scene.kinematics import linkage
+from ..scene.parts import Cylinder, Scene
+from ..scene.passive import CYLINDER, LEFT, RIGHT
+from .places import FRAME
+
+NAME = "boom"
+TIP = "tip"
+UP_IS_POSITIVE = "0 -1 0"
+"""Axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns."""
+EYE = 0.1
+"""Of a closed cylinder, the length that the rod's eye stands out of the barrel."""
+BARREL_RADIUS, ROD_RADIUS, BAR = 0.045, 0.025, 0.06
+"""Of a closed cylinder's length; of the same; of a link's length: for drawing only, a scene does not tell them."""
+COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}
+
+ABOUT = """
+Made from a scene file by `boom_twin urdf`; change the scene, not this file. Frames by REP-103: x forward, z up, the
+boom in the x-z plane; metres and radians. Zero of every section: in line with the one before.
+
+Links                  origin, and direction of x
+  base_link            as in the scene, in the axes of the base
+  section_i            inboard pivot, towards the outboard pivot
+  tip                  outboard pivot of the last section, as that section
+  cylinder_i_barrel    barrel pin, towards the rod pin
+  cylinder_i_rod       rod pin, away from the barrel pin
+  link_l_i, link_r_i   pin D, pin E, towards pin Q where the two links meet (joints B1, B2, B3)
+
+Joints                 published in ~/joint_states
+  joint_i              every message: predicted, root of section i against head of section i-1
+  cylinder_i           every message: estimated stroke, 0 = closed
+  cylinder_i_swivel    with every ~/shape (20 Hz): the barrel in section i-1 (i = 1: in the base)
+  link_l_i_swivel      likewise: link L in section i-1
+  link_r_i_swivel      likewise: link R in section i
+
+A URDF is a tree, so rod pins and pins Q are not joints here. The published positions of the swivels close these loops, for
+rigid sections; mimic joints could not, because they are linear. Sections are drawn undeformed: see ~/shape for how they
+bend. A scene tells no limits of effort and velocity; the zeros stand for that. No inertia: see `boom_twin check`.
+"""
+
+
+def urdf(scene: Scene) -> str:
+    """The URDF document of `scene`, with its links and joints explained in a comment at the top.
+
+    The positions of its joints come in ``~/joint_states``, those of the passive ones from
+    `boom_twin.scene.passive.PassiveJoints`.
+    """
+    robot = Element("robot", name=NAME)
+    robot.append(ElementTree.Comment(ABOUT))
+    for name, rgba in COLOURS.items():
+        SubElement(SubElement(robot, "material", name=name), "color", rgba=rgba)
+    SubElement(robot, "link", name=FRAME)
+    for i in range(len(scene.sections)):
+        _section(robot, scene, i)
+        _cylinder(robot, scene, i)
+        if scene.joints[i].kind != "A":
+            _links(robot, scene, i)
+    SubElement(robot, "link", name=TIP)
+    last = len(scene.sections)
+    _joint(robot, "tip_fixed", "fixed", f"section_{last}", TIP, (scene.sections[-1].length, 0.0))
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'
+
+
+def _section(robot: Element, scene: Scene, i: int) -> None:
+    """Section `i` (0-based) and the joint that turns it."""
+    name, depth = f"section_{i + 1}", section_depth(scene, i)
+    link = SubElement(robot, "link", name=name)
+    _bar(link, (0.0, 0.0), (scene.sections[i].length, 0.0), depth, "section")
+    low, high = (math.radians(angle) for angle in scene.joints[i].range_deg)
+    joint = _joint(robot, f"joint_{i + 1}", "revolute", _carrier(i), name, _pivot(scene, i))
+    _limit(joint, low, high)
+
+
+def _cylinder(robot: Element, scene: Scene, i: int) -> None:
+    """Barrel and rod of cylinder `i` (0-based): a swivel at the barrel pin, and a prismatic joint for the stroke."""
+    part, row, pivot = scene.joints[i].cylinder, linkage(scene, i), _pivot(scene, i)
+    barrel, rod = f"cylinder_{i + 1}_barrel", f"cylinder_{i + 1}_rod"
+    _barrel_and_rod(robot, barrel, rod, part)
+    _joint(robot, CYLINDER.format(i + 1), "continuous", _carrier(i), barrel, (pivot[0] + row.cx, pivot[1] + row.cy))
+    stroke = _joint(robot, f"cylinder_{i + 1}", "prismatic", barrel, rod, (part.closed_length, 0.0), axis="1 0 0")
+    _limit(stroke, 0.0, part.max_stroke)
+
+
+def _barrel_and_rod(robot: Element, barrel: str, rod: str, part: Cylinder) -> None:
+    eye = EYE * part.closed_length
+    round_bar = part.closed_length * BARREL_RADIUS, part.closed_length * ROD_RADIUS
+    _tube(SubElement(robot, "link", name=barrel), 0.0, part.closed_length - eye, round_bar[0], "barrel")
+    _tube(SubElement(robot, "link", name=rod), -part.max_stroke - eye, 0.0, round_bar[1], "rod")
+
+
+def _links(robot: Element, scene: Scene, i: int) -> None:
+    """Links L and R of the six-bar `i` (0-based), each on its pin on a section; one of them carries the rod pin."""
+    row, pivot = linkage(scene, i), _pivot(scene, i)
+    left, right = f"link_l_{i + 1}", f"link_r_{i + 1}"
+    for name, length, carries in ((left, row.length_l, row.mount == LINK_L), (right, row.length_r, row.mount != LINK_L)):
+        link = SubElement(robot, "link", name=name)
+        _bar(link, (0.0, 0.0), (length, 0.0), BAR * length, "link")
+        if carries and row.left:
+            for start in (0.0, length):
+                _bar(link, (start, 0.0), (row.along, row.left), BAR * length, "link")
+    _joint(robot, LEFT.format(i + 1), "continuous", _carrier(i), left, (pivot[0] + row.dx, pivot[1] + row.dy))
+    _joint(robot, RIGHT.format(i + 1), "continuous", f"section_{i + 1}", right, (row.ex, row.ey))
+
+
+def _carrier(i: int) -> str:
+    """The link that joint `i` (0-based) sits on."""
+    return f"section_{i}" if i else FRAME
+
+
+def _pivot(scene: Scene, i: int) -> tuple[float, float]:
+    """Pivot of joint `i` (0-based) in the frame of its carrier, m."""
+    return (scene.sections[i - 1].length, 0.0) if i else scene.base.pivot
+
+
+def _joint(
+    robot: Element, name: str, kind: str, parent: str, child: str, origin: Sequence[float], axis: str = UP_IS_POSITIVE
+) -> Element:
+    """A joint whose origin (x, y of the model plane, m) is given in the frame of its parent."""
+    joint = SubElement(robot, "joint", name=name, type=kind)
+    SubElement(joint, "parent", link=parent)
+    SubElement(joint, "child", link=child)
+    SubElement(joint, "origin", xyz=_xyz(*origin), rpy="0 0 0")
+    if kind != "fixed":
+        SubElement(joint, "axis", xyz=axis)
+    return joint
+
+
+def _limit(joint: Element, low: float, high: float) -> None:
+    SubElement(joint, "limit", lower=_number(low), upper=_number(high), effort="0", velocity="0")
+
+
+def _bar(link: Element, start: tuple[float, float], end: tuple[float, float], depth: float, colour: str) -> None:
+    """A square bar between two points of the model plane, m."""
+    x, y = end[0] - start[0], end[1] - start[1]
+    middle = start[0] + 0.5 * x, start[1] + 0.5 * y
+    geometry = _visual(link, middle, f"0 {_number(-math.atan2(y, x))} 0", colour)
+    SubElement(geometry, "box", size=" ".join(map(_number, (math.hypot(x, y), depth, depth))))
+
+
+def _tube(link: Element, start: float, end: float, radius: float, colour: str) -> None:
+    """A round bar along x, m."""
+    geometry = _visual(link, (0.5 * (start + end), 0.0), f"0 {_number(0.5 * math.pi)} 0", colour)
+    SubElement(geometry, "cylinder", length=_number(end - start), radius=_number(radius))
+
+
+def _visual(link: Element, middle: tuple[float, float], rpy: str, colour: str) -> Element:
+    """The empty geometry of a new visual."""
+    visual = SubElement(link, "visual")
+    SubElement(visual, "origin", xyz=_xyz(*middle), rpy=rpy)
+    geometry = SubElement(visual, "geometry")
+    SubElement(visual, "material", name=colour)
+    return geometry
+
+
+def _xyz(x: float, y: float) -> str:
+    """A point of the model plane in REP-103 axes."""
+    return f"{_number(x)} 0 {_number(y)}"
+
+
+def _number(value: float) -> str:
+    """Ten digits; -0 is 0."""
+    return f"{value + 0.0:.10g}"

@@ -1,0 +1,211 @@
+"""The URDF: well-formed by the format's rules, joints those of ``~/joint_states``, pins where the geometry has them."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pytest
+
+from boom_twin import Report, Sample, Stream, Twin, load_scene
+from boom_twin.cli.main import main
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.outlet import Outlet
+from boom_twin.io.topics import Output
+from boom_twin.io.urdf import urdf
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.parts import Scene
+from boom_twin.scene.passive import PassiveJoints
+from boom_twin.settings import Settings
+from boom_twin.view.skeleton import skeleton
+
+# What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
+# (name: fewest, most), all else refused.
+MANY = 1000
+SCHEMA: dict[str, tuple[set[str], dict[str, tuple[int, int]]]] = {
+    "robot": ({"name"}, {"material": (0, MANY), "link": (1, MANY), "joint": (0, MANY)}),
+    "robot/material": ({"name"}, {"color": (1, 1)}),
+    "robot/link": ({"name"}, {"visual": (0, MANY)}),
+    "link/visual": (set(), {"origin": (0, 1), "geometry": (1, 1), "material": (0, 1)}),
+    "visual/material": ({"name"}, {}),
+    "visual/geometry": (set(), {"box": (0, 1), "cylinder": (0, 1)}),
+    "geometry/box": ({"size"}, {}),
+    "geometry/cylinder": ({"length", "radius"}, {}),
+    "robot/joint": ({"name", "type"}, {"parent": (1, 1), "child": (1, 1), "origin": (0, 1), "axis": (0, 1), "limit": (0, 1)}),
+    "joint/parent": ({"link"}, {}),
+    "joint/child": ({"link"}, {}),
+    "joint/axis": ({"xyz"}, {}),
+    "joint/limit": ({"lower", "upper", "effort", "velocity"}, {}),
+    "material/color": ({"rgba"}, {}),
+    "visual/origin": ({"xyz", "rpy"}, {}),
+    "joint/origin": ({"xyz", "rpy"}, {}),
+}  # fmt: skip
+NUMBERS = {"xyz": 3, "rpy": 3, "size": 3, "rgba": 4, "length": 1, "radius": 1, "lower": 1, "upper": 1, "effort": 1}
+NUMBERS["velocity"] = 1
+
+
+def check(element: Element, place: str = "robot") -> None:
+    """Refuse what the schema does not have."""
+    attributes, children = SCHEMA[place]
+    assert element.attrib.keys() == attributes, place
+    tags = [child.tag for child in element if isinstance(child.tag, str)]
+    assert set(tags) <= children.keys(), place
+    for tag, (fewest, most) in children.items():
+        assert fewest <= tags.count(tag) <= most, (place, tag)
+    for name, count in NUMBERS.items():
+        if name in element.attrib:
+            assert np.isfinite([float(text) for text in element.attrib[name].split()]).sum() == count
+    for child in element:
+        check(child, f"{element.tag}/{child.tag}")
+
+
+def booms() -> dict[str, Scene]:
+    """The default, its first section alone, one with the links' kinds shuffled, one with a rigid section."""
+    scene = load_scene()
+    sections, joints = scene.sections, scene.joints
+    order = [0, 3, 1, 2]
+    rigid = sections[1].model_copy(update=dict.fromkeys(("beam", "A", "I", "rho_A", "rho_I", "beta", "head")))
+    base = scene.base.model_copy(update={"pivot": (0.3, 0.8), "cylinder_pin": (0.75, -0.45), "inclination": 0.1})
+    return {
+        "default": scene,
+        "one": scene.model_copy(update={"sections": sections[:1], "joints": joints[:1]}),
+        "shuffled": scene.model_copy(update={"base": base, "joints": tuple(joints[i] for i in order)}),
+        "rigid": scene.model_copy(update={"sections": (sections[0], rigid, *sections[2:])}),
+    }
+
+
+@pytest.fixture(scope="module", params=["default", "one", "shuffled", "rigid"])
+def boom(request: pytest.FixtureRequest) -> tuple[Scene, Element]:
+    scene = booms()[request.param]
+    return scene, ElementTree.fromstring(urdf(scene))
+
+
+def test_it_keeps_to_the_format(boom: tuple[Scene, Element]) -> None:
+    check(boom[1])
+
+
+def test_it_is_a_tree_from_base_link(boom: tuple[Scene, Element]) -> None:
+    links = [link.attrib["name"] for link in boom[1].findall("link")]
+    names = [joint.attrib["name"] for joint in boom[1].findall("joint")]
+    children = [joint.find("child").attrib["link"] for joint in boom[1].findall("joint")]
+    parents = [joint.find("parent").attrib["link"] for joint in boom[1].findall("joint")]
+    assert len(set(links)) == len(links) and len(set(names)) == len(names)
+    assert sorted([*children, "base_link"]) == sorted(links) and set(parents) <= set(links)
+    colours = {material.attrib["name"] for material in boom[1].findall("material")}
+    assert {material.attrib["name"] for material in boom[1].findall("link/visual/material")} <= colours
+    frames(boom[1], {})  # reaches every link
+
+
+def test_links_are_those_of_the_comment(boom: tuple[Scene, Element]) -> None:
+    scene, robot = boom
+    n = range(1, len(scene.sections) + 1)
+    six_bars = [i for i in n if scene.joints[i - 1].kind != "A"]
+    expected = {"base_link", "tip", *(f"section_{i}" for i in n)}
+    expected |= {f"cylinder_{i}_{part}" for i in n for part in ("barrel", "rod")}
+    expected |= {f"link_{side}_{i}" for i in six_bars for side in "lr"}
+    assert {link.attrib["name"] for link in robot.findall("link")} == expected
+
+
+def test_every_revolute_joint_turns_about_minus_y(boom: tuple[Scene, Element]) -> None:
+    axes = {(joint.attrib["type"], joint.find("axis").attrib["xyz"]) for joint in boom[1].findall("joint[axis]")}
+    assert axes == {("revolute", "0 -1 0"), ("continuous", "0 -1 0"), ("prismatic", "1 0 0")}
+
+
+def test_limits_are_those_of_the_scene(boom: tuple[Scene, Element]) -> None:
+    for i, joint in enumerate(boom[0].joints, start=1):
+        limit = boom[1].find(f"joint[@name='joint_{i}']/limit").attrib
+        np.testing.assert_allclose(np.degrees([float(limit["lower"]), float(limit["upper"])]), joint.range_deg)
+        limit = boom[1].find(f"joint[@name='cylinder_{i}']/limit").attrib
+        assert (float(limit["lower"]), float(limit["upper"])) == (0.0, joint.cylinder.max_stroke)
+
+
+def frames(robot: Element, positions: dict[str, float]) -> dict[str, np.ndarray]:
+    """Pose of every link, shape (4, 4), by the rules of URDF: origin, then the joint's motion; 0 where none is given."""
+    poses, joints = {"base_link": np.eye(4)}, robot.findall("joint")
+    while joints:
+        ready = [joint for joint in joints if joint.find("parent").attrib["link"] in poses]
+        assert ready, "not reached from base_link"
+        for joint in ready:
+            joints.remove(joint)
+            pose = np.eye(4)
+            pose[:3, 3] = [float(text) for text in joint.find("origin").attrib["xyz"].split()]
+            assert joint.find("origin").attrib["rpy"] == "0 0 0"
+            value = positions.get(joint.attrib["name"], 0.0)
+            pose = poses[joint.find("parent").attrib["link"]] @ pose @ motion(joint, value)
+            poses[joint.find("child").attrib["link"]] = pose
+    return poses
+
+
+def motion(joint: Element, value: float) -> np.ndarray:
+    """What a joint does at `value`, by Rodrigues' formula where it turns."""
+    pose = np.eye(4)
+    if joint.attrib["type"] == "fixed":
+        return pose
+    axis = np.array([float(text) for text in joint.find("axis").attrib["xyz"].split()])
+    if joint.attrib["type"] == "prismatic":
+        pose[:3, 3] = value * axis
+        return pose
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    pose[:3, :3] += np.sin(value) * cross + (1.0 - np.cos(value)) * cross @ cross
+    return pose
+
+
+@pytest.mark.parametrize("share", [0.05, 0.4, 0.75, 0.97])
+def test_pins_are_where_the_geometry_has_them(boom: tuple[Scene, Element], share: float) -> None:
+    """Both ways around every loop lead to the same point."""
+    scene, robot = boom
+    low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+    angles = low + share * (high - low)
+    bones, passive = skeleton(scene, angles), PassiveJoints(scene)
+    positions = {f"joint_{i}": angle for i, angle in enumerate(angles, start=1)}
+    positions |= dict(zip(passive.names, passive.positions(angles), strict=True))
+    for i, joint in enumerate(bones.joints, start=1):
+        length = np.hypot(*(joint.rod_pin - joint.barrel_pin))
+        positions[f"cylinder_{i}"] = length - scene.joints[i - 1].cylinder.closed_length
+    poses = frames(robot, positions)
+    at(poses["tip"], (0.0, 0.0), bones.pivots[-1])
+    for i, joint in enumerate(bones.joints, start=1):
+        at(poses[f"section_{i}"], (0.0, 0.0), joint.pivot)
+        at(poses[f"cylinder_{i}_barrel"], (0.0, 0.0), joint.barrel_pin)
+        at(poses[f"cylinder_{i}_rod"], (0.0, 0.0), joint.rod_pin)
+        if joint.q is not None:
+            at(poses[f"link_l_{i}"], (0.0, 0.0), joint.d)
+            at(poses[f"link_r_{i}"], (0.0, 0.0), joint.e)
+            at(poses[f"link_l_{i}"], (scene.joints[i - 1].lL, 0.0), joint.q)
+            at(poses[f"link_r_{i}"], (scene.joints[i - 1].lR, 0.0), joint.q)
+
+
+def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
+    """A point (x, y of the model) of a link lies at `expected` (x, y of the model)."""
+    point = pose @ [own[0], 0.0, own[1], 1.0]
+    np.testing.assert_allclose(point[:3], [expected[0], 0.0, expected[1]], atol=1e-8)
+
+
+def test_joint_states_drive_every_joint() -> None:
+    """A message that comes with a shape names each joint of the URDF that can move, and no other."""
+    scene = load_scene()
+    twin, outlet = Twin(scene), Outlet(RosbagsTypes(), scene, Settings())
+    report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
+    msg = dict(outlet.fill(report))[Output.JOINT_STATES]
+    robot = ElementTree.fromstring(urdf(scene))
+    assert set(msg.name) == {j.attrib["name"] for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
+    positions = dict(zip(msg.name, msg.position.tolist(), strict=True))
+    poses = frames(robot, positions)
+    for i in (2, 3, 4):  # the rod of a deflected boom misses its pin by what the oil and the section give way
+        place = poses[f"link_l_{i}"] @ [scene.joints[i - 1].lL, 0.0, 0.0, 1.0]
+        np.testing.assert_allclose(place, poses[f"link_r_{i}"] @ [scene.joints[i - 1].lR, 0.0, 0.0, 1.0], atol=1e-9)
+    rod = bones_of(scene, positions).joints[0].rod_pin
+    assert np.hypot(*(poses["cylinder_1_rod"][[0, 2], 3] - rod)) < 5e-3
+
+
+def bones_of(scene: Scene, positions: dict[str, float]) -> Any:
+    return skeleton(scene, np.array([positions[f"joint_{i}"] for i in range(1, len(scene.joints) + 1)]))
+
+
+def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["urdf"]) == 0
+    text = capsys.readouterr().out
+    assert text == urdf(load_scene()) and text.startswith('<?xml version="1.0"?>\n<robot name="boom">\n  <!--')

@@ -1,0 +1,49 @@
+"""package.xml against what the package is and uses."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import boom_twin
+from boom_twin.io.topics import TYPES
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
+SETUP = (ROOT / "setup.py").read_text(encoding="utf-8")
+NOT_OF_ROS = {"boom_twin", "numpy", "pydantic", "tqdm", "rpyutils"}  # rpyutils comes with rclpy
+
+
+def imported(folder: str) -> set[str]:
+    """Top-level packages that the files of a folder import, less those of Python."""
+    names: set[str] = set()
+    for path in (ROOT / "boom_twin" / folder).glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names.add(str(node.module).split(".")[0])
+    return names - sys.stdlib_module_names
+
+
+def test_it_agrees_with_setup_py() -> None:
+    assert PACKAGE.findtext("name") == boom_twin.__name__
+    assert f'version="{PACKAGE.findtext("version")}"' in SETUP
+    assert PACKAGE.findtext("version") == boom_twin.__version__
+    assert f'license="{PACKAGE.findtext("license")}"' in SETUP
+    assert PACKAGE.findtext("export/build_type") == "ament_python"
+
+
+def test_everything_of_ros_that_is_used_is_named() -> None:
+    launched = re.findall(r'package="(\w+)"', "".join(p.read_text() for p in (ROOT / "boom_twin/launch").glob("*.py")))
+    used = {name.split("/")[0] for name in TYPES.values()} | {"std_msgs"} | set(launched) | imported("ros") | imported("launch")
+    named = {each.text for each in PACKAGE.findall("exec_depend")}
+    assert used - NOT_OF_ROS <= named
+
+
+def test_names_are_in_order() -> None:
+    names = [str(each.text) for each in PACKAGE.findall("exec_depend")]
+    assert names == sorted(set(names))

@@ -1,0 +1,153 @@
+"""Launch files, RViz configuration, layouts: they name what is there. None of the programs that read them is on PyPI."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from ruamel.yaml import YAML
+
+import boom_twin
+from boom_twin.cli.main import COMMANDS, _parser
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.markers import ShapeMarkers
+from boom_twin.io.topics import load_topics
+
+ROOT = Path(boom_twin.__file__).parent
+LAUNCH = sorted((ROOT / "launch").iterdir())
+CONFIG = ROOT / "msg_config"
+TOPICS = {topic.absolute: topic for each in (load_topics().inputs, load_topics().outputs) for topic in each.values()}
+CHANNELS = [f"{kind}_{i}" for kind in ("joint", "cylinder") for i in range(1, 5)] + ["tip_imu_x", "tip_imu_z"]
+
+# What these modules of ROS 2 Jazzy have, of what is used here.
+API = {
+    "launch": {"LaunchContext", "LaunchDescription", "LaunchDescriptionEntity"},
+    "launch.actions": {"DeclareLaunchArgument", "ExecuteProcess", "IncludeLaunchDescription", "OpaqueFunction", "Shutdown"},
+    "launch.conditions": {"IfCondition"},
+    "launch.launch_description_sources": {"PythonLaunchDescriptionSource"},
+    "launch.substitutions": {"LaunchConfiguration", "PathJoinSubstitution", "ThisLaunchFileDir"},
+    "launch_ros.actions": {"Node"},
+    "launch_ros.parameter_descriptions": {"ParameterValue"},
+    "launch_ros.substitutions": {"FindPackageShare"},
+}
+
+
+def parsed(path: Path) -> ast.Module:
+    source = path.read_text(encoding="utf-8")
+    compile(source, str(path), "exec")
+    return ast.parse(source)
+
+
+def calls(tree: ast.AST, name: str) -> list[ast.Call]:
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Call) and getattr(node.func, "id", None) == name]
+
+
+def declared(tree: ast.Module) -> dict[str, set[str]]:
+    """Launch arguments, and which of default and description they have."""
+    return {call.args[0].value: {key.arg for key in call.keywords} for call in calls(tree, "DeclareLaunchArgument")}
+
+
+def test_the_three_are_there() -> None:
+    assert [path.name for path in LAUNCH] == ["replay.launch.py", "rviz.launch.py", "twin.launch.py"]
+
+
+@pytest.mark.parametrize("path", LAUNCH, ids=lambda path: path.name)
+def test_every_argument_is_declared_and_described(path: Path) -> None:
+    tree = parsed(path)
+    arguments = declared(tree)
+    needed = {name for name, given in arguments.items() if "default_value" not in given}
+    assert needed == ({"bag"} if path.name.startswith("replay") else set())
+    assert all("description" in given for given in arguments.values())
+    named = [call.args[0] for call in calls(tree, "LaunchConfiguration")]
+    used = {node.value for node in named if isinstance(node, ast.Constant)}
+    assert used <= arguments.keys()
+    assert len(used) == len(arguments) or path.name.startswith("replay")
+    assert "generate_launch_description" in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("path", LAUNCH, ids=lambda path: path.name)
+def test_imports_exist(path: Path) -> None:
+    """Those of ROS by the list above, those of this package by importing them."""
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("boom_twin"):
+            module = __import__(str(node.module), fromlist=["_"])
+            assert all(hasattr(module, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert {alias.name for alias in node.names} <= API[str(node.module)]
+
+
+def test_an_included_file_knows_what_it_is_given() -> None:
+    (call,) = calls(parsed(ROOT / "launch" / "replay.launch.py"), "IncludeLaunchDescription")
+    source = (ROOT / "launch" / "replay.launch.py").read_text(encoding="utf-8")
+    passed = {"scene", "rviz", "use_sim_time"}
+    assert all(f'"{name}"' in source for name in passed) and call.keywords[0].arg == "launch_arguments"
+    assert passed <= declared(parsed(ROOT / "launch" / "twin.launch.py")).keys()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["play", "BAG", "--clock", "--rate", "2.0", "--start", "0.0", "--wait", "120.0"], ["record", "--out", "DIR"]]
+)
+def test_the_commands_take_what_the_launch_files_give(arguments: list[str]) -> None:
+    assert arguments[0] in COMMANDS
+    _parser(arguments).parse_args(arguments)
+    words = " ".join(path.read_text(encoding="utf-8") for path in LAUNCH)
+    assert f'"{arguments[0]}"' in words
+
+
+def test_rviz_shows_topics_and_namespaces_that_exist() -> None:
+    document = YAML(typ="safe").load((CONFIG / "boom_twin.rviz").read_text(encoding="utf-8"))
+    manager = document["Visualization Manager"]
+    assert manager["Global Options"]["Fixed Frame"] == "base_link"
+    shown = {each["Class"].split("/")[1]: each["Topic"] for each in manager["Displays"] if "Topic" in each}
+    for kind, topic in shown.items():
+        assert TOPICS[topic["Value"]].type.endswith(f"/{kind}")
+        assert topic["Reliability Policy"].lower() == TOPICS[topic["Value"]].qos.reliability
+    (boom,) = (each for each in manager["Displays"] if each["Name"] == "Boom")
+    markers = ShapeMarkers(RosbagsTypes(), 10.0, 1e5)
+    names = {each.ns for each in vars(markers).values() if hasattr(each, "ns")} | {"cylinders"}
+    assert boom["Namespaces"] == dict.fromkeys(names, True)
+
+
+def field(type_name: str, path: list[str]) -> Any:
+    """What a field path leads to in a message of that type; arrays of a JointState have eight entries and more."""
+    value: Any = RosbagsTypes().make(type_name)
+    for part in path:
+        name, _, index = part.partition("[")
+        value = getattr(value, name)
+        assert not index or int(index[:-1]) < 8
+    return value
+
+
+def test_foxglove_shows_topics_and_fields_that_exist() -> None:
+    document = json.loads((CONFIG / "foxglove.json").read_text(encoding="utf-8"))
+    panels = document["configById"]
+    placed = re.findall(r'"(?:first|second)": "([^"]+)"', json.dumps(document["layout"]))
+    assert sorted(placed) == sorted(panels)
+    assert panels["3D!boom"]["topics"].keys() - TOPICS.keys() == {"/robot_description"}
+    paths = [row["value"] for panel in panels.values() for row in panel.get("paths", [])]
+    assert len(paths) == 16
+    for path in paths:
+        topic, *parts = path.split(".")
+        field(TOPICS[topic].type, parts)
+    assert panels["RawMessages!residuals"]["topicPath"] in TOPICS
+    assert panels["DiagnosticSummary!diagnostics"]["topicToRender"] in TOPICS
+
+
+def test_plotjuggler_shows_topics_and_fields_that_exist() -> None:
+    """It names the arrays of a JointState by channel."""
+    root = ElementTree.parse(CONFIG / "plotjuggler.xml").getroot()
+    curves = [curve.attrib["name"] for curve in root.iter("curve")]
+    assert len(curves) == len(set(curves)) == 38
+    for curve in curves:
+        (topic,) = (name for name in TOPICS if curve.startswith(f"{name}/"))
+        *parts, last = curve.removeprefix(f"{topic}/").split("/")
+        if TOPICS[topic].type.endswith("JointState"):
+            assert parts[0] in CHANNELS
+            parts = []
+        field(TOPICS[topic].type, [*parts, last])
+    assert {topic.attrib["name"] for topic in root.iter("topic")} <= TOPICS.keys()
