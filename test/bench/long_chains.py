@@ -89,10 +89,10 @@ def main() -> None:
     seconds = costs(runners)
     (fixed, each), residuals = line(counts, seconds)
     head = ["sections", "unknowns", "us per step", "passes", "us per section", "off the line"]
-    rows = [
-        [f"{n}", f"{len(one.plan.names)}", f"{1e6 * t:.1f}", f"{one.passes:.2f}", f"{1e6 * t / n:.2f}", f"{100 * off:+.1f} %" if off == off else "-"]
-        for n, one, t, off in zip(counts, runners, seconds, residuals, strict=True)
-    ]
+    rows = []
+    for n, one, t, off in zip(counts, runners, seconds, residuals, strict=True):
+        row = [f"{n}", f"{len(one.plan.names)}", f"{1e6 * t:.1f}", f"{one.passes:.2f}", f"{1e6 * t / n:.2f}"]
+        rows.append([*row, "-" if np.isnan(off) else f"{100 * off:+.1f} %"])
     if "--round-off" in sys.argv:
         head += ["error", "of LU"]
         for row, scene in zip(rows, scenes, strict=True):
