@@ -56,7 +56,7 @@ class Runner:
         """Wall time of a step, mean of a short run."""
         state = State(*(array.copy() for array in self.start))
         begun = time.perf_counter()
-        status, _, passes, _ = run(
+        status, _, passes, *_ = run(
             self.plan.tables, state, self.work, np.array([STEP]), np.array([STEPS]), self.drives, self.rates,
             GENERALISED_ALPHA, RHO, TOLERANCE, PASSES, None, self.out,
         )  # fmt: skip
