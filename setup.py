@@ -38,6 +38,7 @@ setup(
         "mcap>=1.2,<2",
         "rosbags>=0.11,<0.12",
         "zstandard>=0.21,<1",
+        "lz4>=4,<5",
         "matplotlib>=3.8,<4",
         "tqdm>=4.66,<5",
     ],

@@ -12,6 +12,8 @@ from ruamel.yaml.error import YAMLError
 
 from .errors import UsageError
 
+DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
@@ -63,7 +65,7 @@ def load_settings(path: Path | None = None) -> Settings:
 
     Parameters of the node alone (``scene``, ``autostart``) are passed over.
     """
-    source = Path(str(files("boom_twin") / "msg_config" / "twin.yaml")) if path is None else Path(path)
+    source = DEFAULT_FILE if path is None else Path(path)
     try:
         content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
         values = dict(next(iter(content.values()))["ros__parameters"])

@@ -6,11 +6,12 @@ import json
 import sys
 from argparse import ArgumentParser
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import Fault
-from ..scene import Scene
-from ..scene.load import examine
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 
 def add_scene(parser: ArgumentParser, *, option: bool = False) -> None:
@@ -27,6 +28,8 @@ def add_json(parser: ArgumentParser) -> None:
 
 def open_scene(source: str | None) -> Scene:
     """The scene of an argument; its warnings go to stderr, one line each."""
+    from ..scene.load import examine  # not for commands that open no scene
+
     scene, oddities = examine(source)
     tell(oddities)
     return scene

@@ -21,8 +21,10 @@ from ..errors import BoomTwinError
 # name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
 COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("check", "validate a scene and tell what its model consists of"),
-    "play": ("play", "publish the inputs of a recorded session over ROS 2"),
+    "info": ("info", "what a recorded session holds and what it lacks"),
+    "play": ("play", "publish a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
+    "recover": ("recover", "save what is whole of a damaged session"),
     "scene": ("scene", "print the default scene file"),
     "urdf": ("urdf", "print a scene as a URDF, for robot_state_publisher"),
     "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),

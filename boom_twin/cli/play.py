@@ -1,16 +1,20 @@
-"""`boom_twin play`: publish the inputs of a recorded session over ROS 2."""
+"""`boom_twin play`: publish a recorded session over ROS 2."""
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import scan
 from ..ros.require import require_rclpy
+
+if TYPE_CHECKING:
+    from ..ros.player import Player
 
 BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
@@ -21,7 +25,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
     parser.add_argument("--duration", type=positive, metavar="S", help="seconds of the session to play (all)")
-    parser.add_argument("--clock", action="store_true", help="publish the log times on /clock too, at 40 Hz")
+    parser.add_argument("--loop", action="store_true", help="again and again, until Ctrl-C")
+    parser.add_argument("--topics", nargs="+", metavar="NAME", help="these topics of the session (the twin's inputs)")
+    parser.add_argument(
+        "--clock",
+        nargs="?",
+        type=positive,
+        const=40.0,
+        metavar="HZ",
+        help="publish the log times on /clock too, so many times in a second (40)",
+    )
     parser.add_argument(
         "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
     )
@@ -35,18 +48,45 @@ def run(args: Namespace) -> int:
 
     session = scan(args.bag)
     with ros([]):
-        player = Player(session, args.clock)
+        player = Player(session, args.topics, args.clock)
+        length = player.length(args.start, args.duration)
         lonely = player.wait(args.wait)
         if lonely and args.wait > 0.0:
             _complain(lonely, len(player.topics), args.wait)
-        with tqdm(total=player.length(args.start, args.duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
-            for elapsed in player.play(args.rate, args.start, args.duration):
-                bar.update(elapsed * 1e-9 - bar.n)
+        try:
+            _play(player, args, length)
+        except KeyboardInterrupt:
+            if not args.loop:
+                raise
         played = player.played
         player.close()
     sent = ", ".join(f"{name} {count}" for name, count in played.sent.items())
     print(f"sent in {played.wall:.1f} s: {sent}; at worst {played.latest * 1e3:.1f} ms late", file=sys.stderr)
     return 0
+
+
+def _play(player: Player, args: Namespace, length: float) -> None:
+    """Once or for ever; the space bar of a terminal pauses."""
+    from .keys import Keys
+
+    is_paused = False
+
+    def is_held() -> bool:
+        nonlocal is_paused
+        if keys.pressed().count(" ") % 2:
+            is_paused = not is_paused
+            bar.set_description("paused" if is_paused else "playing", refresh=True)
+        return is_paused
+
+    with Keys() as keys:
+        if keys.are_read:
+            print("space: pause and go on; Ctrl-C: end", file=sys.stderr)
+        while True:
+            with tqdm(total=length, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
+                for elapsed in player.play(args.rate, args.start, args.duration, is_held):
+                    bar.update(elapsed * 1e-9 - bar.n)
+            if not args.loop:
+                return
 
 
 def _complain(lonely: list[str], topics: int, wait: float) -> None:

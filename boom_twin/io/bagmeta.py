@@ -16,6 +16,8 @@ from .topics import Qos
 FILE_NAME = "metadata.yaml"
 VERSION = 9
 """Of the format, as Jazzy writes it."""
+LARGEST = 4 * 2**20
+"""Bytes of a file that is read, and values that it may hold, aliases written out."""
 
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -86,9 +88,13 @@ def read_metadata(path: Path) -> BagMetadata:
     """
     remedy = "Move it away: the .mcap files can be read without it."
     try:
+        if (size := path.stat().st_size) > LARGEST:
+            raise BagError(f"{path}: {size} bytes: at most {LARGEST} are read. {remedy}")
         document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        if _count(document) > LARGEST:
+            raise BagError(f"{path}: more than {LARGEST} values, by aliases of aliases. {remedy}")
         metadata = BagMetadata.model_validate((document or {})[_ROOT])
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+    except (OSError, UnicodeDecodeError, YAMLError, RecursionError) as error:
         raise BagError(f"{path}: not a readable YAML file ({error}). {remedy}") from error
     except (KeyError, TypeError) as error:
         raise BagError(f"{path}: no {_ROOT} in it, so not rosbag2 metadata. {remedy}") from error
@@ -108,9 +114,22 @@ def read_metadata(path: Path) -> BagMetadata:
     return metadata
 
 
+def _count(document: Any) -> int:
+    """How many values a document holds with its aliases written out; at most a little more than `LARGEST`."""
+    count, waiting = 0, [document]
+    while waiting and count <= LARGEST:
+        value = waiting.pop()
+        inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+        count += 1 + len(inner)
+        waiting.extend(inner)
+    return count
+
+
 def write_metadata(path: Path, metadata: BagMetadata) -> None:
-    """Write `metadata` as Jazzy does; the same values give the same bytes."""
-    path.write_text(dump({_ROOT: metadata.model_dump()}), encoding="utf-8")
+    """Write `metadata` as Jazzy does, all of it or nothing; the same values give the same bytes."""
+    draft = path.with_name(f".{path.name}.draft")
+    draft.write_text(dump({_ROOT: metadata.model_dump()}), encoding="utf-8")
+    draft.replace(path)
 
 
 def offered_qos(qos: Qos) -> list[dict[str, Any]]:

@@ -13,15 +13,19 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, McapRecord, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 
+from .content import LARGEST, MESSAGE_HEAD, definition_of, message_of, parts, unpack
 from .damage import STUMBLES
+
+TOGETHER = 2**30
+"""Bytes of messages that are held together, where the file does not keep them in order, at most."""
 
 
 def records(path: Path) -> Iterator[McapRecord]:
     """All records in the order of the file; those inside a chunk follow it."""
     with path.open("rb") as file:
-        limit = path.stat().st_size
+        limit = min(LARGEST, path.stat().st_size)
         for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
             yield record
             if isinstance(record, Chunk):
@@ -35,16 +39,46 @@ def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
     """
     by_time = attrgetter("log_time")
     if not chunks:
-        yield from sorted((record for record in records(path) if isinstance(record, Message)), key=by_time)
+        yield from sorted(_all_messages(path), key=by_time)
         return
     with path.open("rb") as file:
         for group in _overlapping(chunks):
+            if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
+                raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
             content = [record for index in group for record in _content(chunk_at(file, index))]
             yield from sorted((record for record in content if isinstance(record, Message)), key=by_time)
 
 
+def _all_messages(path: Path) -> Iterator[Message]:
+    """In the order of the file, as long as they may be held together."""
+    size = 0
+    for record in records(path):
+        if isinstance(record, Message):
+            size += len(record.data)
+            if size > TOGETHER:
+                raise McapError(f"more than {TOGETHER} bytes of messages without an index")
+            yield record
+
+
+def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, bytes]]:
+    """Channel, log time (ns) and encoded data of all messages in the order of the file, one chunk in memory."""
+    if not chunks:
+        for record in records(path):
+            if isinstance(record, Message):
+                yield record.channel_id, record.log_time, record.data
+        return
+    with path.open("rb") as file:
+        for index in sorted(chunks, key=attrgetter("chunk_start_offset")):
+            for opcode, body in parts(unpack(chunk_at(file, index))):
+                if opcode == Opcode.MESSAGE:
+                    channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)
+                    yield channel, log_time, body[MESSAGE_HEAD.size :]
+
+
 def chunk_at(file: BinaryIO, index: ChunkIndex) -> Chunk:
     """The chunk that `index` points at."""
+    if index.chunk_length > LARGEST:
+        raise McapError(f"chunk of {index.chunk_length} bytes: at most {LARGEST} are read")
     file.seek(index.chunk_start_offset)
     raw = file.read(index.chunk_length)
     if len(raw) != index.chunk_length or raw[:9] != struct.pack("<BQ", Opcode.CHUNK, len(raw) - 9):
@@ -67,11 +101,13 @@ def _overlapping(chunks: Sequence[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
 
 
 def _content(chunk: Chunk) -> list[McapRecord]:
-    """The records inside a chunk, its checksum verified."""
-    if chunk.compression not in ("", "zstd", "lz4"):
-        raise McapError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
+    """The messages and definitions inside a chunk, its checksum verified."""
     try:
-        return breakup_chunk(chunk, validate_crc=True)
+        return [record for opcode, body in parts(unpack(chunk)) if (record := _record(opcode, body)) is not None]
     except STUMBLES as error:
         span = f"{chunk.message_start_time} to {chunk.message_end_time} ns"
         raise McapError(f"chunk with log times {span}: {error}") from error
+
+
+def _record(opcode: int, body: bytes) -> McapRecord | None:
+    return message_of(body) if opcode == Opcode.MESSAGE else definition_of(opcode, body)

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BagError
-from .bagmeta import FILE_NAME, read_metadata
+from .bagmeta import FILE_NAME, BagMetadata, read_metadata
 from .blocks import messages
 from .damage import RESCUE, STUMBLES, blame, compare_counts
 from .definitions import check_encoding
+from .files import check_listed, mcap_files
 from .survey import McapFile, survey
 from .typestore import jazzy
 
@@ -50,6 +51,8 @@ class Session:
         a value cannot be noticed.
     notes : dict of str to str
         What the writer noted, for instance that the session is synthetic.
+    metadata : BagMetadata or None
+        What ``metadata.yaml`` says; None without one.
     """
 
     path: Path
@@ -59,6 +62,7 @@ class Session:
     end: int
     checked: bool
     notes: dict[str, str]
+    metadata: BagMetadata | None
 
     def find(self, name: str) -> TopicInfo | None:
         """The topic of that name, with or without its leading slash."""
@@ -74,8 +78,10 @@ def scan(path: Path) -> Session:
         If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
     metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else _mcap_files(path)
+    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
+    if metadata is not None:
+        check_listed(path, named)
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
@@ -93,6 +99,7 @@ def scan(path: Path) -> Session:
         end=max((file.end for file in filled), default=0),
         checked=all(file.checked for file in filled),
         notes=notes,
+        metadata=metadata,
     )
 
 
@@ -117,26 +124,18 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
         At once if a topic is missing, empty, or of another type, encoding or definition; while iterating if a checksum
         does not fit or a message cannot be decoded; at the end if the files did not hold what their statistics say.
     """
+    return ((name, time, message) for name, time, _, message in read_both(session, wanted))
+
+
+def read_both(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
+    """As `read`, with the encoded message before the decoded one, which is None for a type that Jazzy does not have."""
     asked: dict[str, str] = {}
     for name, type_name in wanted.items():
-        asked[_check_topic(session, name, type_name).name] = name
+        asked[check_topic(session, name, type_name).name] = name
     for file in session.files:
         check_encoding(file, asked)
     streams = [_decoded(file, asked) for file in session.files]
     return heapq.merge(*streams, key=itemgetter(1))
-
-
-def _mcap_files(path: Path) -> list[Path]:
-    """The files of a session without metadata."""
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
-    files = sorted(path.glob("*.mcap"))
-    if not files:
-        there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
-        raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
-    return files
 
 
 def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
@@ -156,7 +155,7 @@ def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
     return tuple(TopicInfo(name, types[name], counts[name]) for name in sorted(types))
 
 
-def _check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
+def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     """The topic, if it is there, of that type and not empty."""
     topic = session.find(name)
     if topic is None:
@@ -171,8 +170,9 @@ def _check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     return topic
 
 
-def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
     """The wanted messages of one file; all others are counted."""
+    known = jazzy().types
     channels = file.channels
     seen: Counter[int] = Counter()
     decode = jazzy().deserialize_cdr
@@ -182,10 +182,11 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
             seen[message.channel_id] += 1
             if (name := asked.get(channel.topic)) is None:
                 continue
+            kind = file.schemas[channel.schema_id].name
             try:
-                decoded = decode(message.data, file.schemas[channel.schema_id].name)
+                decoded = decode(message.data, kind) if kind in known else None
             except STUMBLES as error:
                 place = f"{file.path}: topic {channel.topic} at log time {message.log_time} ns"
                 raise BagError(f"{place}: {error} {RESCUE}") from error
-            yield name, message.log_time, decoded
+            yield name, message.log_time, message.data, decoded
         compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))

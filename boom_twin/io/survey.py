@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
-from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
 from mcap.summary import Summary
-from mcap.writer import MCAP0_MAGIC
 
 from ..errors import BagError
 from .blocks import chunk_at, records
-from .damage import RESCUE, blame, compare_counts
+from .content import LARGEST
+from .damage import blame, compare_counts
+from .ends import check_ends
 
 PROFILE = "ros2"
 NOTES = "boom_twin"
 """Name of the metadata record that holds the notes on a session."""
-
-_FOOTER = struct.Struct("<BQQQI8s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +69,9 @@ def survey(path: Path) -> McapFile:
         If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
     """
     with blame(path), path.open("rb") as file:
-        _check_ends(path, file)
+        check_ends(path, file)
         file.seek(0)
-        reader = SeekingReader(file, validate_crcs=True, record_size_limit=path.stat().st_size)
+        reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))
         if (profile := reader.get_header().profile) != PROFILE:
             raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
         summary = reader.get_summary()
@@ -94,22 +89,6 @@ def survey(path: Path) -> McapFile:
             checked=chunk_at(file, summary.chunk_indexes[0]).uncompressed_crc != 0,
             notes=_notes(reader.iter_metadata()),
         )
-
-
-def _check_ends(path: Path, file: BinaryIO) -> None:
-    """Magic at both ends, footer, checksum of the summary."""
-    size = path.stat().st_size
-    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-        raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
-    file.seek(max(0, size - _FOOTER.size))
-    tail = file.read()
-    if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
-        raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
-    _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
-    file.seek(start or size - _FOOTER.size)
-    covered = file.read()[: -len(MCAP0_MAGIC) - 4]
-    if checksum not in (0, zlib.crc32(covered)):
-        raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
 
 
 def _is_complete(summary: Summary, told: Statistics) -> bool:

@@ -1,10 +1,10 @@
-"""Publishes the input topics of a recorded session at the pace of its log times."""
+"""Publishes topics of a recorded session at the pace of its log times."""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,17 +12,14 @@ import rclpy
 from rclpy.publisher import Publisher
 
 from ..errors import BagError
-from ..io.reader import Session, read
-from ..io.topics import Topic, load_topics
-from ..io.typestore import jazzy
-from ..records import Stream
+from ..io.publishable import publishable
+from ..io.reader import Session, read_both
+from .clock import CLOCK, CLOCK_TYPE, clock_message
+from .definition import installed_class
 from .qos import qos_profile
 from .types import message_class
 
 NAME = "boom_twin_player"
-CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
-CLOCK_PERIOD = 25_000_000
-"""ns of session time between two messages on ``/clock``: 40 Hz, as ``ros2 bag play --clock`` has it."""
 LOOK = 0.05
 """Time (s) between looks for listeners."""
 SETTLE = 0.5
@@ -46,26 +43,39 @@ class Player:
     Parameters
     ----------
     session : Session
-    clock : bool
-        Publish the log times on ``/clock`` too.
+    names : sequence of str, optional
+        Topics; by default the inputs of the twin. Their quality of service is that of the session.
+    clock_rate : float, optional
+        Publish the log times on ``/clock`` too, so many times in a second.
+
+    Raises
+    ------
+    BagError
+        A topic is not in the session.
+    UsageError
+        The type of one is not installed.
     """
 
-    def __init__(self, session: Session, clock: bool = False) -> None:
-        self._session, self._with_clock = session, clock
-        self._topics = _inputs(session)
+    def __init__(self, session: Session, names: Sequence[str] | None = None, clock_rate: float | None = None) -> None:
+        self._session, self._clock_rate = session, clock_rate
+        topics = publishable(session, names)
+        self._types = {topic.name: topic.type for topic in topics}
+        kinds = {topic.name: installed_class(topic.type) for topic in topics}
         self._node = rclpy.create_node(NAME)
         self._publishers = {
-            name: self._node.create_publisher(message_class(topic.type), name, qos_profile(topic.qos))
-            for name, topic in self._topics.items()
+            topic.name: self._node.create_publisher(kinds[topic.name], topic.name, qos_profile(topic.qos))
+            for topic in topics
         }
         self._clock: Publisher[Any] | None = None
-        if clock:
+        if clock_rate is not None:
             self._clock = self._node.create_publisher(message_class(CLOCK_TYPE), CLOCK, 10)
+        self._sent: Counter[str] = Counter()
+        self._latest = self._wall = self._ask = 0.0
 
     @property
     def topics(self) -> tuple[str, ...]:
         """The names of what is published."""
-        return tuple(self._topics)
+        return tuple(self._types)
 
     def lonely(self, listeners: int = 1) -> list[str]:
         """The topics that fewer than so many subscriptions have matched."""
@@ -91,7 +101,13 @@ class Player:
             raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {whole:.1f} s.")
         return min(whole - start, whole if duration is None else duration)
 
-    def play(self, rate: float = 1.0, start: float = 0.0, duration: float | None = None) -> Iterator[int]:
+    def play(
+        self,
+        rate: float = 1.0,
+        start: float = 0.0,
+        duration: float | None = None,
+        is_held: Callable[[], bool] = lambda: False,
+    ) -> Iterator[int]:
         """Publish, one message for every step of the iterator; `played` tells afterwards what was sent.
 
         Parameters
@@ -100,6 +116,8 @@ class Player:
             Session time over real time, > 0.
         start, duration : float
             Part of the session, s; all from `start` on without a duration.
+        is_held : callable
+            Asked often; as long as it says so, nothing is published but the time on ``/clock``.
 
         Returns
         -------
@@ -111,25 +129,44 @@ class Player:
         BagError
             The session cannot be read.
         """
-        self._sent: Counter[str] = Counter()
-        self._latest = 0.0
         first = self._session.start + round(start / NANO)
         end = self._session.end + 1 if duration is None else first + round(duration / NANO)
-        began = time.monotonic()
-        for stamp, name, data in self._schedule(first, end):
-            due = began + (stamp - first) * NANO / rate
-            now = time.monotonic()
-            if due > now:
-                time.sleep(due - now)
-            else:
-                self._latest = max(self._latest, now - due)
-            self._publish(name, data)
-            yield stamp - first
-        self._wall = time.monotonic() - began
+        entered = began = time.monotonic()
+        try:
+            for stamp, name, data in self._schedule(first, end, rate):
+                due = (stamp - first) * NANO / rate
+                began += self._wait(began + due, stamp, is_held)
+                self._latest = max(self._latest, time.monotonic() - began - due)
+                self._publish(name, data)
+                yield stamp - first
+        finally:
+            self._wall += time.monotonic() - entered
+
+    def _wait(self, due: float, stamp: int, is_held: Callable[[], bool]) -> float:
+        """Until `due`; gives the seconds for which the play was held."""
+        held = 0.0
+        while True:
+            if time.monotonic() >= self._ask:
+                held += self._hold(stamp, is_held)
+                self._ask = time.monotonic() + LOOK
+            left = due + held - time.monotonic()
+            if left <= 0.0:
+                return held
+            time.sleep(min(left, LOOK))
+
+    def _hold(self, stamp: int, is_held: Callable[[], bool]) -> float:
+        """Wait as long as the play is held; gives the seconds."""
+        began, was_held = time.monotonic(), False
+        while is_held():
+            was_held = True
+            if self._clock is not None:
+                self._clock.publish(clock_message(stamp))
+            time.sleep(LOOK if self._clock_rate is None else min(LOOK, 1.0 / self._clock_rate))
+        return time.monotonic() - began if was_held else 0.0
 
     @property
     def played(self) -> Played:
-        """What the last call of `play` published."""
+        """What all calls of `play` published."""
         return Played(dict(self._sent), self._wall, self._latest)
 
     def close(self) -> None:
@@ -137,40 +174,19 @@ class Player:
         self._node.destroy_node()
 
     def _publish(self, name: str, data: bytes) -> None:
-        if name == CLOCK:
-            assert self._clock is not None
+        if name == CLOCK and self._clock is not None:
             self._clock.publish(data)
             return
         self._publishers[name].publish(data)
         self._sent[name] += 1
 
-    def _schedule(self, first: int, end: int) -> Iterator[tuple[int, str, bytes]]:
+    def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes]]:
         """Log time (ns), topic and CDR of every message of that span in order, those of the clock among them."""
-        encode = jazzy().serialize_cdr
-        tick = first
-        for name, stamp, message in read(self._session, {name: topic.type for name, topic in self._topics.items()}):
+        tick, period = first, round(rate / self._clock_rate / NANO) if self._clock_rate else 0
+        for name, stamp, data, _ in read_both(self._session, self._types):
             if not first <= stamp < end:
                 continue
-            while self._with_clock and tick <= stamp:
-                yield tick, CLOCK, _clock(tick)
-                tick += CLOCK_PERIOD
-            yield stamp, name, bytes(encode(message, self._topics[name].type))
-
-
-def _inputs(session: Session) -> dict[str, Topic]:
-    """The session's input topics by name: strokes, and what else has messages."""
-    inputs = load_topics().inputs
-    there = {stream: session.find(topic.name) for stream, topic in inputs.items()}
-    return {
-        topic.name: topic
-        for stream, topic in inputs.items()
-        if stream is Stream.STROKES or ((info := there[stream]) is not None and info.count)
-    }
-
-
-def _clock(stamp: int) -> bytes:
-    """A message for ``/clock`` in CDR."""
-    types = jazzy().types
-    time_class, clock_class = types["builtin_interfaces/msg/Time"], types[CLOCK_TYPE]
-    now = time_class(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
-    return bytes(jazzy().serialize_cdr(clock_class(clock=now), CLOCK_TYPE))
+            while period and tick <= stamp:
+                yield tick, CLOCK, clock_message(tick)
+                tick += period
+            yield stamp, name, data

@@ -56,7 +56,7 @@ class Runner:
         """Wall time of a step, mean of a short run."""
         state = State(*(array.copy() for array in self.start))
         begun = time.perf_counter()
-        status, _, passes, _ = run(
+        status, _, passes, *_ = run(
             self.plan.tables, state, self.work, np.array([STEP]), np.array([STEPS]), self.drives, self.rates,
             GENERALISED_ALPHA, RHO, TOLERANCE, PASSES, None, self.out,
         )  # fmt: skip
@@ -72,13 +72,13 @@ def costs(runners: list[Runner], rounds: int = ROUNDS) -> np.ndarray:
 
 
 def line(counts: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fixed and per-section cost (s) of least relative squares, and relative residuals of all.
+    """Fixed and per-section cost (s) of least relative squares, and relative residuals.
 
-    Beams of booms of few sections are cut, so those are left out of the line.
+    Beams of booms of few sections are cut into more parts, so those are left out of the line: NaN.
     """
     terms, whole = np.stack([np.ones(len(counts)), counts], axis=1), counts >= LEAST
     share = np.linalg.lstsq((terms / seconds[:, None])[whole], np.ones(whole.sum()), rcond=None)[0]
-    return share, seconds / (terms @ share) - 1.0
+    return share, np.where(whole, seconds / (terms @ share) - 1.0, np.nan)
 
 
 def main() -> None:
@@ -89,10 +89,10 @@ def main() -> None:
     seconds = costs(runners)
     (fixed, each), residuals = line(counts, seconds)
     head = ["sections", "unknowns", "us per step", "passes", "us per section", "off the line"]
-    rows = [
-        [f"{n}", f"{len(one.plan.names)}", f"{1e6 * t:.1f}", f"{one.passes:.2f}", f"{1e6 * t / n:.2f}", f"{100 * off:+.1f} %"]
-        for n, one, t, off in zip(counts, runners, seconds, residuals, strict=True)
-    ]
+    rows = []
+    for n, one, t, off in zip(counts, runners, seconds, residuals, strict=True):
+        row = [f"{n}", f"{len(one.plan.names)}", f"{1e6 * t:.1f}", f"{one.passes:.2f}", f"{1e6 * t / n:.2f}"]
+        rows.append([*row, "-" if np.isnan(off) else f"{100 * off:+.1f} %"])
     if "--round-off" in sys.argv:
         head += ["error", "of LU"]
         for row, scene in zip(rows, scenes, strict=True):

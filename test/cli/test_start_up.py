@@ -36,7 +36,10 @@ def test_what_does_not_step_needs_no_compiler(arguments: list[str]) -> None:
     assert imported_by(*arguments) == (0, set())
 
 
-@pytest.mark.parametrize("command", ["check", "statics", "simulate", "replay", "rig", "play", "record", "urdf"])
+COMMANDS = ["check", "statics", "simulate", "replay", "rig", "info", "recover", "play", "record", "urdf"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_usage_errors_are_told_at_once(command: str) -> None:
     code, slow = imported_by(command, "--no-such-option")
     assert code == 2 and slow <= {"rosbags"}

@@ -66,7 +66,7 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
     else:
         lengths, rates = drive(step * np.arange(1, count + 1))
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, row, _, _ = run(
+    status, row, *_ = run(
         plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     assert status == 0, f"status {status} in row {row}"

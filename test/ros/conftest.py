@@ -26,11 +26,13 @@ SECONDS, RATE = 4.0, 200.0
 class Process:
     """A child whose output is kept."""
 
-    def __init__(self, log: Path, *arguments: str) -> None:
+    def __init__(self, log: Path, *arguments: str, stdin: int | None = subprocess.DEVNULL) -> None:
         self._log = log
         self._file = log.open("w")
         command = [sys.executable, "-m", *arguments]
-        self._child = subprocess.Popen(command, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True)
+        self._child = subprocess.Popen(
+            command, stdin=stdin, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True
+        )
 
     def said(self) -> str:
         return self._log.read_text()
@@ -75,8 +77,8 @@ def spawn(domain: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ca
     """Starts ``python -m ARGUMENTS``; all are ended with the module."""
     children: list[Process] = []
 
-    def start(*arguments: str) -> Process:
-        children.append(Process(tmp_path_factory.mktemp("process") / "log", *arguments))
+    def start(*arguments: str, stdin: int | None = subprocess.DEVNULL) -> Process:
+        children.append(Process(tmp_path_factory.mktemp("process") / "log", *arguments, stdin=stdin))
         return children[-1]
 
     yield start

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import re
+import signal
 import time
 from collections.abc import Callable
 from itertools import pairwise
@@ -17,7 +21,14 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
+from boom_twin.io.bagmeta import offered_qos
+from boom_twin.io.bagwriter import BagWriter
 from boom_twin.io.intake import stamp_of
+from boom_twin.io.publishable import publishable
+from boom_twin.io.reader import scan
+from boom_twin.io.recorded import Recorded
+from boom_twin.io.topics import Qos
+from boom_twin.ros.player import Player
 
 
 def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path, motion: dict[str, Any]) -> None:
@@ -27,11 +38,13 @@ def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path
     qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
     node.create_subscription(JointState, "cylinder_strokes", strokes.append, qos)
     node.create_subscription(Clock, "/clock", lambda msg: ticks.append(msg.clock.sec * 10**9 + msg.clock.nanosec), qos)
-    part = ["--start", "1", "--duration", "2", "--rate", "2", "--clock"]
+    part = ["--start", "1", "--duration", "2", "--rate", "2", "--clock", "80"]
     play = spawn("boom_twin.cli.main", "play", str(bag), *part, "--wait", "5")
     end = time.monotonic() + 60.0
     while "sent in" not in play.said() and time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.05)
+    for _ in range(1000):  # what still waits
+        rclpy.spin_once(node, timeout_sec=0.001)
     node.destroy_node()
     assert play.end() == 0, play.said()
     assert "nobody listens to joint_angles, tip_imu" in play.said()
@@ -62,3 +75,72 @@ def test_nothing_to_record(spawn: Callable[..., Any], tmp_path: Path) -> None:
     assert record.end() == 1
     assert "nothing came" in record.said()
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
+
+
+def test_again_and_again_until_it_is_stopped(spawn: Callable[..., Any], bag: Path) -> None:
+    play = spawn("boom_twin.cli.main", "play", str(bag), "--wait", "0", "--rate", "8", "--loop", "--topics", "/tip_imu")
+    play.wait_for("4.0/4.0 s")
+    time.sleep(1.0)
+    assert play.stop(signal.SIGINT) == 0
+    match = re.search(r"sent in \d+\.\d s: /tip_imu (\d+);", play.said())
+    assert match is not None and 850 < int(match[1]) < 8000, play.said()
+
+
+def test_the_space_bar_pauses(spawn: Callable[..., Any], bag: Path) -> None:
+    ours, theirs = pty.openpty()
+    play = spawn("boom_twin.cli.main", "play", str(bag), "--wait", "0", "--rate", "2", stdin=theirs)
+    play.wait_for("space: pause")
+    play.wait_for("playing")
+    os.write(ours, b"x ")
+    play.wait_for("paused")
+    time.sleep(2.0)
+    os.write(ours, b" ")
+    assert play.end() == 0, play.said()
+    match = re.search(r"sent in (\d+\.\d) s: cylinder_strokes 800, joint_angles 800, tip_imu 800; at worst", play.said())
+    assert match is not None and 3.8 < float(match[1]) < 15.0, play.said()
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_held_play_keeps_the_clock_and_its_pace(domain: None, bag: Path) -> None:
+    ticks: list[int] = []
+    node = rclpy.create_node("clock_listener")
+    node.create_subscription(Clock, "/clock", lambda msg: ticks.append(msg.clock.sec * 10**9 + msg.clock.nanosec), 100)
+    player = Player(scan(bag), ["/tip_imu"], 50.0)
+    end = time.monotonic() + 20.0
+    while player._clock.get_subscription_count() == 0 and time.monotonic() < end:  # type: ignore[union-attr]
+        rclpy.spin_once(node, timeout_sec=0.05)
+    holding = iter([False] * 5 + [True] * 20 + [False] * 10_000)
+    began = time.monotonic()
+    for _ in player.play(duration=1.0, is_held=lambda: next(holding)):
+        rclpy.spin_once(node, timeout_sec=0.0)
+    took = time.monotonic() - began
+    for _ in range(200):
+        rclpy.spin_once(node, timeout_sec=0.002)
+    assert took > 1.35 and player.played.sent == {"/tip_imu": 200}
+    assert ticks == sorted(ticks) and len(ticks) >= 60 and len(set(ticks)) in (49, 50, 51, 52)
+    player.close()
+    node.destroy_node()
+
+
+@pytest.mark.parametrize("with_metadata", [True, False])
+def test_quality_of_service_is_that_of_the_session(tmp_path: Path, with_metadata: bool) -> None:
+    qos = Qos(reliability="reliable", durability="transient_local", depth=3)
+    bag = BagWriter(tmp_path / "bag")
+    offered = offered_qos(qos)
+    text = "- reliability: 1\n  durability: 1\n  depth: 3\n  history: 1\n"  # as version 8 has it
+    (key,) = bag.add(Recorded("/map", "std_msgs/msg/String", b"string data\n", {"offered_qos_profiles": text}, offered))
+    bag.write(key, 1, b"\0\1\0\0\2\0\0\0a\0")
+    bag.close()
+    if not with_metadata:
+        (tmp_path / "bag" / "metadata.yaml").unlink()
+    assert [topic.qos for topic in publishable(scan(tmp_path / "bag"), ["map"])] == [qos]
+
+
+def test_a_topic_that_is_not_there(bag: Path, capsys: pytest.CaptureFixture[str], domain: None) -> None:
+    from boom_twin.cli.main import main
+
+    rclpy.try_shutdown()
+    assert main(["play", str(bag), "--wait", "0", "--topics", "tip_imo"]) == 1
+    rclpy.init(args=[])
+    assert "no topic tip_imo" in capsys.readouterr().err

@@ -1,0 +1,135 @@
+"""``boom_twin info``: what a recorded session holds, and what it lacks for a replay."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..io.info import BagInfo
+    from ..io.tally import Tally
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
+    add_scene(parser, option=True)
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Read the session once and tell."""
+    from ..io.info import inspect
+
+    joints = len(open_scene(args.scene).joints) if args.scene else None
+    info = inspect(Path(args.bag))
+    if args.json:
+        print_json(as_json(info, joints))
+    else:
+        print("\n".join(as_text(info, joints)))
+    return 0
+
+
+def as_json(info: BagInfo, joints: int | None) -> dict[str, Any]:
+    """All that is known; lists have one entry for each of ``topics``."""
+    from ..io.needs import missing, names_extra, names_missing, remarks
+
+    session, metadata, tallies = info.session, info.session.metadata, info.tallies
+    return {
+        "path": str(session.path),
+        "storage": "mcap",
+        "compression": info.compression,
+        "profile": "ros2",
+        "distro": (metadata.ros_distro or None) if metadata else None,
+        "metadata_version": metadata.version if metadata else None,
+        "library": info.library,
+        "files": [file.path.name for file in session.files],
+        "bytes": info.size,
+        "start_ns": session.start,
+        "duration_s": (session.end - session.start) * 1e-9,
+        "messages": sum(tally.count for tally in tallies),
+        "checksums": session.checked,
+        "origin": session.notes.get("origin"),
+        "synthetic": info.synthetic,
+        "notes": [f"{key}: {value}" for key, value in session.notes.items()],
+        "topics": [tally.name for tally in tallies],
+        "types": [tally.type for tally in tallies],
+        "counts": [tally.count for tally in tallies],
+        "rates_Hz": [tally.rate for tally in tallies],
+        "largest_gaps_s": [tally.gap * 1e-9 if tally.gap else None for tally in tallies],
+        "largest_gaps_at_s": [_gap_at(tally, session.start) for tally in tallies],
+        "stamps_not_increasing": [tally.not_increasing for tally in tallies],
+        "stamps_unset": [tally.unset for tally in tallies],
+        "log_minus_stamp_min_s": [_skew(tally, 0) for tally in tallies],
+        "log_minus_stamp_mean_s": [_skew(tally, 2) for tally in tallies],
+        "log_minus_stamp_max_s": [_skew(tally, 1) for tally in tallies],
+        "names_missing": names_missing(info, joints),
+        "names_extra": names_extra(info, joints),
+        "missing_for_replay": missing(info, joints),
+        "remarks": remarks(info),
+    }
+
+
+def _gap_at(tally: Tally, start: int) -> float | None:
+    """Where the largest gap begins, seconds after the first log time of the session."""
+    return (tally.gap_after - start) * 1e-9 if tally.gap else None
+
+
+def _skew(tally: Tally, which: int) -> float | None:
+    """Log time minus stamp, s: least (0), most (1) or mean (2)."""
+    if not tally.skewed:
+        return None
+    return tally.skews[which] * 1e-9 / (tally.skewed if which == 2 else 1)
+
+
+def as_text(info: BagInfo, joints: int | None) -> list[str]:
+    """The same for people."""
+    told = as_json(info, joints)
+    made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
+    files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
+    distro = told["distro"] or "distribution not noted"
+    version = f"metadata version {told['metadata_version']}" if told["metadata_version"] else "no metadata.yaml"
+    lines = [
+        f"session    {told['path']}",
+        f"stored     mcap, {files}, {told['bytes'] / 2**20:.2f} MiB, compression {told['compression']}, "
+        f"checksums {'present' if told['checksums'] else 'absent'}",
+        f"written    by {told['library'] or 'an unnamed program'}; profile ros2, {distro}, {version}",
+        f"made by    {told['origin'] or 'origin not noted'} ({made})",
+        f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages",
+        "",
+        *_table(info),
+        "",
+    ]
+    lines += [f"note       {note}" for note in told["notes"] if not note.startswith("origin: ")]
+    lines += [f"name       {sentence}" for sentence in told["names_extra"]]
+    lines += [f"remark     {remark}" for remark in told["remarks"]]
+    lines += [f"missing    {sentence}" for sentence in told["missing_for_replay"]]
+    return lines if told["missing_for_replay"] else [*lines, "replay     nothing is missing"]
+
+
+def _table(info: BagInfo) -> list[str]:
+    """One line for each topic."""
+    wide = max((len(tally.name) for tally in info.tallies), default=5)
+    kind = max((len(tally.type) for tally in info.tallies), default=4)
+    lines = [
+        f"{'topic':{wide}}  {'type':{kind}}  {'count':>8}  {'Hz':>8}  {'largest gap':>19}  {'not':>6}  "
+        f"{'no':>6}  log time minus stamp, ms",
+        f"{'':{wide}}  {'':{kind}}  {'':>8}  {'':>8}  {'ms':>8} {'at s':>10}  {'rising':>6}  {'stamp':>6}  "
+        f"{'least':>9} {'mean':>9} {'most':>9}",
+    ]
+    for tally in info.tallies:
+        gap = (tally.gap * 1e-6 if tally.gap else None, _gap_at(tally, info.session.start))
+        skew = [None if (value := _skew(tally, which)) is None else value * 1e3 for which in (0, 2, 1)]
+        lines.append(
+            f"{tally.name:{wide}}  {tally.type:{kind}}  {tally.count:8d}  {_number(tally.rate, 8, 2)}  "
+            f"{_number(gap[0], 8, 2)} {_number(gap[1], 10, 3)}  {tally.not_increasing:6d}  {tally.unset:6d}  "
+            + " ".join(_number(value, 9, 3) for value in skew)
+        )
+    return lines
+
+
+def _number(value: float | None, width: int, digits: int) -> str:
+    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"

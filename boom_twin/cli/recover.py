@@ -1,0 +1,77 @@
+"""``boom_twin recover``: a new, sound session with all that can be saved of a damaged one."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .common import add_json, print_json
+
+if TYPE_CHECKING:
+    from ..io.outcome import Outcome
+
+SHOWN = 20
+"""Faults that are printed one by one."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
+    parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
+    parser.add_argument(
+        "--unverified",
+        action="store_true",
+        help="save also the whole messages at the start of chunks that were cut off or whose checksum does not fit; "
+        "their values may be wrong",
+    )
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Save, and tell what was saved and what was lost."""
+    from ..io.recover import recover
+
+    outcome = recover(Path(args.bag), Path(args.out), args.unverified)
+    for path, fault in outcome.faults[:SHOWN]:
+        print(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}", file=sys.stderr)
+    if outcome.fault_count > SHOWN:
+        print(f"and {outcome.fault_count - SHOWN} faults more", file=sys.stderr)
+    if args.json:
+        print_json(as_json(outcome, args.out))
+    else:
+        print("\n".join(as_text(outcome, args.out)))
+    return 0
+
+
+def as_json(outcome: Outcome, out: str) -> dict[str, Any]:
+    """The count; lists have one entry for each of ``topics``, null in ``lost`` is unknown."""
+    topics = sorted({*outcome.saved, *(outcome.lost or {})})
+    return {
+        "path": out,
+        "messages": outcome.saved.total(),
+        "topics": topics,
+        "saved": [outcome.saved[topic] for topic in topics],
+        "saved_without_checksum": [outcome.unvouched[topic] for topic in topics],
+        "lost": [None if outcome.lost is None else outcome.lost.get(topic, 0) for topic in topics],
+        "lost_of_unknown_topics": outcome.nameless,
+        "faults": outcome.fault_count,
+    }
+
+
+def as_text(outcome: Outcome, out: str) -> list[str]:
+    """The same for people."""
+    told = as_json(outcome, out)
+    wide = max(len(topic) for topic in told["topics"])
+    lines = [f"{'topic':{wide}}  {'saved':>9}  {'no checksum':>11}  {'lost':>9}"]
+    for row, topic in enumerate(told["topics"]):
+        lost = "unknown" if told["lost"][row] is None else str(told["lost"][row])
+        lines.append(f"{topic:{wide}}  {told['saved'][row]:9d}  {told['saved_without_checksum'][row]:11d}  {lost:>9}")
+    if outcome.nameless:
+        lines.append(f"{outcome.nameless} sound messages were left out: the definitions of their topics are lost")
+    if any(told["saved_without_checksum"]):
+        lines.append("'no checksum': saved as they stood; nothing vouches for their values")
+    if outcome.lost is None:
+        lines.append("'unknown': no sound count is left in the source that says how many there were")
+    return [*lines, out]

@@ -1,0 +1,172 @@
+"""A rosbag2 directory of one or more .mcap files, written from encoded messages; the same bytes for the same input."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from io import BufferedWriter
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from ..errors import BagError
+from . import bagmeta
+from .claim import claim
+from .recorded import Recorded
+from .summary import file_information, metadata_of
+from .survey import NOTES, PROFILE
+
+CHUNK_SIZE = 64 * 1024
+"""Bytes of messages that wait in memory: about one second of a 200 Hz session."""
+LIBRARY = "boom_twin"
+
+
+class BagWriter:
+    """Writes a bag; `close` completes it, `abandon` leaves it as it is.
+
+    Every method raises BagError if the disk is full or fails; then only `abandon` is left to do.
+
+    Parameters
+    ----------
+    directory : Path
+        Made if it is not there.
+    notes : dict of str to str, optional
+        Kept in every file and in ``custom_data``.
+    compression : CompressionType, optional
+        Of the chunks.
+    distro : str, optional
+        Of ROS.
+
+    Raises
+    ------
+    BagError
+        If `directory` holds anything, or cannot be made.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        notes: Mapping[str, str] | None = None,
+        compression: CompressionType = CompressionType.ZSTD,
+        distro: str = "jazzy",
+    ) -> None:
+        self.directory, self._distro, self._compression = directory, distro, compression
+        self._notes = dict(notes or {})
+        self.topics: list[Recorded] = []
+        self._channels: list[int] = []
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self.counts: Counter[int] = Counter()
+        self._files: list[bagmeta.FileInformation] = []
+        self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
+        claim(directory)
+        self._open()
+
+    @property
+    def has_messages(self) -> bool:
+        """Whether anything was written to the open file."""
+        return self._span is not None
+
+    @property
+    def file(self) -> Path:
+        """The file that is being written."""
+        return self.directory / file_name(len(self._files))
+
+    def add(self, *topics: Recorded) -> list[int]:
+        """Register topics; gives the keys that `write` takes."""
+        first = len(self.topics)
+        self.topics += topics
+        self._register(list(topics))
+        return list(range(first, len(self.topics)))
+
+    def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
+        """Append one encoded message; times in ns, the publish time by default the log time."""
+        self.counts[key] += 1
+        first, last, count = self._span or (log_time, log_time, 0)
+        self._span = min(first, log_time), max(last, log_time), count + 1
+        published = log_time if publish_time is None else publish_time
+        try:
+            self._writer.add_message(self._channels[key], log_time, data, published, sequence)
+        except OSError as error:
+            raise self._fault(error) from error
+
+    def flush(self) -> None:
+        """Put all messages so far on the disk, to survive the loss of the process and of power."""
+        with self._told():
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            os.fsync(self._raw.fileno())
+
+    @property
+    def size(self) -> int:
+        """Bytes of the open file on the disk, without what is in memory."""
+        return self._raw.tell()
+
+    @property
+    def first(self) -> int | None:
+        """The first log time (ns) of the open file; None without messages."""
+        return self._span[0] if self._span else None
+
+    def split(self) -> None:
+        """Complete the open file, tell of it in ``metadata.yaml``, and begin the next one."""
+        self.close()
+        self._open()
+
+    def close(self) -> None:
+        """Complete the file, then write ``metadata.yaml``."""
+        with self._told():
+            self._finish()
+            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
+
+    def abandon(self) -> None:
+        """Let go of the open file; what waits in memory is given up."""
+        with suppress(OSError):
+            self._raw.close()
+
+    def _open(self) -> None:
+        with self._told():
+            self._raw = self.file.open("xb", buffering=0)
+            buffered = BufferedWriter(self._raw)
+            self._writer = Writer(buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
+            self._writer.start(profile=PROFILE, library=LIBRARY)
+            if self._notes:
+                self._writer.add_metadata(NOTES, self._notes)
+            self._channels, self._schemas, self._span = [], {}, None
+            self._register(self.topics)
+
+    def _register(self, topics: list[Recorded]) -> None:
+        """All new schemas, then the channels, in the open file."""
+        for each in topics:
+            schema = each.type, each.definition_encoding, each.definition
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(*schema)
+        for each in topics:
+            number = self._schemas[each.type, each.definition_encoding, each.definition]
+            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
+
+    def _finish(self) -> None:
+        """Complete the open file, down to the disk."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self.flush()
+        self._raw.close()
+        first, last, count = self._span or (0, 0, 0)
+        self._files.append(file_information(file_name(len(self._files)), first, last, count))
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._fault(error) from error
+
+    def _fault(self, error: OSError) -> BagError:
+        return BagError(
+            f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
+            f"`boom_twin recover {self.directory} --out DIR` saves what was written before."
+        )
+
+
+def file_name(number: int) -> str:
+    """Of the .mcap file with that number, from 0."""
+    return f"session_{number}.mcap"

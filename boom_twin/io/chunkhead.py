@@ -1,0 +1,148 @@
+"""The head of a chunk record, read so that one wrong field does not hide the content."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import BinaryIO
+
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+
+from .content import LARGEST, PREFIX, unpack_start, whole_parts
+from .damage import STUMBLES
+
+_FIELDS = struct.Struct("<BQQQQII")
+_SIZE = struct.Struct("<Q")
+_COMPRESSIONS = ("", "zstd", "lz4")
+LONGEST = _FIELDS.size + 4 + _SIZE.size
+"""Bytes of the longest head."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkHead:
+    """What a chunk says about itself.
+
+    Attributes
+    ----------
+    offset : int
+        Of the record in the file.
+    opcode, length : int
+        Of the record; the length counts from after these two.
+    start, end : int
+        Log times, ns.
+    unpacked, crc : int
+        Size and checksum of the content; a checksum of 0 is none.
+    compression : str
+        Empty where the name is not known.
+    head, size : int
+        Bytes up to the packed content, and of it.
+    """
+
+    offset: int
+    opcode: int
+    length: int
+    start: int
+    end: int
+    unpacked: int
+    crc: int
+    compression: str
+    head: int
+    size: int
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether its two lengths agree: no other bytes look like that by chance."""
+        return PREFIX.size + self.length == self.head + self.size
+
+    @property
+    def after(self) -> int:
+        """Offset of the next record, if `is_certain`."""
+        return self.offset + PREFIX.size + self.length
+
+    def __str__(self) -> str:
+        return f"chunk with log times {self.start} to {self.end} ns"
+
+
+def head_at(file: BinaryIO, offset: int) -> ChunkHead | None:
+    """The head of a chunk at `offset`; None if nothing like one is there."""
+    file.seek(offset)
+    raw = file.read(LONGEST)
+    if len(raw) < _FIELDS.size + _SIZE.size:
+        return None
+    opcode, length, start, end, unpacked, crc, letters = _FIELDS.unpack_from(raw)
+    if letters > 4 or len(raw) < (head := _FIELDS.size + letters + _SIZE.size):
+        return None
+    name = raw[_FIELDS.size : _FIELDS.size + letters].decode("latin-1")
+    (size,) = _SIZE.unpack_from(raw, _FIELDS.size + letters)
+    found = ChunkHead(offset, opcode, length, start, end, unpacked, crc, name, head, size)
+    return found if found.is_certain or (opcode == Opcode.CHUNK and name in _COMPRESSIONS) else None
+
+
+def sound_content(file: BinaryIO, head: ChunkHead, size: int) -> tuple[bytes, int]:
+    """Content of a chunk in a file of `size` bytes, and the offset after it.
+
+    With a checksum, everything else in the head may be wrong; without, all of it must fit.
+
+    Raises
+    ------
+    McapError
+        Says what does not fit.
+    """
+    if head.crc == 0:
+        if not head.is_certain:
+            raise McapError("its lengths do not agree")
+        content = _unpacked(file, head, head.size, head.compression, head.unpacked)
+        if len(content) != head.unpacked:
+            raise McapError(f"unpacks to another size than the {head.unpacked} bytes that it states")
+        if len(whole_parts(content)) != len(content):
+            raise McapError("its records do not fill it")
+        return content, head.after
+    reason = "its checksum does not fit its content"
+    for packed, compression, unpacked in _readings(head, size):
+        try:
+            content = _unpacked(file, head, packed, compression, unpacked)
+        except STUMBLES as error:
+            reason = str(error)
+            continue
+        if zlib.crc32(content) == head.crc:
+            return content, head.offset + head.head + packed
+        reason = "its checksum does not fit its content"
+    raise McapError(reason)
+
+
+def loose_start(file: BinaryIO, head: ChunkHead) -> bytes:
+    """The whole records at the start of a chunk that is cut off or wrong; no checksum vouches for them."""
+    try:
+        content = _unpacked(file, head, min(head.size, LARGEST), head.compression, min(head.unpacked, LARGEST))
+    except STUMBLES:
+        return b""
+    return whole_parts(content)
+
+
+def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str, int]]:
+    """Packed size, compression and unpacked size that are possible, those that the head states first."""
+    room = min(size - head.offset - head.head, LARGEST)
+    packed = dict.fromkeys(each for each in (head.size, PREFIX.size + head.length - head.head) if 0 < each <= room)
+    known = [head.compression] if head.compression in _COMPRESSIONS else list(_COMPRESSIONS)
+    sizes = dict.fromkeys(each for each in (head.unpacked, LARGEST) if each <= LARGEST)
+    yield from product(packed, known, sizes)
+
+
+def _unpacked(file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int) -> bytes:
+    if packed > LARGEST:
+        raise McapError(f"{packed} bytes: at most {LARGEST} are read")
+    file.seek(head.offset + head.head)
+    chunk = Chunk(
+        compression=compression,
+        data=file.read(packed),
+        message_start_time=head.start,
+        message_end_time=head.end,
+        uncompressed_crc=head.crc,
+        uncompressed_size=unpacked,
+    )
+    return unpack_start(chunk)

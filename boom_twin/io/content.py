@@ -1,0 +1,110 @@
+"""The records inside a chunk, unpacked within limits: a stranger's file may not fill the memory."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from io import BytesIO
+
+from lz4.frame import LZ4FrameDecompressor
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Schema
+from zstandard import ZstdDecompressor
+
+LARGEST = 64 * 2**20
+"""Bytes of one record, and of one chunk unpacked, that are read at most."""
+
+PREFIX = struct.Struct("<BQ")
+"""Opcode and length of a record."""
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence, log time (ns), publish time (ns) of a message."""
+
+_WINDOW = 2**27  # of zstd, as its command line allows without --long
+
+
+def _zstd(data: bytes, limit: int) -> bytes:
+    return ZstdDecompressor(max_window_size=_WINDOW).stream_reader(data).read(limit)
+
+
+def _lz4(data: bytes, limit: int) -> bytes:
+    unpacked: bytes = LZ4FrameDecompressor().decompress(data, max_length=limit)
+    return unpacked
+
+
+_UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: data[:limit], "zstd": _zstd, "lz4": _lz4}
+
+
+def unpack(chunk: Chunk) -> bytes:
+    """The content of a chunk, its size and checksum (where it has one) verified.
+
+    Raises
+    ------
+    McapError
+        If the compression is unknown, more than `LARGEST` bytes would come out, or size or checksum do not fit.
+    """
+    content = unpack_start(chunk)
+    if len(content) != chunk.uncompressed_size:
+        raise McapError(f"unpacks to another size than the {chunk.uncompressed_size} bytes that it states")
+    if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
+        raise McapError("crc validation failed: its checksum does not fit its content")
+    return content
+
+
+def unpack_start(chunk: Chunk) -> bytes:
+    """What can be unpacked of a chunk that may be cut off, at most one byte more than it states; nothing verified."""
+    if chunk.compression not in _UNPACK:
+        raise McapError(f"compression = {chunk.compression!r}: only zstd, lz4 and none are known")
+    if chunk.uncompressed_size > LARGEST:
+        raise McapError(f"unpacked size = {chunk.uncompressed_size} bytes: at most {LARGEST} are read")
+    return _UNPACK[chunk.compression](chunk.data, chunk.uncompressed_size + 1)
+
+
+def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Opcode and body of every record in the content of a chunk; McapError at one that is not whole."""
+    place, size = 0, len(content)
+    while place < size:
+        start = place + PREFIX.size
+        if start > size:
+            raise McapError(f"{size - place} bytes are left at byte {place} of a chunk, too few for a record")
+        opcode, length = PREFIX.unpack_from(content, place)
+        place = start + length
+        if place > size:
+            raise McapError(f"record of {length} bytes at byte {start - PREFIX.size} of a chunk ends after the chunk")
+        yield opcode, content[start:place]
+
+
+def whole_parts(content: bytes) -> bytes:
+    """The start of `content` up to where its last whole record ends."""
+    end = 0
+    try:
+        for _, body in parts(content):
+            end += PREFIX.size + len(body)
+    except McapError:
+        pass
+    return content[:end]
+
+
+def message_of(body: bytes) -> Message:
+    """A message from the body of its record."""
+    channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
+    return Message(
+        channel_id=channel,
+        log_time=log_time,
+        data=body[MESSAGE_HEAD.size :],
+        publish_time=publish_time,
+        sequence=sequence,
+    )
+
+
+def definition_of(opcode: int, body: bytes) -> Channel | Schema | None:
+    """A channel or a schema from the body of its record; None for any other record, McapError if it is not whole."""
+    if opcode not in (Opcode.CHANNEL, Opcode.SCHEMA):
+        return None
+    stream = ReadDataStream(BytesIO(body))
+    record: Channel | Schema = Channel.read(stream) if opcode == Opcode.CHANNEL else Schema.read(stream)
+    if stream.count != len(body):
+        raise McapError(f"{type(record).__name__} record of {len(body)} bytes holds {stream.count}")
+    return record

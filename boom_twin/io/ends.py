@@ -1,0 +1,58 @@
+"""Both ends of an .mcap file: whether it is whole, and where its summary is."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+from ..errors import BagError
+from .damage import RESCUE
+
+BLOCK = 2**20
+"""Bytes that are read at a time where a file may be of any size."""
+
+_FOOTER = struct.Struct("<BQQQI8s")
+
+
+def check_ends(path: Path, file: BinaryIO) -> None:
+    """Magic at both ends, footer, checksum of the summary."""
+    size = path.stat().st_size
+    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
+    if (ends := _footer(file, size)) is None:
+        raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
+    start, is_sound = ends
+    if not is_sound:
+        raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
+
+
+def summary_start(path: Path) -> int | None:
+    """Where the summary of a file begins, if it has a whole one that no checksum denies."""
+    with path.open("rb") as file:
+        ends = _footer(file, path.stat().st_size)
+    return ends[0] if ends and ends[1] else None
+
+
+def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
+    """Start of the summary, and whether its checksum fits or is absent; None without a whole footer."""
+    file.seek(max(0, size - _FOOTER.size))
+    tail = file.read()
+    if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
+        return None
+    _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
+    start = start or size - _FOOTER.size
+    return start, checksum in (0, checksum_of(file, start, size - len(MCAP0_MAGIC) - 4))
+
+
+def checksum_of(file: BinaryIO, start: int, end: int) -> int:
+    """CRC-32 of the bytes from `start` up to `end`, a block at a time."""
+    total = 0
+    file.seek(start)
+    while (left := end - file.tell()) > 0 and (block := file.read(min(left, BLOCK))):
+        total = zlib.crc32(block, total)
+    return total

@@ -1,0 +1,143 @@
+"""What a damaged file still says about its messages: topics, definitions, notes, counts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
+
+from ..errors import BagError
+from .bagmeta import BagMetadata, offered_qos
+from .content import LARGEST, definition_of, parts
+from .ends import checksum_of, summary_start
+from .offered import profiles
+from .recorded import Recorded
+from .salvage import Piece, walk
+from .survey import NOTES, PROFILE
+
+
+@dataclass(slots=True)
+class Legend:
+    """What one file says about its messages.
+
+    Attributes
+    ----------
+    channels, schemas : dict
+        By their numbers; those under a checksum go first.
+    notes : dict of str to str
+    told : Counter or None
+        Messages by topic as a sound summary has them.
+    is_summed : bool
+        Whether all bytes up to the end of the data are under a checksum that fits.
+    """
+
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    told: Counter[str] | None = None
+    is_summed: bool = False
+
+    def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
+        """The topic of a channel; None if its definition is lost."""
+        found = self.channels.get(channel)
+        schema = self.schemas.get(found.schema_id) if found else None
+        if found is None or schema is None:
+            return None
+        entries = metadata.topics_with_message_count if metadata else []
+        known = next((each.topic_metadata for each in entries if each.topic_metadata.name == found.topic), None)
+        offered = known.offered_qos_profiles if known else found.metadata.get("offered_qos_profiles", "")
+        return Recorded(
+            topic=found.topic,
+            type=schema.name,
+            definition=schema.data,
+            details=found.metadata,
+            qos=[profile for qos in profiles(offered) for profile in offered_qos(qos)],
+            type_hash=known.type_description_hash if known else found.metadata.get("topic_type_hash", ""),
+            encoding=found.message_encoding,
+            definition_encoding=schema.encoding,
+        )
+
+
+def legend_of(path: Path, unverified: bool = False) -> Legend:
+    """Walk through a file once for everything but its messages.
+
+    A definition counts if its chunk's or the summary's checksum fits, or if none is there to deny it; if `unverified`,
+    one at the start of a chunk that is cut off or wrong counts too.
+
+    Raises
+    ------
+    BagError
+        The file is of another profile than ros2.
+    """
+    legend = Legend()
+    loose = Legend()
+    statistics: Statistics | None = None
+    summary = summary_start(path)
+    budget, is_data = LARGEST, True
+    for piece in walk(path, unverified):
+        if not isinstance(piece, Piece):
+            continue
+        is_in_summary = summary is not None and piece.offset >= summary
+        taker = legend if piece.vouched or is_in_summary else loose
+        for opcode, body in parts(piece.content):
+            if opcode == Opcode.HEADER:
+                _check_profile(path, body)
+            elif opcode == Opcode.METADATA:
+                _note(legend, body)
+            elif opcode == Opcode.DATA_END:
+                is_data = False
+                legend.is_summed = _is_summed(path, piece.offset, body)
+            elif opcode == Opcode.STATISTICS and is_in_summary:
+                statistics = Statistics.read(ReadDataStream(BytesIO(body)))
+            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (taker is legend or is_data):
+                budget -= len(body)
+                if budget < 0:
+                    raise BagError(f"{path}: more than {LARGEST} bytes of definitions. It is not the work of a recorder.")
+                _define(taker, opcode, body)
+    legend.channels = {**loose.channels, **legend.channels}
+    legend.schemas = {**loose.schemas, **legend.schemas}
+    if statistics is not None and statistics.channel_message_counts.keys() <= legend.channels.keys():
+        legend.told = _by_topic(statistics.channel_message_counts, legend.channels)
+    return legend
+
+
+def _check_profile(path: Path, body: bytes) -> None:
+    profile = Header.read(ReadDataStream(BytesIO(body))).profile
+    if profile in ("ros1", "px4"):
+        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
+
+
+def _note(legend: Legend, body: bytes) -> None:
+    record: Metadata = Metadata.read(ReadDataStream(BytesIO(body)))
+    if record.name == NOTES:
+        legend.notes |= record.metadata
+
+
+def _is_summed(path: Path, offset: int, body: bytes) -> bool:
+    """Whether the checksum at the end of the data fits."""
+    told: int = DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc
+    if told == 0:
+        return False
+    with path.open("rb") as file:
+        return checksum_of(file, 0, offset) == told
+
+
+def _define(legend: Legend, opcode: int, body: bytes) -> None:
+    record = definition_of(opcode, body)
+    if isinstance(record, Channel):
+        legend.channels.setdefault(record.id, record)
+    elif isinstance(record, Schema):
+        legend.schemas.setdefault(record.id, record)
+
+
+def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:
+    told: Counter[str] = Counter()
+    for channel, count in counts.items():
+        told[channels[channel].topic] += count
+    return told

@@ -1,0 +1,155 @@
+"""A new, sound session with all that can be saved of a damaged one, and a truthful count."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from mcap.opcode import Opcode
+
+from ..errors import BagError
+from .bagmeta import FILE_NAME, BagMetadata
+from .bagwriter import BagWriter, file_name
+from .blocks import heads
+from .content import message_of, parts
+from .damage import blame
+from .files import sources
+from .legend import Legend, legend_of
+from .outcome import Outcome
+from .reader import scan
+from .recorded import Recorded
+from .salvage import Fault, walk
+
+
+def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
+    """Write what can be saved of the session at `path` into the new directory `out`; `path` is only read.
+
+    Parameters
+    ----------
+    path, out : Path
+    unverified : bool
+        Save also the whole messages at the start of chunks that were cut off or whose checksum does not fit.
+
+    Raises
+    ------
+    BagError
+        There is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
+    """
+    files, metadata = sources(path)
+    _check_place(path, out)
+    legends = []
+    for file in files:
+        with blame(file):
+            legends.append(legend_of(file, unverified))
+    outcome = Outcome()
+    notes = {key: value for legend in legends for key, value in legend.notes.items()}
+    notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
+    bag = BagWriter(out, {**notes, "recovered from": path.name}, distro=metadata.ros_distro if metadata else "")
+    keys: dict[tuple[str, str, bytes], int] = {}
+    try:
+        for number, (file, legend) in enumerate(zip(files, legends, strict=True)):
+            if number and bag.has_messages:
+                bag.split()
+            with blame(file):
+                _copy(file, legend, bag, keys, outcome, metadata, unverified)
+        bag.close()
+    except BaseException:
+        bag.abandon()
+        raise
+    if not bag.counts.total():
+        _remove(out)
+        raise BagError(f"{path}: nothing can be saved: {_first(outcome)}. {out} was not kept.")
+    outcome.saved = _count(out)
+    outcome.lost = _lost(outcome.saved, legends, metadata, files)
+    return outcome
+
+
+def _check_place(path: Path, out: Path) -> None:
+    source = path.resolve()
+    if source == out.resolve() or (source.is_dir() and source in out.resolve().parents):
+        raise BagError(f"{out}: lies in the source, which is never touched. Choose a directory outside {path}.")
+
+
+def _copy(
+    file: Path,
+    legend: Legend,
+    bag: BagWriter,
+    keys: dict[tuple[str, str, bytes], int],
+    outcome: Outcome,
+    metadata: BagMetadata | None,
+    unverified: bool,
+) -> None:
+    """Copy the messages of one file."""
+    own: dict[int, int] = {}
+    for piece in walk(file, unverified, legend.channels):
+        if isinstance(piece, Fault):
+            outcome.note(file, piece)
+            continue
+        for opcode, body in parts(piece.content):
+            if opcode != Opcode.MESSAGE:
+                continue
+            message = message_of(body)
+            if message.channel_id not in own:
+                topic = legend.topic(message.channel_id, metadata)
+                if topic is None:
+                    outcome.nameless += 1
+                    continue
+                own[message.channel_id] = _key(bag, keys, topic)
+            key = own[message.channel_id]
+            bag.write(key, message.log_time, message.data, message.publish_time, message.sequence)
+            if not (piece.vouched or legend.is_summed):
+                outcome.unvouched[bag.topics[key].topic] += 1
+
+
+def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:
+    """The key of a topic in the new bag; two channels of one topic become one."""
+    identity = topic.topic, topic.type, topic.definition
+    if identity not in keys:
+        (keys[identity],) = bag.add(topic)
+    return keys[identity]
+
+
+def _count(out: Path) -> Counter[str]:
+    """Messages by topic, from reading all of the new session."""
+    saved: Counter[str] = Counter()
+    for file in scan(out).files:
+        for channel, _, _ in heads(file.path, file.chunks):
+            saved[file.channels[channel].topic] += 1
+    return saved
+
+
+def _lost(
+    saved: Mapping[str, int], legends: list[Legend], metadata: BagMetadata | None, files: list[Path]
+) -> dict[str, int] | None:
+    """What is missing of the source's own count, if there is a sound one that can be true."""
+    for told in _counts_told(legends, metadata, files):
+        if all(told.get(topic, 0) >= count for topic, count in saved.items()):
+            return {topic: told[topic] - saved.get(topic, 0) for topic in told}
+    return None
+
+
+def _counts_told(legends: list[Legend], metadata: BagMetadata | None, files: list[Path]) -> Iterator[Counter[str]]:
+    """The counts by the files' summaries, if all have one; by the metadata, if it knows of all files."""
+    counts = [legend.told for legend in legends]
+    if None not in counts:
+        yield sum((each for each in counts if each is not None), Counter[str]())
+    if metadata is not None and {file.name for file in files} <= {Path(name).name for name in metadata.relative_file_paths}:
+        told = Counter[str]()
+        for entry in metadata.topics_with_message_count:
+            told[entry.topic_metadata.name] += entry.message_count
+        yield told
+
+
+def _remove(out: Path) -> None:
+    """Take away the empty bag that was begun."""
+    for name in (file_name(0), FILE_NAME):
+        (out / name).unlink(missing_ok=True)
+    out.rmdir()
+
+
+def _first(outcome: Outcome) -> str:
+    if outcome.faults:
+        path, fault = outcome.faults[0]
+        return f"{path.name}, byte {fault.offset}: {fault.reason}"
+    return f"{outcome.nameless} messages of unknown topics" if outcome.nameless else "it holds no messages"

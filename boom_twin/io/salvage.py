@@ -1,0 +1,180 @@
+"""Walks a damaged .mcap file from front to back: what is sound in it, and what is not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap import records as kinds
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+from .chunkhead import ChunkHead, head_at, loose_start, sound_content
+from .content import LARGEST, MESSAGE_HEAD, PREFIX
+from .damage import STUMBLES
+from .ends import BLOCK
+
+_START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
+"""Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""
+
+_READERS: dict[int, Callable[[ReadDataStream], kinds.McapRecord]] = {
+    Opcode.HEADER: kinds.Header.read,
+    Opcode.FOOTER: kinds.Footer.read,
+    Opcode.SCHEMA: kinds.Schema.read,
+    Opcode.CHANNEL: kinds.Channel.read,
+    Opcode.MESSAGE_INDEX: kinds.MessageIndex.read,
+    Opcode.CHUNK_INDEX: kinds.ChunkIndex.read,
+    Opcode.ATTACHMENT: kinds.Attachment.read,
+    Opcode.ATTACHMENT_INDEX: kinds.AttachmentIndex.read,
+    Opcode.STATISTICS: kinds.Statistics.read,
+    Opcode.METADATA: kinds.Metadata.read,
+    Opcode.METADATA_INDEX: kinds.MetadataIndex.read,
+    Opcode.SUMMARY_OFFSET: kinds.SummaryOffset.read,
+    Opcode.DATA_END: kinds.DataEnd.read,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Whole records, one behind the other. `vouched` says whether the checksum of their chunk fits."""
+
+    offset: int
+    vouched: bool
+    content: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Bytes that cannot be used, and why."""
+
+    offset: int
+    length: int
+    reason: str
+
+
+def walk(path: Path, unverified: bool = False, channels: Container[int] | None = None) -> Iterator[Piece | Fault]:
+    """All of a file in order; one chunk in memory at a time.
+
+    Parameters
+    ----------
+    path : Path
+    unverified : bool
+        Take the whole records, too, from the start of a chunk whose checksum does not fit or cannot be verified.
+    channels : container of int, optional
+        Those that are known: messages of others outside chunks are not looked for behind damage.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        offset = len(MCAP0_MAGIC)
+        if file.read(offset) != MCAP0_MAGIC:
+            yield Fault(0, min(offset, size), "it does not begin as an MCAP file")
+        while offset < size - len(MCAP0_MAGIC) or (offset < size and not _ends(file, offset)):
+            pieces, after = _next(file, offset, size, unverified)
+            if after is None:
+                after = _behind(file, offset + 1, size, channels or ())
+                if not any(isinstance(piece, Fault) for piece in pieces):
+                    pieces = [*pieces, Fault(offset, after - offset, "no record that is whole begins here")]
+            yield from pieces
+            offset = after
+
+
+def _next(file: BinaryIO, offset: int, size: int, unverified: bool) -> tuple[list[Piece | Fault], int | None]:
+    """What begins at `offset`, and where the next record begins; None where that is not known."""
+    head = head_at(file, offset)
+    if head is None:
+        record = _whole_record(file, offset, size)
+        return ([Piece(offset, False, record)], offset + len(record)) if record else ([], None)
+    if head.is_certain and head.after > size:
+        fault = Fault(offset, size - offset, f"{head}: cut off, {size - offset} of {head.after - offset} bytes are there")
+        return [*_loose(file, head, unverified), fault], size
+    try:
+        content, after = sound_content(file, head, size)
+        return [Piece(offset, head.crc != 0, content)], after
+    except STUMBLES as error:
+        if not head.is_certain:
+            return [], None
+        fault = Fault(offset, head.after - offset, f"{head}: {error}")
+        return [*_loose(file, head, unverified), fault], head.after
+
+
+def _loose(file: BinaryIO, head: ChunkHead, unverified: bool) -> list[Piece]:
+    """The whole records at the start of a chunk that is not sound, where no checksum denies them or all are wanted."""
+    if head.crc != 0 and not unverified:
+        return []
+    content = loose_start(file, head)
+    return [Piece(head.offset, False, content)] if content else []
+
+
+def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
+    """The record at `offset`, if it is one of those outside chunks and fills its length exactly; else nothing."""
+    file.seek(offset)
+    raw = file.read(PREFIX.size)
+    if len(raw) < PREFIX.size:
+        return b""
+    opcode, length = PREFIX.unpack(raw)
+    if length > min(LARGEST, size - offset - PREFIX.size):
+        return b""
+    body = file.read(length)
+    if opcode == Opcode.MESSAGE:
+        is_whole = length >= MESSAGE_HEAD.size and _may_begin(file, offset + PREFIX.size + length, size)
+    else:
+        is_whole = opcode in _READERS and _fills(body, _READERS[opcode])
+    return raw + body if is_whole else b""
+
+
+def _fills(body: bytes, read: Callable[[ReadDataStream], kinds.McapRecord]) -> bool:
+    stream = ReadDataStream(BytesIO(body))
+    try:
+        read(stream)
+    except STUMBLES:
+        return False
+    return stream.count == len(body)
+
+
+def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
+    """Whether a record, a part of one, or the end of the file may be at `offset`."""
+    file.seek(offset)
+    raw = file.read(PREFIX.size)
+    if len(raw) < PREFIX.size:
+        return raw[:1] in (b"", MCAP0_MAGIC[:1]) or raw[0] in {Opcode.MESSAGE, *_READERS}
+    opcode, length = PREFIX.unpack(raw)
+    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *_READERS) and length <= LARGEST
+
+
+def _ends(file: BinaryIO, offset: int) -> bool:
+    """Whether nothing but the last magic bytes is at `offset`."""
+    file.seek(offset)
+    return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+
+
+def _behind(file: BinaryIO, offset: int, size: int, channels: Container[int]) -> int:
+    """The next offset from which on the file can be read again; its size if there is none."""
+    while offset < size:
+        file.seek(offset)
+        block = file.read(BLOCK + PREFIX.size - 1)
+        for match in _START.finditer(block):
+            if _is_start(file, offset + match.start(), size, channels):
+                return offset + match.start()
+        offset += BLOCK
+    return size
+
+
+def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) -> bool:
+    """Whether a chunk, the end of the data, or a message of a known channel followed by a record is at `offset`."""
+    file.seek(offset)
+    raw = file.read(PREFIX.size + MESSAGE_HEAD.size)
+    opcode, length = PREFIX.unpack_from(raw)
+    if opcode == Opcode.CHUNK:
+        head = head_at(file, offset)
+        return head is not None and head.is_certain
+    if opcode == Opcode.DATA_END:
+        return bool(length == 4)
+    if length < MESSAGE_HEAD.size or len(raw) < PREFIX.size + MESSAGE_HEAD.size or offset + length > size:
+        return False
+    channel = MESSAGE_HEAD.unpack_from(raw, PREFIX.size)[0]
+    return channel in channels and _may_begin(file, offset + PREFIX.size + length, size)

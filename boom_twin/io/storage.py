@@ -1,0 +1,151 @@
+"""Writes a bag in a thread of its own, so that a slow disk holds up no message."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Thread
+
+from ..errors import BagError
+from .bagwriter import BagWriter
+from .recorded import Recorded
+
+FLUSH = 0.5
+"""Seconds after which what was recorded is on the disk: a kill costs at most this and one write."""
+STALL = 5.0
+"""Seconds without an answer from the disk after which that is told."""
+PATIENCE = 30.0
+"""Seconds that the disk has at the end."""
+MOST = 256 * 2**20
+"""Bytes of messages that may wait in memory."""
+
+_Message = tuple[int, int, bytes, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """When a new file begins: bytes, and seconds of log time; None for never."""
+
+    size: int | None = None
+    duration: float | None = None
+
+    def is_due(self, bag: BagWriter, log_time: int) -> bool:
+        """Whether a message of that log time (ns) belongs into the next file."""
+        if bag.first is None:
+            return False
+        if self.size is not None and bag.size >= self.size:
+            return True
+        return self.duration is not None and log_time - bag.first >= self.duration * 1e9
+
+
+class Storage:
+    """Takes messages at any pace; they are on the disk `FLUSH` later.
+
+    Parameters
+    ----------
+    bag : BagWriter
+        From now on only used here.
+    split : Split
+    tell : callable
+        Told in words that the disk does not answer, and that it does again.
+    """
+
+    def __init__(self, bag: BagWriter, split: Split, tell: Callable[[str], None]) -> None:
+        self._bag, self._split, self._tell = bag, split, tell
+        self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
+        self._put = self._taken = 0  # bytes; each is changed by one thread only
+        self._alive = time.monotonic()
+        self._is_late = False
+        self._error: BaseException | None = None
+        self._topics = 0
+        self._thread = Thread(target=self._run, name="storage", daemon=True)
+        self._thread.start()
+
+    def add(self, topic: Recorded) -> int:
+        """Register a topic; gives the key that `put` takes."""
+        self._queue.put(topic)
+        self._topics += 1
+        return self._topics - 1
+
+    def put(self, key: int, log_time: int, data: bytes, publish_time: int, sequence: int) -> None:
+        """Append one encoded message; times in ns."""
+        self._put += len(data)
+        self._queue.put((key, log_time, data, publish_time, sequence))
+
+    def check(self) -> None:
+        """Say if the disk does not answer.
+
+        Raises
+        ------
+        BagError
+            The disk is full or fails, or too much waits for it.
+        """
+        if self._error is not None:
+            raise self._error
+        silent = time.monotonic() - self._alive
+        if silent > STALL and not self._is_late:
+            self._tell(f"{self._bag.directory}: the disk has not answered for {silent:.0f} s; messages wait in memory")
+        elif silent < STALL and self._is_late:
+            self._tell(f"{self._bag.directory}: the disk answers again; nothing was lost")
+        self._is_late = silent > STALL
+        if self._put - self._taken > MOST:
+            raise self._stalled(f"{MOST // 2**20} MiB of messages wait in memory")
+
+    def close(self) -> list[int]:
+        """Complete the bag; gives the messages written by key.
+
+        Raises
+        ------
+        BagError
+            The disk is full or fails, or does not answer.
+        """
+        self._queue.put(None)
+        self._thread.join(PATIENCE)
+        if self._error is not None:
+            raise self._error
+        if self._thread.is_alive():
+            raise self._stalled(f"it has not answered for {time.monotonic() - self._alive:.0f} s at the end")
+        return [self._bag.counts[key] for key in range(self._topics)]
+
+    def _stalled(self, how: str) -> BagError:
+        place = self._bag.directory
+        return BagError(
+            f"{place}: the disk does not keep up: {how}. Record less or on a faster disk; "
+            f"`boom_twin recover {place} --out DIR` saves what was written before."
+        )
+
+    def _run(self) -> None:
+        try:
+            self._serve()
+            self._bag.close()
+        except Exception as error:  # told where it can be told: by `check` and `close`
+            self._error = error
+            self._bag.abandon()
+
+    def _serve(self) -> None:
+        """Write until the end, flushing now and then."""
+        due = time.monotonic() + FLUSH
+        while True:
+            self._alive = time.monotonic()
+            if self._alive >= due:
+                self._bag.flush()
+                due = time.monotonic() + FLUSH
+            try:
+                item = self._queue.get(timeout=max(due - time.monotonic(), 0.0))
+            except Empty:
+                continue
+            if item is None:
+                return
+            if isinstance(item, Recorded):
+                self._bag.add(item)
+            else:
+                self._write(item)
+
+    def _write(self, message: _Message) -> None:
+        key, log_time, data, publish_time, sequence = message
+        if self._split.is_due(self._bag, log_time):
+            self._bag.split()
+        self._bag.write(key, log_time, data, publish_time, sequence)
+        self._taken += len(data)

@@ -1,0 +1,219 @@
+"""The thread that writes a recording: splits, disks that fill up or stall, and kills."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+from boom_twin.errors import BagError
+from boom_twin.io import storage as module
+from boom_twin.io.bagmeta import read_metadata
+from boom_twin.io.bagwriter import BagWriter
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.reader import read, scan
+from boom_twin.io.recorded import Recorded
+from boom_twin.io.recover import recover
+from boom_twin.io.storage import Split, Storage
+from boom_twin.io.topics import load_topics
+from boom_twin.io.typestore import jazzy
+from boom_twin.io.writer import recorded
+from boom_twin.records import Stream
+
+TOPIC = load_topics().inputs[Stream.STROKES]
+STEP = 5_000_000
+
+
+def message(number: int) -> bytes:
+    msg = RosbagsTypes().make(TOPIC.type)
+    msg.header.stamp.sec = number
+    msg.position = RosbagsTypes().doubles([0.1 * number])
+    return bytes(jazzy().serialize_cdr(msg, TOPIC.type))
+
+
+def numbers(path: Path) -> list[int]:
+    """What `message` was given, in the order of the log times."""
+    return [msg.header.stamp.sec for _, _, msg in read(scan(path), {TOPIC.name: TOPIC.type})]
+
+
+def fill(storage: Storage, count: int) -> list[int]:
+    key = storage.add(recorded(TOPIC))
+    for number in range(count):
+        storage.put(key, number * STEP, message(number), number * STEP, number)
+    return storage.close()
+
+
+def test_all_that_is_put_is_written(tmp_path: Path) -> None:
+    assert fill(Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail), 500) == [500]
+    assert numbers(tmp_path / "bag") == list(range(500))
+
+
+@pytest.mark.parametrize(("split", "files"), [(Split(duration=0.5), 5), (Split(size=9_000), None)])
+def test_splits(tmp_path: Path, split: Split, files: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("boom_twin.io.bagwriter.CHUNK_SIZE", 4096)
+    fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), split, pytest.fail), 500)
+    metadata = read_metadata(tmp_path / "bag" / "metadata.yaml")
+    assert len(metadata.relative_file_paths) == (files or len(metadata.files)) > 1
+    assert sum(file.message_count for file in metadata.files) == metadata.message_count == 500
+    assert numbers(tmp_path / "bag") == list(range(500))
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert reader.message_count == sum(1 for _ in reader.messages()) == 500
+    for name in metadata.relative_file_paths:  # each can be read alone
+        assert scan(tmp_path / "bag" / name).notes == {"note": "n"}
+        if split.size:
+            assert (tmp_path / "bag" / name).stat().st_size < split.size + 3 * 4096
+
+
+def test_metadata_is_there_after_each_split_and_a_lost_rest_is_noticed(tmp_path: Path) -> None:
+    bag = BagWriter(tmp_path / "bag")
+    (key,) = bag.add(recorded(TOPIC))
+    bag.write(key, 1, message(1))
+    bag.split()
+    assert numbers_of_metadata(tmp_path / "bag") == (["session_0.mcap"], 1)
+    bag.write(key, 2, message(2))
+    bag.flush()
+    bag.abandon()
+    with pytest.raises(BagError, match=r"metadata\.yaml does not name session_1\.mcap.*recover"):
+        scan(tmp_path / "bag")
+    assert recover(tmp_path / "bag", tmp_path / "out").saved.total() == 2
+    assert numbers(tmp_path / "out") == [1, 2]
+
+
+def numbers_of_metadata(path: Path) -> tuple[list[str], int]:
+    metadata = read_metadata(path / "metadata.yaml")
+    return metadata.relative_file_paths, metadata.message_count
+
+
+def test_a_topic_may_come_late(tmp_path: Path) -> None:
+    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    first = storage.add(recorded(TOPIC))
+    storage.put(first, 1, message(1), 1, 1)
+    other = storage.add(Recorded("/late", "pkg/msg/Late", b"int32 value\n"))
+    storage.put(other, 2, b"\0\1\0\0\7\0\0\0", 2, 1)
+    assert storage.close() == [1, 1]
+    with AnyReader([tmp_path / "bag"]) as reader:
+        late = [reader.deserialize(data, c.msgtype) for c, _, data in reader.messages() if c.topic == "/late"]
+    assert [msg.value for msg in late] == [7]  # type: ignore[attr-defined]
+
+
+FULL = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from test_io_storage import BagError, BagWriter, Split, Storage, message, recorded, TOPIC
+import resource, time
+storage = Storage(BagWriter(Path({bag!r})), Split(), print)
+key = storage.add(recorded(TOPIC))
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+try:
+    for number in range(100_000):
+        storage.put(key, number, message(number), number, number)
+        if number % 100 == 0:
+            storage.check()
+            time.sleep(0.01)
+except BagError as error:
+    print(error, flush=True)
+    sys.exit(1)
+"""
+
+
+def test_a_disk_that_fills_up(tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    bag = tmp_path / "bag"
+    program = FULL.format(here=str(Path(__file__).parent), bag=str(bag))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and done.stderr == ""
+    assert "session_0.mcap: cannot be written (File too large). Make room" in done.stdout and done.stdout.count("\n") == 1
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+    outcome = recover(bag, tmp_path / "out")
+    assert numbers(tmp_path / "out") == list(range(outcome.saved.total())) and outcome.saved.total() > 500
+
+
+def test_a_disk_that_stalls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    real, stuck = os.fsync, [True]
+    monkeypatch.setattr(module, "STALL", 0.3)
+    monkeypatch.setattr(module, "FLUSH", 0.05)
+    monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: stuck[0], False)] and real(file))
+    storage = Storage(BagWriter(tmp_path / "bag"), Split(), told.append)
+    key = storage.add(recorded(TOPIC))
+    for number in range(300):
+        storage.put(key, number, message(number), number, number)
+        storage.check()
+        time.sleep(0.004)
+        stuck[0] = number < 200
+    time.sleep(0.5)
+    storage.check()
+    assert storage.close() == [300]
+    assert len(told) == 2 and "has not answered for" in told[0] and "answers again; nothing was lost" in told[1]
+
+
+def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    release = [False]
+    monkeypatch.setattr(module, "MOST", 10_000)
+    monkeypatch.setattr(module, "FLUSH", 0.01)
+    monkeypatch.setattr(module, "PATIENCE", 0.2)
+    monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: release[0], True)])
+    storage = Storage(BagWriter(tmp_path / "bag"), Split(), lambda text: None)
+    key = storage.add(recorded(TOPIC))
+    time.sleep(0.1)
+    with pytest.raises(BagError, match="does not keep up: 0 MiB of messages wait"):
+        for number in range(1000):
+            storage.put(key, number, message(number), number, number)
+            storage.check()
+    with pytest.raises(BagError, match="does not keep up: it has not answered"):
+        storage.close()
+    release[0] = True
+    storage.close()
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from test_io_storage import BagWriter, Split, Storage, message, recorded, TOPIC
+storage = Storage(BagWriter(Path({bag!r})), Split({size}, None), print)
+key = storage.add(recorded(TOPIC))
+began = time.monotonic()
+for number in range(10**6):
+    storage.put(key, time.time_ns(), message(number), 0, number)
+    print(number, flush=True)
+    time.sleep(max(0.0, began + number * 0.005 - time.monotonic()))
+"""
+
+
+def kill_once(tmp_path: Path, delay: float, size: int | None) -> None:
+    """Start a recording of 200 Hz, kill it after so long, and look at what is left."""
+    bag = tmp_path / "bag"
+    program = KILLED.format(here=str(Path(__file__).parent), bag=str(bag), size=size)
+    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    child.stdout.readline()
+    time.sleep(delay)
+    child.send_signal(signal.SIGKILL)
+    killed = time.time_ns()
+    last = int(child.stdout.read().split()[-1])
+    child.wait()
+    outcome = recover(bag, tmp_path / "out")
+    saved = numbers(tmp_path / "out")
+    assert saved == list(range(len(saved))) and outcome.saved.total() == len(saved) <= last + 2
+    assert killed - scan(tmp_path / "out").end < 1_200_000_000
+    assert outcome.lost is None or not any(outcome.lost.values())
+
+
+@pytest.mark.parametrize(("delay", "size"), [(1.3, None), (2.1, 30_000)])
+def test_a_kill_costs_little(tmp_path: Path, delay: float, size: int | None) -> None:
+    kill_once(tmp_path, delay, size)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(20))
+def test_many_kills_cost_little(tmp_path: Path, number: int) -> None:
+    kill_once(tmp_path, 1.0 + 0.137 * number, 40_000 if number % 2 else None)
