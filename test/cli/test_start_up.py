@@ -22,13 +22,16 @@ print(json.dumps([code, sorted(sys.modules)]))
 """
 
 
-def imported_by(*arguments: str) -> tuple[int, set[str]]:
-    """Exit code of a command in a fresh process, and those of the slow modules that it has imported."""
+BAG = Path(__file__).parents[2] / "bags" / "arch_session"
+
+
+def imported_by(*arguments: str, others: tuple[str, ...] = ()) -> tuple[int, set[str]]:
+    """Exit code of a command in a fresh process, and those of the slow modules, and of others, that it has imported."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, json.dumps(arguments)], capture_output=True, text=True, check=True, timeout=300
     )
     code, modules = json.loads(done.stdout)
-    return code, set(SLOW) & set(modules)
+    return code, {*SLOW, *others} & set(modules)
 
 
 @pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["urdf"], ["--help"], ["statics", "--help"]])
@@ -56,3 +59,7 @@ def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
     imported_by("statics", "--posture", "arch")
     code, slow = imported_by("statics", "--posture", "arch")
     assert code == 0 and slow == {"numba", "llvmlite", "scipy"}
+
+
+def test_what_a_bag_holds_is_told_without_arrays() -> None:
+    assert imported_by("info", str(BAG), others=("numpy",)) == (0, {"rosbags"})
