@@ -173,5 +173,3 @@ def march(
         status="ok" if status == OK else SENTENCES[status],
         doubt=doubt(jolt, shake, travel, step * rows * every * step) if status == OK else "",
     )
-
-

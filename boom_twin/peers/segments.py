@@ -161,5 +161,3 @@ def _point(place: Place, theta: Jet, ahead: float, aside: float) -> Place:
     """Point at (ahead, aside) in axes turned by theta at `place`."""
     c, s = cos(theta), sin(theta)
     return place[0] + ahead * c - aside * s, place[1] + ahead * s + aside * c
-
-

@@ -28,8 +28,11 @@ DTYPES = {
 
 @dataclass
 class Layout:
-    """Rows so far, names of the unknowns, and of every history of a mass point its inertia (kg or kg m^2) and its weight
-    (N along x or y). Histories of the unknowns come first, so places of histories shift by their number in `table`."""
+    """Rows so far, names of the unknowns, and of every history of a mass point its inertia and its weight.
+
+    Inertia in kg or kg m^2, weight in N along x or y. Histories of the unknowns come first, so places of histories shift by
+    their number in `table`.
+    """
 
     rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: {name: [] for name in DTYPES})
     names: list[str] = field(default_factory=list)

@@ -20,7 +20,7 @@ def find(rows: Sequence[Row], case: Own) -> Row | None:
 
 
 def paragraph(rows: Sequence[Row], scene: Scene) -> str:
-    """Is the default on the front, and what do its step, rho, passes and modes buy?"""
+    """Whether the default is on the front, and what its step, rho, passes and modes buy."""
     row = find(rows, Own())
     if row is None:
         return "The default failed on this motion; see below.\n"
