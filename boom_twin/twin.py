@@ -36,7 +36,7 @@ EVENTS = {
 NANO = 1e-9
 SMOOTHING = 0.05  # weight of the newest interval in the running mean
 PENDING = 4096  # most samples that wait for a stroke
-SHAPE_PERIOD = 50_000_000  # ns of one slot; one shape is given in each, 20 a second
+SHAPE_PERIOD = 100_000_000  # ns of one slot; one shape is given in each, 10 a second
 
 
 @dataclass

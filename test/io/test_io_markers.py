@@ -68,7 +68,7 @@ def test_names_and_numbers_are_the_same_in_every_message(messages: Any) -> None:
         ("boom", 0): line, ("boom_exaggerated", 0): line, ("boom_exaggerated", 1): text, ("boom_undeflected", 0): line,
         **{("cylinders", i): line for i in (1, 2, 3, 4)}, ("tip_trace", 0): line,
     }  # fmt: skip
-    assert len(messages) == 120
+    assert len(messages) == 60
     for message in messages:
         assert {key: marker["type"] for key, marker in message.items()} == expected
 
@@ -137,7 +137,7 @@ def test_the_trace_is_the_tip_of_the_last_seconds(messages: Any, predictions: li
     for k, message in enumerate(messages):
         past = [p.tip_position for p in predictions[: k + 1] if p.stamp >= predictions[k].stamp - TRACE]
         np.testing.assert_array_equal(message["tip_trace", 0]["points"], past)
-    assert len(messages[-1]["tip_trace", 0]["points"]) == 101
+    assert len(messages[-1]["tip_trace", 0]["points"]) == 51
 
 
 def test_the_trace_starts_anew_where_time_was_set_back(predictions: list[Prediction]) -> None:

@@ -225,12 +225,12 @@ def test_imu_at_rest_reads_gravity(scene, twin, still):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_shapes_come_20_times_a_second_in_spite_of_jitter(twin, still, seed):
+def test_shapes_come_10_times_a_second_in_spite_of_jitter(twin, still, seed):
     jitter = np.random.default_rng(seed).uniform(-0.2, 0.2, 401)
     reports = [twin.update(strokes(5 * k + 1 + late, still)) for k, late in enumerate(jitter)]
     sent = [report.stamp for report in reports if report.prediction.shape is not None]
-    assert 40 <= len(sent) <= 42
-    assert np.min(np.diff(sent[1:])) > 44 * MS
+    assert 20 <= len(sent) <= 22
+    assert np.min(np.diff(sent[1:])) > 94 * MS
     assert reports[0].prediction.shape[-1] == pytest.approx(reports[0].prediction.tip_position, abs=1e-12)
 
 
