@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..chain.clearance import axis_of
 from ..chain.program import State
-from ..physics.contact import APPROACH, CLOSED, DAMPER, NEAR, PRELOAD, SEAT_X, SEAT_Y, SLOWEST, SPRING
+from ..physics.contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..physics.integrators import X
 from ..plan.compile import Plan
 
@@ -36,10 +37,11 @@ def linearise_pins(plan: Plan, state: State) -> None:
         offset = state.z[row.z : row.z + 2]
         distance = float(np.hypot(*offset))
         memory[CLOSED] = float(distance > row.gap - NEAR)
-        if row.linear and distance > row.gap:
-            depth = distance - row.gap
-            force = row.stiffness * depth**row.exponent
-            memory[SPRING], memory[PRELOAD] = row.exponent * force / depth, force
-            memory[DAMPER] = row.loss * force / SLOWEST
-            place = offset * (1.0 - force / (memory[SPRING] * distance))
-            memory[SEAT_X], memory[SEAT_Y] = place
+        _, _, _, depth, _ = penetration(row, *offset)
+        memory[FORCE] = row.stiffness * depth**row.exponent
+        if row.linear:
+            memory[SPRING] = row.exponent * memory[FORCE] / depth
+            memory[DAMPER] = row.loss * memory[FORCE] / SLOWEST
+            x, y = offset * (1.0 - memory[FORCE] / (memory[SPRING] * distance))
+            c, s = axis_of(plan.tables, state, row)
+            memory[SEAT_X], memory[SEAT_Y] = c * x + s * y, c * y - s * x

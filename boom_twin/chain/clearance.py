@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 
-from ..physics.contact import BARREL, CLOSED, NEAR, SPRING, bearing, limited, remember
+from ..physics.contact import BARREL, CLOSED, LEAST_GAP, LINK_R_PIN, NEAR, Q_PIN, ROD, SPRING, bearing, limited, remember
 from ..physics.integrators import A, V
 from ..physics.jit import inner
 
-ALLOWED = 1e-3  # of the clearance: error of a sub-step in an offset
+ALLOWED = 1e-3  # of the clearance, or of the least one in K: error of a sub-step in an offset
 SIXTH = 1.0 / 6.0
 
 
@@ -46,9 +46,40 @@ def load_pins(t, state, work, motion):
         vx, vy = motion.rate * x + motion.offset[row.z], motion.rate * y + motion.offset[row.z + 1]
         if row.friction > 0.0:
             turning = motion.rate * work.position[row.turn] + motion.offset[row.turn]
-        hold[0], hold[1], hold[2], hold[3], hold[4], hold[5] = bearing(
-            row, state.contacts[k], x, y, vx, vy, before[row.z], before[row.z + 1], turning, motion.rate
+        ax, ay = axis_of(t, state, row)
+        hold[0], hold[1], hold[2], hold[3], hold[4], hold[5], hold[6], hold[7], hold[8] = bearing(
+            row, state.contacts[k], x, y, vx, vy, before[row.z], before[row.z + 1], turning, ax, ay, motion.rate
         )
+
+
+@inner
+def axis_of(t, state, row):
+    """First axis of what a linearised pin is fixed to: the cylinder, or the body with the bush."""
+    turns = state.turns[row.owner]
+    if row.place >= ROD:
+        pins = state.pins[row.owner]
+        dx, dy = pins[2] - pins[0], pins[3] - pins[1]
+        length = math.hypot(dx, dy)
+        return dx / length, dy / length
+    if row.place == LINK_R_PIN:
+        return turns[2], turns[3]
+    if row.place == Q_PIN:
+        return turns[4], turns[5]
+    if row.owner == 0:
+        return 1.0, 0.0
+    return turns[0], turns[1]
+
+
+@inner
+def add_turning(hold, h, at, journal, bush):
+    """Tangent of friction's torque between two bodies, whose angles stand at `journal` and `bush`, the offset at `at`."""
+    low, high = min(journal, bush), max(journal, bush)
+    h[journal, journal] += hold[8]
+    h[bush, bush] += hold[8]
+    h[high, low] -= hold[8]
+    for i in range(2):
+        h[at + i, journal] += hold[6 + i]
+        h[at + i, bush] -= hold[6 + i]
 
 
 @inner
@@ -69,10 +100,13 @@ def end_of(row):
 @inner
 def condense_ends(t, state, work, cylinder, g, h):
     """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h)."""
+    torque = 0.0
+    for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
+        torque += work.hold[k, 5]
+    if torque != 0.0:
+        _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         at, hold, block, gains, free = end_of(t.clearances[k]), work.hold[k], work.ends[k], work.end_gains[k], work.end_free[k]
-        if hold[5] != 0.0:
-            _turn_back(g, h, hold[5] / work.position[cylinder.history])
         block[0, 0], block[0, 1] = h[at, at] + hold[2], h[at, at + 1] + hold[3]
         block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[4]
         share = 1.0 / (block[0, 0] * block[1, 1] - block[0, 1] * block[0, 1])
@@ -151,5 +185,5 @@ def coarseness(t, state, work, scheme):
         if touching or memory[CLOSED] > 0.0:
             ax = scheme.gain * (state.z[i] - work.hat[i]) - before[i]
             ay = scheme.gain * (state.z[j] - work.hat[j]) - before[j]
-            worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * row.gap))
+            worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * max(row.gap, LEAST_GAP)))
     return worst

@@ -132,8 +132,8 @@ class Work(NamedTuple):
     ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
     end_gains: Array  # (clearances, 2, 5), and its gains
     end_free: Array  # (clearances, 2)
-    hold: Array  # (clearances, 6) force, tangent and torque of a pin, see `physics.contact.bearing`
-    apart: Array  # (3, 3 + inner) scratch of a six-bar whose parts move on their own
+    hold: Array  # (clearances, 9) force, tangent and torque of a pin, see `physics.contact.bearing`
+    apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
     angles: Array  # (P+1,)

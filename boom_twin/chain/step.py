@@ -9,7 +9,7 @@ import numpy as np
 from ..physics.contact import CLOSED, bearing
 from ..physics.integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..physics.jit import inner, kernel
-from .clearance import coarseness, load_pins, note_contacts, shorten
+from .clearance import axis_of, coarseness, load_pins, note_contacts, shorten
 from .place import place
 from .plain import plain_pass
 from .program import JOINT_A, JOINT_B, Motion
@@ -200,7 +200,8 @@ def observe_pins(t, state, out, at):
         x, y, vx, vy, turning = state.z[row.z], state.z[row.z + 1], v[row.z], v[row.z + 1], 0.0
         if row.friction > 0.0:
             turning = v[row.turn]
-        fx, fy, _, _, _, _ = bearing(row, memory, x, y, vx, vy, vx, vy, turning, 0.0)
+        ax, ay = axis_of(t, state, row)
+        fx, fy, _, _, _, _, _, _, _ = bearing(row, memory, x, y, vx, vy, vx, vy, turning, ax, ay, 0.0)
         out[at + 4 * k], out[at + 4 * k + 1] = x, y
         out[at + 4 * k + 2], out[at + 4 * k + 3] = math.hypot(fx, fy), memory[CLOSED]
 

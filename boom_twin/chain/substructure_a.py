@@ -71,6 +71,10 @@ def close_base(t, work, operation):
         a[2, 3] += hold[3]
         a[3, 2] += hold[3]
         a[3, 3] += hold[4]
+        a[0, 0] += hold[8]
+        for i in range(2):
+            a[0, 2 + i] += hold[6 + i]
+            a[2 + i, 0] += hold[6 + i]
     for i in range(size):
         for j in range(size):
             work.blocks[0, i, j] = a[i, j]

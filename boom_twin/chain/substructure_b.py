@@ -24,7 +24,7 @@ from ..physics.cylinder import cylinder_terms
 from ..physics.jit import inner
 from ..physics.linkage import LINK_L, LINK_R
 from ..physics.rotation import rotated
-from .clearance import condense_ends, move_ends, torque_of
+from .clearance import add_turning, condense_ends, move_ends, torque_of
 from .place import link_frame
 
 # places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
@@ -210,6 +210,7 @@ def _free_pins(t, state, work, joint, g, h):
         bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
         g[journal] += hold[5]
         g[bush] -= hold[5]
+        add_turning(hold, h, at, journal, bush)
 
 
 @inner

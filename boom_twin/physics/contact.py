@@ -2,18 +2,21 @@
 
 The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^2 + s^2), n = delta/r, s = `SMOOTH`,
 
-    gap g = r - c,    penetration d = [g + sqrt(g^2 + s^2)]/2,    d' = (dd/dg) n.delta',
-    F = K d^e [1 + chi d'/v]   but not below zero,        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
+    gap g = r - c,    penetration d = [g + sqrt(g^2 + s^2)]/2,    g' = n.delta',
+    F = K d^e [1 + chi g'/v]   but not below zero,        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
 
 c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
 radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
 K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.notation`); the laws differ
-in chi, a function of the coefficient of restitution each. The elastic part is convex in delta: at rest a pin has one place.
+in chi, a function of the coefficient of restitution each. With g' in the bracket the rebound does not depend on how d is
+smoothed. The elastic part is convex in delta: at rest a pin has one place.
 
-Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2).
+Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2),
+with F of the step before, which leaves the tangent symmetric.
 
 Linearised at a preload F_0 with penetration d_0, the pin is a spring k = e F_0/d_0 and a damper chi F_0/v about the place from
-which F_0 stretches it to c + d_0. That place turns with the force, but stays on its side when the force reverses.
+which F_0 stretches it to c + d_0. That place is fixed to the cylinder, or to the body that holds the bush of a pivot or link
+pin: it turns with the force of a cylinder, and stays on its side when the force reverses.
 """
 
 from __future__ import annotations
@@ -35,7 +38,8 @@ PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD, BARREL = range(6)
 CLEARANCE = np.dtype(
     [
         ("z", np.int64),  # place of delta among the unknowns
-        ("place", np.int64),  # which pin of its joint or cylinder
+        ("owner", np.int64),  # row of its joint and cylinder ..
+        ("place", np.int64),  # .. and which pin of them it is
         ("turn", np.int64),  # place of the journal's angle in the bush among the histories, if there is friction
         ("heavy", np.int64),  # 1 if the journal has inertia of its own
         ("linear", np.int64),  # 1: linearised at the preload of the first equilibrium
@@ -48,9 +52,9 @@ CLEARANCE = np.dtype(
     ]
 )
 
-# What a pin remembers: whether it touches, speed of approach (m/s); spring (N/m; 0: contact), damper (N s/m) and place (m) of
-# the linearisation, its preload (N); how often contact was lost.
-CLOSED, APPROACH, SPRING, DAMPER, SEAT_X, SEAT_Y, PRELOAD, LOST, COLUMNS = range(9)
+# What a pin remembers: whether it touches, speed of approach (m/s), normal force (N); spring (N/m; 0: contact), damper
+# (N s/m) and place (m, in the axes it is fixed to) of the linearisation; how often contact was lost.
+CLOSED, APPROACH, FORCE, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(9)
 
 
 def hertz(restitution: float) -> float:
@@ -101,26 +105,27 @@ def approach(memory, nx, ny, vx, vy):
 
 
 @inner
-def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, rate):
+def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis_y, rate):
     """Force and tangent of a pin whose journal is at (x, y) with velocity (vx, vy).
 
     before_x, before_y : velocity at the start of the step, m/s. turning : of the journal in the bush, rad/s.
-    rate : C of the integrator, dv/dx.
+    axis_x, axis_y : first axis of what the linearisation is fixed to. rate : C of the integrator, dv/dx.
 
     Returns
     -------
-    fx, fy, kxx, kxy, kyy, torque
-        What holds the journal back (N), its symmetric tangent (N/m), and what holds its turning back (N m). Left out of the
-        tangent: how friction changes with the force, and the turning's; Newton passes make up for it.
+    fx, fy, kxx, kxy, kyy, torque, kx, ky, turn
+        What holds the journal back (N), its tangent (N/m), what holds its turning back (N m) with its derivatives by x and y
+        (N) and by the turning (N m).
     """
     if memory[SPRING] > 0.0:
         k, c = memory[SPRING], memory[DAMPER]
-        stiff = k + rate * c
-        return k * (x - memory[SEAT_X]) + c * vx, k * (y - memory[SEAT_Y]) + c * vy, stiff, 0.0, stiff, 0.0
+        fx = k * (x - axis_x * memory[SEAT_X] + axis_y * memory[SEAT_Y]) + c * vx
+        fy = k * (y - axis_y * memory[SEAT_X] - axis_x * memory[SEAT_Y]) + c * vy
+        return fx, fy, k + rate * c, 0.0, k + rate * c, 0.0, 0.0, 0.0, 0.0
     nx, ny, r, d, slope = penetration(row, x, y)
     speed = approach(memory, nx, ny, before_x, before_y)
     elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
-    lead = row.loss * slope / speed
+    lead = row.loss / speed
     share = 1.0 + lead * (nx * vx + ny * vy)
     force, radial = 0.0, 0.0
     if share > 0.0:
@@ -131,13 +136,14 @@ def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, rate):
     if row.friction > 0.0:
         slip = nx * vy - ny * vx + row.radius * turning
         width = math.sqrt(slip * slip + SLIP * SLIP)
-        drag = row.friction * force * slip / width
-        drag_rate = row.friction * force * SLIP * SLIP / (width * width * width) * rate
-    across_all = across + drag_rate
-    kxx = radial * nx * nx + across * (1.0 - nx * nx - ny * ny) + across_all * ny * ny
-    kyy = radial * ny * ny + across * (1.0 - nx * nx - ny * ny) + across_all * nx * nx
-    kxy = (radial - across_all) * nx * ny
-    return force * nx - drag * ny, force * ny + drag * nx, kxx, kxy, kyy, row.radius * drag
+        most = row.friction * memory[FORCE]
+        drag, drag_rate = most * slip / width, 0.5 * most / width * (1.0 + (SLIP / width) ** 2) * rate
+    along, rest, turn = across + drag_rate, across * (1.0 - nx * nx - ny * ny), row.radius * drag_rate
+    kxx = radial * nx * nx + along * ny * ny + rest
+    kyy = radial * ny * ny + along * nx * nx + rest
+    kxy = (radial - along) * nx * ny
+    fx, fy = force * nx - drag * ny, force * ny + drag * nx
+    return fx, fy, kxx, kxy, kyy, row.radius * drag, -turn * ny, turn * nx, row.radius * turn
 
 
 @inner
@@ -157,7 +163,7 @@ def limited(row, x, y, dx, dy):
 
 @inner
 def remember(row, memory, x, y, before_x, before_y, fx, fy):
-    """Note contact that began or ended in a step that is accepted, and turn the linearisation with the force (fx, fy)."""
+    """Note contact that began or ended in a step that is accepted, and the force."""
     nx, ny, r, _, _ = penetration(row, x, y)
     closed = r - row.gap > -NEAR
     if closed and memory[CLOSED] == 0.0:
@@ -166,8 +172,4 @@ def remember(row, memory, x, y, before_x, before_y, fx, fy):
     elif not closed and memory[CLOSED] > 0.0:
         memory[CLOSED] = 0.0
         memory[LOST] += 1.0
-    force, seat = math.hypot(fx, fy), math.hypot(memory[SEAT_X], memory[SEAT_Y])
-    if memory[SPRING] > 0.0 and seat > 0.0 and force > 0.1 * memory[PRELOAD]:
-        along = fx * memory[SEAT_X] + fy * memory[SEAT_Y]
-        sign = 1.0 if along > 0.0 else -1.0
-        memory[SEAT_X], memory[SEAT_Y] = sign * seat * fx / force, sign * seat * fy / force
+    memory[FORCE] = max(0.0, nx * fx + ny * fy)

@@ -89,7 +89,7 @@ class Plan:
             h=np.zeros((LOOP, LOOP)), own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
             gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),
             block=np.zeros((shapes, shapes)), blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
-            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, 6)), apart=np.zeros((2, LOOP + 1)),
+            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, 9)), apart=np.zeros((2, LOOP + 1)),
             rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)), angles=np.zeros(points),
             turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)),
             drive=np.zeros(n), drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
@@ -142,7 +142,7 @@ class _Builder:
         pins = sorted(self.scene.pins_of(f"joint_{n}"), key=lambda pin: PLACES[pin.at.split(".")[1]])
         z = self.layout.unknowns([f"{name}_{n}" for name in names])
         heavy = {"pivot": True, "Q": bool(joint.mL or joint.mR), "link_L": bool(joint.mL), "link_R": bool(joint.mR)}
-        first_clearance = self._clearances(pins, heavy)
+        first_clearance = self._clearances(index, pins, heavy)
         first_link = len(self.layout.rows["links"])
         for side, length, mass in ((LINK_L, joint.lL, joint.mL), (LINK_R, joint.lR, joint.mR)):
             if mass and length is not None:
@@ -157,7 +157,7 @@ class _Builder:
         self._mark_frame()
         self.layout.operate(kind, row)
 
-    def _clearances(self, pins: Sequence[Pin], heavy: dict[str, bool]) -> int:
+    def _clearances(self, owner: int, pins: Sequence[Pin], heavy: dict[str, bool]) -> int:
         """Rows for `pins`, with the offsets of their journals among the unknowns; returns the first."""
         block, first = self.scene.clearance, len(self.layout.rows["clearances"])
         for pin in pins:
@@ -170,6 +170,7 @@ class _Builder:
             self.layout.add(
                 "clearances",
                 z=z,
+                owner=owner,
                 place=PLACES[place],
                 turn=self.layout.histories([0.0], [0.0]) if law.friction else -1,
                 heavy=heavy[place],
@@ -196,7 +197,7 @@ class _Builder:
             history=self.layout.histories([0.0], [0.0]),
             first_part=first_part,
             parts=len(self.layout.rows["parts"]) - first_part,
-            first_clearance=self._clearances(pins, heavy),
+            first_clearance=self._clearances(n - 1, pins, heavy),
             clearances=len(pins),
             closed_length=part.closed_length,
             compliance=0.0 if part.k is None else 1.0 / part.k,
