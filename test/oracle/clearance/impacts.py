@@ -61,7 +61,7 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
     breaks : sequence of float
         Times at which the drive is not smooth.
     longest : float
-        Longest step in flight, s.
+        Longest step, s.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
         crossing, turning = _events(gap, touching)
         found = solve_ivp(
             rates, (now, stops[0]), state, method, dense_output=True, events=[crossing, turning], args=(entry,),
-            rtol=rtol, atol=atol, max_step=np.inf if touching else longest,
+            rtol=rtol, atol=atol, max_step=longest,
         )  # fmt: skip
         if not found.success:
             raise ArithmeticError(f"t = {found.t[-1]:g} s: {found.message}")
