@@ -104,7 +104,7 @@ class PinnedBoom:
         length, psi, _, force, offset = parts(found.x)
         return Rest(found.x[0], length, psi, self.part.tip_at(found.x[0]), offset, force, unit * found.x[1])
 
-    def follow(self, drive, rest, times, breaks=(), tolerance=1e-8, method="Radau", rate=0.0):
+    def follow(self, drive, rest, times, breaks=(), tolerance=1e-8, method="LSODA", rate=0.0):
         """Motion from an equilibrium, as `Followed`.
 
         Parameters

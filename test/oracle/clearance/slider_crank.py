@@ -62,7 +62,7 @@ class SliderCrank:
     def run(self, turns, rows, tolerance=1e-9, method="DOP853") -> Motion:
         """From crank angle 0, the pin in the middle of the bush, over some turns of the crank."""
         period = 2.0 * pi / self.speed
-        absolute = tolerance * np.array([1e-3, 1e-3, 1.0, 1.0]) * self.contact.clearance / 1e-4
+        absolute = tolerance * np.array([1e-3, 1e-3, 1.0, 1.0])
         return follow(
             self.rates, self.gap, self.closed(0.0), np.linspace(0.0, turns * period, rows), tolerance, absolute,
             longest=period / 200.0, method=method,
