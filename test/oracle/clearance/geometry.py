@@ -94,14 +94,15 @@ def _joint(document, headings, index, pivot):
     joint, before = document["joints"][index], headings[index - 1]
     phi = headings[index] - before
     left, right = links(joint, phi)
-    places = on_left(joint, left, 0.5 * joint["lL"]), on_right(joint, phi, right, 0.5 * joint["lR"])
-    found = [
-        Mass(mass, mass * long**2 / 12.0, place.seen_from(pivot, before).value)
-        for mass, long, place in zip((joint.get("mL", 0.0), joint.get("mR", 0.0)), (joint["lL"], joint["lR"]), places, strict=True)
-    ]
+    both = (
+        (joint.get("mL", 0.0), joint["lL"], on_left(joint, left, 0.5 * joint["lL"])),
+        (joint.get("mR", 0.0), joint["lR"], on_right(joint, phi, right, 0.5 * joint["lR"])),
+    )
+    found = [Mass(m, m * long**2 / 12.0, middle.seen_from(pivot, before).value) for m, long, middle in both]
     barrel, rod = pins(document, headings, index)
     axis = (rod - barrel) / abs(rod - barrel)
-    for part, pin, inwards in ((joint["cylinder"].get("barrel"), barrel, axis), (joint["cylinder"].get("rod"), rod, -axis)):
+    for name, pin, inwards in (("barrel", barrel, axis), ("rod", rod, -axis)):
+        part = joint["cylinder"].get(name)
         if part:
             found.append(Mass(part["mass"], part["inertia"], pin + part["com"] * inwards))
     return found

@@ -69,7 +69,7 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
     """
     now, end, state = float(times[0]), float(times[-1]), np.array(start, dtype=float)
     touching = gap(now, state)[0] >= 0.0
-    entry = abs(gap(now, state)[1]) if touching else None
+    entry = max(gap(now, state)[1], 0.0) if touching else None
     begun, peaks, deepest = now, 0, 0.0
     rows, entries, episodes = [], [], []
     stops = [*sorted(t for t in breaks if now < t < end), end]

@@ -66,7 +66,7 @@ def test_a_stop_lifts_the_pin_off_and_solvers_agree():
     start = geometry.cylinder_length(document, HEADINGS[:1], 0)
     drive, times = own_pair(rigid.move(start, 0.03, 0.2)), np.linspace(0.0, 0.21, 211)
     rest = boom.rest(start, 0.5)
-    runs = [boom.follow(drive, rest, times, [0.2], tolerance, method) for tolerance, method in ((1e-8, "LSODA"), (1e-7, "Radau"))]
+    runs = [boom.follow(drive, rest, times, [0.2], *solver) for solver in ((1e-8, "LSODA"), (1e-7, "Radau"))]
     assert len(runs[0].episodes) > 3 and len(runs[0].episodes) == len(runs[1].episodes)
     starts = [[episode.start for episode in run.episodes] for run in runs]
     assert starts[0] == pytest.approx(starts[1], abs=1e-5)

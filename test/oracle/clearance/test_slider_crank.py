@@ -70,3 +70,11 @@ def test_exudyn_agrees(law, restitution):
     assert np.abs(offsets) == pytest.approx(np.interp(times, run.times, expected), abs=2e-6)
     assert places == pytest.approx(np.interp(times, run.times, run.states[:, 1]), abs=2e-6)
     assert np.abs(offsets).max() - mechanism.contact.clearance == pytest.approx(run.episodes[0].depth, rel=5e-3)
+
+
+def test_tighter_tolerances_converge():
+    """Time and speed of the fourth touch, against the run at 1e-11."""
+    touches = [demonstration().run(0.1, 11, tolerance).episodes[3] for tolerance in (1e-5, 1e-7, 1e-9, 1e-11)]
+    errors = [abs(touch.entry / touches[-1].entry - 1.0) for touch in touches[:-1]]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-5
