@@ -26,7 +26,8 @@ def pins(document, headings, index):
         rod = pivot + complex(*document["sections"][0]["rod_pin"]) * exp(1j * headings[0])
         return complex(*document["base"]["cylinder_pin"]), rod
     before = headings[index - 1]
-    rod = rod_pin(joint, headings[index] - before).seen_from(pivot, before).value
+    phi = headings[index] - before
+    rod = rod_pin(joint, phi, *links(joint, phi)).seen_from(pivot, before).value
     return pivot + complex(*joint["C"]) * exp(1j * before), rod
 
 

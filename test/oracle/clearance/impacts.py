@@ -105,12 +105,19 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
 
 def _events(gap, touching):
     """Of the gap's change of sign, which ends a piece, and of its maxima."""
+    last = {}
+
+    def once(time, state):
+        if time not in last:
+            last.clear()
+            last[time] = gap(time, state)
+        return last[time]
 
     def crossing(time, state, entry):
-        return gap(time, state)[0]
+        return once(time, state)[0]
 
     def turning(time, state, entry):
-        return gap(time, state)[1]
+        return once(time, state)[1]
 
     crossing.terminal, crossing.direction = True, -1.0 if touching else 1.0
     turning.direction = -1.0

@@ -25,9 +25,8 @@ def links(joint, phi):
     return Turn(phase(a), first[0], second[0]), Turn(phase(b), first[1], second[1])
 
 
-def rod_pin(joint, phi):
-    """Where the rod is pinned, a `Point` over phi."""
-    left, right = links(joint, phi)
+def rod_pin(joint, phi, left, right):
+    """Where the rod is pinned, a `Point` over phi, given the links there."""
     if joint["kind"] == "B3":
         return on_right(joint, phi, right, joint["lR"] - complex(*joint["R"]))
     return on_left(joint, left, complex(*joint["R"]) if joint["kind"] == "B2" else joint["lL"])

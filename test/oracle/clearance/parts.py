@@ -70,13 +70,13 @@ class SixBar:
         joint, angle, turn = self.joint, phi - self.before, Turn(phi, 1.0, 0.0)
         left, right = links(joint, angle)
         long, short = joint["lL"], joint["lR"]
-        light, heavy = joint.get("mR", 0.0), joint.get("mL", 0.0)
+        one, other = joint.get("mL", 0.0), joint.get("mR", 0.0)
         bodies = [
             (self.body, Point(self.pivot, 0j, 0j) + turn.arm(self.body.at), turn),
-            (Mass(heavy, heavy * long**2 / 12.0, 0j), self._fixed(on_left(joint, left, 0.5 * long)), left),
-            (Mass(light, light * short**2 / 12.0, 0j), self._fixed(on_right(joint, angle, right, 0.5 * short)), right),
+            (Mass(one, one * long**2 / 12.0, 0j), self._fixed(on_left(joint, left, 0.5 * long)), left),
+            (Mass(other, other * short**2 / 12.0, 0j), self._fixed(on_right(joint, angle, right, 0.5 * short)), right),
         ]
-        return _placed(bodies, self._fixed(rod_pin(joint, angle)))
+        return _placed(bodies, self._fixed(rod_pin(joint, angle, left, right)))
 
     def tip_at(self, phi):
         """Complex, m."""
