@@ -5,8 +5,9 @@ from __future__ import annotations
 from cmath import exp
 
 from . import geometry
+from .cylinder import Cylinder
 from .parts import Lever, SixBar
-from .pinned_boom import Cylinder, PinnedBoom
+from .pinned_boom import PinnedBoom
 
 
 def freed(document, headings, index, contact):

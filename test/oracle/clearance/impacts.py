@@ -21,7 +21,7 @@ class Episode:
     entry : float
         Approach speed at the touch, m/s.
     exit : float
-        Speed of separation at the release, m/s.
+        Speed of separation at the release, m/s; nan where the motion ends in contact.
     peaks : int
         Maxima of the penetration. One is an impact; several mean that the pin follows the bush.
     depth : float
@@ -67,40 +67,29 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
     -------
     Motion
     """
-    now, end, state = float(times[0]), float(times[-1]), np.array(start, dtype=float)
-    touching = gap(now, state)[0] >= 0.0
-    entry = max(gap(now, state)[1], 0.0) if touching else None
-    begun, peaks, deepest = now, 0, 0.0
-    rows, entries, episodes = [], [], []
-    stops = [*sorted(t for t in breaks if now < t < end), end]
-    for _ in range(MOST):
-        crossing, turning = _events(gap, touching)
-        found = solve_ivp(
-            rates, (now, stops[0]), state, method, dense_output=True, events=[crossing, turning], args=(entry,),
-            rtol=rtol, atol=atol, max_step=longest,
-        )  # fmt: skip
-        if not found.success:
-            raise ArithmeticError(f"t = {found.t[-1]:g} s: {found.message}")
-        inside = times[(times >= now) & ((times < found.t[-1]) | (found.t[-1] == end))]
-        rows += list(found.sol(inside).T) if len(inside) else []
-        entries += [np.nan if entry is None else entry] * len(inside)
-        now, state = float(found.t[-1]), found.y[:, -1]
-        if touching:
-            tops = [gap(t, y)[0] for t, y in zip(found.t_events[1], found.y_events[1], strict=True)]
-            peaks, deepest = peaks + len(tops), max([deepest, *tops])
-        if found.status == 1:
-            speed = abs(gap(now, state)[1])
-            if touching:
-                episodes.append(Episode(begun, now, entry, speed, peaks, deepest))
-            touching, begun, peaks, deepest = not touching, now, 0, 0.0
-            entry = speed if touching else None
-        elif now == end:
-            if touching:
-                episodes.append(Episode(begun, now, entry, np.nan, peaks, max(deepest, gap(now, state)[0])))
-            return Motion(times, np.array(rows), np.array(entries), episodes)
-        else:
-            stops.pop(0)
-    raise ArithmeticError(f"more than {MOST} touches by t = {now:g} s")
+    stops = [*sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
+    options = {"method": method, "rtol": rtol, "atol": atol, "max_step": longest}
+    pieces = list(_pieces(rates, gap, times[0], np.array(start, dtype=float), stops, options))
+    states, entries = _rows(pieces, times)
+    return Motion(times, states, entries, _episodes(pieces, gap))
+
+
+def _pieces(rates, gap, now, state, stops, options):
+    """Solutions between touches, releases and stops, each with the entry speed that held."""
+    depth, rate = gap(now, state)
+    entry = max(rate, 0.0) if depth >= 0.0 else None
+    count = 0
+    for stop in stops:
+        while now < stop:
+            events = _events(gap, entry is not None)
+            found = solve_ivp(rates, (now, stop), state, dense_output=True, events=events, args=(entry,), **options)
+            count += 1
+            if not found.success or count > MOST:
+                raise ArithmeticError(f"t = {found.t[-1]:g} s, after {count} pieces: {found.message}")
+            yield found, entry
+            now, state = found.t[-1], found.y[:, -1]
+            if found.status == 1:
+                entry = abs(gap(now, state)[1]) if entry is None else None
 
 
 def _events(gap, touching):
@@ -122,3 +111,26 @@ def _events(gap, touching):
     crossing.terminal, crossing.direction = True, -1.0 if touching else 1.0
     turning.direction = -1.0
     return crossing, turning
+
+
+def _rows(pieces, times):
+    """States and entry speeds at given times; a touch belongs to what follows it."""
+    which = np.searchsorted([found.t[0] for found, _ in pieces], times, side="right") - 1
+    states = [pieces[k][0].sol(time) for k, time in zip(which, times, strict=True)]
+    entries = [np.nan if pieces[k][1] is None else pieces[k][1] for k in which]
+    return np.array(states), np.array(entries)
+
+
+def _episodes(pieces, gap):
+    episodes, begun, tops = [], None, []
+    for found, entry in pieces:
+        if entry is None:
+            continue
+        begun = found.t[0] if begun is None else begun
+        tops += [gap(*top)[0] for top in zip(found.t_events[1], found.y_events[1], strict=True)]
+        left, released = gap(found.t[-1], found.y[:, -1]), found.status == 1
+        if released or found is pieces[-1][0]:
+            depth, speed = max([*tops, left[0]]), -left[1] if released else np.nan
+            episodes.append(Episode(begun, found.t[-1], entry, speed, len(tops), depth))
+            begun, tops = None, []
+    return episodes

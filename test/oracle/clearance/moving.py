@@ -51,3 +51,8 @@ def lumped(masses):
     mass = sum(body.mass for body in masses)
     at = sum(body.mass * body.at for body in masses) / mass
     return Mass(mass, sum(body.inertia + body.mass * abs(body.at - at) ** 2 for body in masses), at)
+
+
+def dot(a, b):
+    """Scalar product of two vectors of the plane."""
+    return a.real * b.real + a.imag * b.imag
