@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -158,7 +159,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         sample = self._intake.put(stream, stamp, msg)
         if sample is None:
             return
+        began = perf_counter()
         report = self._twin.update(sample)
-        self._diagnostics.reported(report)
+        self._diagnostics.took(sample, report, perf_counter() - began)
         for key, filled in self._outlet.fill(report):
             self._outputs[key].publish(filled)

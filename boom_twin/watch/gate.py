@@ -1,0 +1,56 @@
+"""The level of one quantity, with hysteresis in value and in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+from .status import Level
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Above these a quantity has that level; by default it never does."""
+
+    warn: float = inf
+    error: float = inf
+    stale: float = inf
+
+    def level(self, value: float, held: Level, release: float) -> Level:
+        """The level of `value`, where a level that is `held` is left below `release` times its limit."""
+        for level, limit in ((Level.STALE, self.stale), (Level.ERROR, self.error), (Level.WARN, self.warn)):
+            if value > limit * (release if level <= held else 1.0):
+                return level
+        return Level.OK
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long (s) a worse and a better level must last before it counts, and the share of a limit where it is left."""
+
+    raise_after: float
+    clear_after: float
+    release: float
+
+    @property
+    def none(self) -> Patience:
+        """No waiting."""
+        return Patience(0.0, 0.0, self.release)
+
+
+class Gate:
+    """The level of one quantity; a NaN is no reason to change it to a worse one."""
+
+    def __init__(self) -> None:
+        self.level = Level.OK
+        self._agreed: float | None = None
+
+    def update(self, value: float, limits: Limits, patience: Patience, now: float) -> Level:
+        """The level at the time `now` (s, of a clock that only goes forward)."""
+        seen = limits.level(value, self.level, patience.release)
+        if seen == self.level or self._agreed is None:
+            self._agreed = now
+        wait = patience.raise_after if seen > self.level else patience.clear_after
+        if now - self._agreed >= wait:
+            self.level, self._agreed = seen, now
+        return self.level

@@ -1,0 +1,65 @@
+"""Several quantities of one component judged into one status."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from math import inf
+
+from ..settings import Settings
+from .gate import Gate, Limits, Patience
+from .status import Level, Status
+
+
+class Judge:
+    """Judges one component again and again: `begin`, any number of `check` and `note`, `finish`.
+
+    Parameters
+    ----------
+    name : str
+        Of the component.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._gates: defaultdict[str, Gate] = defaultdict(Gate)
+        self._level: Level | None = None
+        self._since = 0.0
+
+    @property
+    def level(self) -> Level | None:
+        """As it was told last; None before."""
+        return self._level
+
+    def begin(self, now: float, settings: Settings) -> None:
+        """A new look, at the time `now` (s, of a clock that only goes forward)."""
+        self._now = now
+        self._patience = Patience(settings.raise_after, settings.clear_after, settings.release)
+        self._faults: list[tuple[Level, str]] = []
+        self._values: dict[str, str | int | float] = {}
+
+    def note(self, key: str, value: str | int | float) -> None:
+        """Tell a value that is not judged."""
+        self._values[key] = value
+
+    def check(self, key: str, value: float, limits: Limits, words: str, at_once: bool = False) -> None:
+        """Judge a value, and tell it with its limits; `words` say what is wrong if it is, `at_once` without waiting."""
+        self._values[key] = value
+        for name, limit in (("warn", limits.warn), ("error", limits.error), ("stale", limits.stale)):
+            if limit < inf:
+                self._values[f"{key}_{name}"] = limit
+        level = self._gates[key].update(value, limits, self._patience.none if at_once else self._patience, self._now)
+        self.fault(level, words)
+
+    def fault(self, level: Level, words: str) -> None:
+        """A level that needs no judging."""
+        if level != Level.OK:
+            self._faults.append((level, words))
+
+    def finish(self, clock: float, message: str) -> Status:
+        """The worst of it; `message` if all is well. `clock` (s) is the time that people know, for ``since_s``."""
+        faults = sorted(self._faults, key=lambda fault: -fault[0])
+        level = faults[0][0] if faults else Level.OK
+        if level != self._level:
+            self._level, self._since = level, clock
+        told = "; ".join(words for _, words in faults) or message
+        return Status(self.name, level, told, {**self._values, "since_s": f"{self._since:.3f}"})
