@@ -13,7 +13,8 @@ def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> f
         p = erf(q / (2 sqrt(2) s)),
 
     reached by a sensor that stands still in the middle of a step; N equal readings have p^(N - 1). A sensor that is coarse
-    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9), one without noise cannot be told from a frozen one.
+    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9); one without noise cannot be told
+    from a frozen one.
 
     Parameters
     ----------
