@@ -73,5 +73,5 @@ class StreamWatch:
         self._told = self.count
         self.lag, self._least = self._least, nan
         stamps = np.array([sample.stamp for sample in samples], dtype=np.int64)
-        table = np.array([sample.values for sample in samples]).reshape(len(samples), len(self._channels))
+        table = np.concatenate([np.zeros(0), *(sample.values for sample in samples)]).reshape(-1, len(self._channels))
         return [channel.look(stamps, table[:, i], refused) for i, channel in enumerate(self._channels)]

@@ -136,7 +136,8 @@ class TwinWatch:
         """Every channel that ever had a residual."""
         taken, self._residuals = self._residuals, []
         for names in dict.fromkeys(each.names for each in taken):
-            table = np.array([each.normalised for each in taken if each.names == names])
-            for name, column in zip(names, table.T, strict=True):
+            those = [each for each in taken if each.names == names]
+            values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
+            for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name)).take(column, now)
         return [judge.status(self.settings, now, clock) for judge in self._judges.values()]
