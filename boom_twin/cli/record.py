@@ -6,6 +6,7 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from .play import positive
 if TYPE_CHECKING:
     from ..ros.recorder import Count
     from ..ros.wanted import Wanted
+    from ..settings import Settings
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -55,16 +57,18 @@ def run(args: Namespace) -> int:
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    wanted, scene, parameters = _wanted(args), _scene_text(args.scene), _parameters_text(args.params)
+    wanted, scene, settings, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
-    Sheet(__version__, scene, parameters, types, args.note, args.origin).write(args.out)
+    sheet = Sheet(__version__, scene, parameters, types, args.note, args.origin)
+    sheet.write(args.out)
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, lambda: bool(signals) or time.monotonic() >= end, _say)
+        counts = record(storage, wanted, settings, lambda: bool(signals) or time.monotonic() >= end, _say)
     _tell(counts)
+    sheet.write(args.out, [asdict(count) for count in counts])
     if not any(count.received for count in counts):
         raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
     return 0
@@ -103,12 +107,11 @@ def _scene_text(source: str | None) -> str:
     return default_text() if source is None else Path(source).read_text(encoding="utf-8")
 
 
-def _parameters_text(path: Path | None) -> str:
-    """Text of the parameter file, which must be valid."""
+def _parameters(path: Path | None) -> tuple[Settings, str]:
+    """The parameter file, and its text."""
     from ..settings import DEFAULT_FILE, load_settings
 
-    load_settings(path)
-    return (path or DEFAULT_FILE).read_text(encoding="utf-8")
+    return load_settings(path), (path or DEFAULT_FILE).read_text(encoding="utf-8")
 
 
 def size(text: str) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from ..io.topics import Topic
@@ -37,6 +38,10 @@ class Board:
         message = DiagnosticArray(status=[self._message(status) for status in statuses])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
+
+    def settle(self) -> None:
+        """Wait until those that listen have got it, at most a second."""
+        self._publisher.wait_for_all_acked(Duration(seconds=1))
 
     def _log(self, status: Status) -> None:
         logger, text = self._node.get_logger(), f"{status.name}: {status.message}"

@@ -35,6 +35,10 @@ class Process:
             command, stdin=stdin, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True
         )
 
+    @property
+    def pid(self) -> int:
+        return self._child.pid
+
     def said(self) -> str:
         return self._log.read_text()
 

@@ -1,0 +1,93 @@
+"""Whether a recording is complete, on the disk, and has room."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+
+from ..settings import Settings
+from .gate import Limits
+from .judge import Judge
+from .status import Level, Status
+
+
+@dataclass(frozen=True, slots=True)
+class DiskState:
+    """What is on the disk.
+
+    Attributes
+    ----------
+    lag : float
+        Age of the oldest message that a loss of power would cost, s.
+    waiting : int
+        Bytes of messages in memory.
+    written : int
+        Bytes of all files.
+    free : int
+        Bytes left on the disk.
+    left : float
+        Time until the disk is full at the pace of this recording so far, s.
+    """
+
+    lag: float
+    waiting: int
+    written: int
+    free: int
+    left: float
+
+
+@dataclass(frozen=True, slots=True)
+class TopicState:
+    """Messages of one topic: received, and published but never received (None: not known)."""
+
+    received: int
+    missed: int | None
+
+
+class RecordingJudge:
+    """Judges one recording."""
+
+    def __init__(self) -> None:
+        self._judge = Judge("recording")
+
+    def status(
+        self, topics: Mapping[str, TopicState], disk: DiskState, end: str | None, settings: Settings, now: float, clock: float
+    ) -> Status:
+        """State of the recording.
+
+        Parameters
+        ----------
+        topics : dict of str to TopicState
+        disk : DiskState
+        end : str or None
+            Why it ended too early; empty if it ended in order, None while it runs.
+        settings : Settings
+        now, clock : float
+            As for `boom_twin.watch.sensor.SensorJudge`.
+        """
+        judge, missed = self._judge, sum(topic.missed or 0 for topic in topics.values())
+        judge.begin(now, settings)
+        if end:
+            judge.fault(Level.ERROR, end)
+        judge.check("never_arrived", missed, Limits(warn=0), f"{missed} messages were published and never arrived", True)
+        told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
+        judge.check("lag_s", disk.lag, Limits(settings.lag_warn, settings.lag_error), told, at_once=True)
+        self._check_room(disk, settings)
+        judge.note("waiting_bytes", disk.waiting)
+        judge.note("written_bytes", disk.written)
+        for name, topic in topics.items():
+            judge.note(f"received {name}", topic.received)
+            judge.note(f"never_arrived {name}", "nan" if topic.missed is None else topic.missed)
+        return judge.finish(clock, "running" if end is None else "ended")
+
+    def _check_room(self, disk: DiskState, settings: Settings) -> None:
+        """Less is worse here, so the limit over the time is judged."""
+        short = settings.disk_warn / disk.left if disk.left > 0.0 else inf
+        told = f"the disk is full in {disk.left:.0f} s"
+        judge, limits = self._judge, Limits(1.0, settings.disk_warn / settings.disk_error)
+        judge.note("disk_free_bytes", disk.free)
+        judge.note("disk_left_s", disk.left)
+        judge.note("disk_left_s_warn", settings.disk_warn)
+        judge.note("disk_left_s_error", settings.disk_error)
+        judge.check("disk_shortage", short, limits, told)
