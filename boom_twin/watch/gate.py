@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import nan
 
 from .status import Level
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Above these a quantity has that level; by default it never does."""
+    """Above these a quantity has that level, or below these if it is `low` that is bad; NaN is no limit."""
 
-    warn: float = inf
-    error: float = inf
-    stale: float = inf
+    warn: float = nan
+    error: float = nan
+    stale: float = nan
+    low: bool = False
 
     def level(self, value: float, held: Level, release: float) -> Level:
-        """The level of `value`, where a level that is `held` is left below `release` times its limit."""
+        """The level of `value`, where a level that is `held` is left at `release` times its limit (if low: over `release`)."""
         for level, limit in ((Level.STALE, self.stale), (Level.ERROR, self.error), (Level.WARN, self.warn)):
-            if value > limit * (release if level <= held else 1.0):
+            share = release if level <= held else 1.0
+            if value < limit / share if self.low else value > limit * share:
                 return level
         return Level.OK
 

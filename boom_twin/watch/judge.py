@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from math import inf
+from math import isfinite
 
 from ..settings import Settings
 from .gate import Gate, Limits, Patience
@@ -45,7 +45,7 @@ class Judge:
         """Judge a value, and tell it with its limits; `words` say what is wrong if it is, `at_once` without waiting."""
         self._values[key] = value
         for name, limit in (("warn", limits.warn), ("error", limits.error), ("stale", limits.stale)):
-            if limit < inf:
+            if isfinite(limit):
                 self._values[f"{key}_{name}"] = limit
         level = self._gates[key].update(value, limits, self._patience.none if at_once else self._patience, self._now)
         self.fault(level, words)

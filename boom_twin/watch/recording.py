@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 
 from ..settings import Settings
 from .gate import Limits
@@ -73,21 +72,12 @@ class RecordingJudge:
         judge.check("never_arrived", missed, Limits(warn=0), f"{missed} messages were published and never arrived", True)
         told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
         judge.check("lag_s", disk.lag, Limits(settings.lag_warn, settings.lag_error), told, at_once=True)
-        self._check_room(disk, settings)
+        room = Limits(settings.disk_warn, settings.disk_error, low=True)
+        judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
+        judge.note("disk_free_bytes", disk.free)
         judge.note("waiting_bytes", disk.waiting)
         judge.note("written_bytes", disk.written)
         for name, topic in topics.items():
             judge.note(f"received {name}", topic.received)
             judge.note(f"never_arrived {name}", "nan" if topic.missed is None else topic.missed)
         return judge.finish(clock, "running" if end is None else "ended")
-
-    def _check_room(self, disk: DiskState, settings: Settings) -> None:
-        """Less is worse here, so the limit over the time is judged."""
-        short = settings.disk_warn / disk.left if disk.left > 0.0 else inf
-        told = f"the disk is full in {disk.left:.0f} s"
-        judge, limits = self._judge, Limits(1.0, settings.disk_warn / settings.disk_error)
-        judge.note("disk_free_bytes", disk.free)
-        judge.note("disk_left_s", disk.left)
-        judge.note("disk_left_s_warn", settings.disk_warn)
-        judge.note("disk_left_s_error", settings.disk_error)
-        judge.check("disk_shortage", short, limits, told)

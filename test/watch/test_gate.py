@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 
 import pytest
 
@@ -39,6 +39,12 @@ def test_a_level_must_last(values: list[float], expected: str) -> None:
 
 def test_without_patience_a_level_counts_at_once() -> None:
     assert levels([0, 1.5, 2.5, 0], PATIENCE.none) == "OWEO"
+
+
+def test_a_quantity_of_which_little_is_bad() -> None:
+    gate, limits = Gate(), Limits(warn=100.0, error=10.0, low=True)
+    values = [inf, 101.0, 99.0, 9.0, 11.0, 13.0, 120.0, 126.0]
+    assert "".join(gate.update(value, limits, PATIENCE.none, 0.0).name[0] for value in values) == "OOWEEWWO"
 
 
 def test_a_status_tells_value_limit_and_since_when() -> None:
