@@ -35,7 +35,7 @@ from boom_twin.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 CLIENT, MODULES = ROOT / "test" / "clients" / "read.cjs", ROOT / ".node"
-NODE_JS = shutil.which("node", path=MODULES / "venv" / "bin") or shutil.which("node")
+NODE_JS = shutil.which("node") or shutil.which("node", path=MODULES / "venv" / "bin")
 IS_INSTALLED = NODE_JS is not None and (MODULES / "node_modules").is_dir()
 TOPICS = load_topics()
 Values = dict[str, list[list[str]]]
