@@ -6,7 +6,8 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,15 +64,32 @@ def run(args: Namespace) -> int:
     types = {each.name: each.type for each in wanted}
     sheet = Sheet(__version__, scene, parameters, types, args.note, args.origin)
     sheet.write(args.out)
+
+    def meet(twin: Mapping[str, object]) -> None:
+        nonlocal sheet
+        sheet = replace(sheet, twin=twin)
+        sheet.write(args.out)
+        _compare(str(twin.get("scene", "")), scene)
+
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, settings, lambda: bool(signals) or time.monotonic() >= end, _say)
+        counts = record(storage, wanted, settings, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
     _tell(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if not any(count.received for count in counts):
         raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
     return 0
+
+
+def _compare(path: str, scene: str) -> None:
+    """Say if the twin's scene is not the one in session.yaml."""
+    try:
+        is_same = _scene_text(path or None) == scene
+    except BoomTwinError:
+        is_same = False
+    if not is_same:
+        _say(f"warning: the twin's scene is {path or 'the default one'}, session.yaml holds another. Give it with --scene.")
 
 
 def _say(text: str) -> None:

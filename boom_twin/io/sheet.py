@@ -31,6 +31,8 @@ class Sheet:
         Type by topic that is to be recorded; None where it was not known at the start.
     note, origin : str or None
         Of the operator.
+    twin : dict of str to object
+        The parameters of the running twin; empty as long as there is none.
     started : datetime
     """
 
@@ -40,6 +42,7 @@ class Sheet:
     topics: Mapping[str, str | None]
     note: str | None = None
     origin: str | None = None
+    twin: Mapping[str, object] = field(default_factory=dict)
     started: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
@@ -64,6 +67,7 @@ class Sheet:
             "origin": self.origin,
             "note": self.note,
             "topics": dict(self.topics),
+            "twin": dict(self.twin),
             "scene_sha256": hashlib.sha256(self.scene.encode()).hexdigest(),
             "scene": LiteralScalarString(self.scene),
             "parameters": LiteralScalarString(self.parameters),

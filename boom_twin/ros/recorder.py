@@ -16,6 +16,7 @@ from ..io.topics import Output, load_topics
 from ..settings import Settings
 from ..watch.recording import RecordingJudge, TopicState
 from .board import Board
+from .remote import RemoteParameters
 from .wanted import Wanted, subscription_of
 
 NAME = "boom_twin_recorder"
@@ -100,6 +101,7 @@ class _Recording:
         self.node, self.storage, self._settings = node, storage, settings
         self.channels = [_Channel(each, storage) for each in wanted]
         self._board, self._judge = Board(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self.twin = RemoteParameters(node)
 
     def look(self) -> bool:
         """Subscribe to what has come up; whether every required topic has a publisher. BagError if the disk fails."""
@@ -120,7 +122,12 @@ class _Recording:
 
 
 def record(
-    storage: Storage, wanted: Sequence[Wanted], settings: Settings, stopped: Callable[[], bool], tell: Callable[[str], None]
+    storage: Storage,
+    wanted: Sequence[Wanted],
+    settings: Settings,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+    meet: Callable[[Mapping[str, object]], None],
 ) -> list[Count]:
     """Record until `stopped`; needs an initialised rclpy. Log times are those of the reception.
 
@@ -135,6 +142,8 @@ def record(
         Asked after every message, and ten times a second.
     tell : callable
         Told in words when recording begins, and once every required topic has a publisher (`COMPLETE`).
+    meet : callable
+        Told the parameters of the twin, if there is one.
 
     Returns
     -------
@@ -152,7 +161,7 @@ def record(
     recording = _Recording(node, storage, wanted, settings)
     try:
         try:
-            _spin(recording, stopped, tell)
+            _spin(recording, stopped, tell, meet)
         finally:
             written = storage.close()
         counts = [channel.finish(written) for channel in recording.channels]
@@ -168,7 +177,12 @@ def record(
     return counts
 
 
-def _spin(recording: _Recording, stopped: Callable[[], bool], tell: Callable[[str], None]) -> None:
+def _spin(
+    recording: _Recording,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+    meet: Callable[[Mapping[str, object]], None],
+) -> None:
     """Receive until `stopped`."""
     executor = SingleThreadedExecutor()
     executor.add_node(recording.node)
@@ -181,6 +195,8 @@ def _spin(recording: _Recording, stopped: Callable[[], bool], tell: Callable[[st
             if recording.look() and not is_complete:
                 is_complete = True
                 tell(COMPLETE)
+            if parameters := recording.twin.look():
+                meet(parameters)
             if looks % LOOKS == 0:
                 recording.tell()
         executor.spin_once(timeout_sec=WAKE)

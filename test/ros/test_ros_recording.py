@@ -32,6 +32,8 @@ from boom_twin.io.writer import SessionWriter
 from boom_twin.records import Stream
 from boom_twin.replay import replay
 from boom_twin.scene import load_scene
+from boom_twin.scene.load import default_text
+from boom_twin.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 CLIENT, MODULES = ROOT / "test" / "clients" / "read.cjs", ROOT / ".node"
@@ -43,12 +45,17 @@ Values = dict[str, list[list[str]]]
 
 @pytest.fixture(scope="module")
 def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> Path:
-    """Inputs and outputs of a live run, recorded in a process of its own into several files."""
+    """Inputs and outputs of a live run, recorded in a process of its own into several files.
+
+    The node's scene has a text of its own, which the recorder is not given.
+    """
     from boom_twin.ros.player import Player
     from boom_twin.ros.recorder import COMPLETE
 
     out = tmp_path_factory.mktemp("recording") / "bag"
-    node = spawn_node()
+    scene = out.parent / "scene.yaml"
+    scene.write_text(default_text() + "# a copy\n")
+    node = spawn_node("-p", f"scene:={scene}")
     node.wait_for("active;")
     recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--split-duration", "1.5")
     player = Player(scan(bag))
@@ -59,6 +66,7 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
     time.sleep(1.0)
     player.close()
     assert recorder.stop(signal.SIGINT) == 0, recorder.said()
+    assert f"warning: the twin's scene is {scene}, session.yaml holds another" in recorder.said()
     assert node.stop(signal.SIGINT) == 0, node.said()
     return out
 
@@ -98,6 +106,7 @@ def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
         name: len(messages) for name, messages in values.items()
     }
     assert len(list(recorded.glob("*.mcap"))) >= 3
+    assert sheet["twin"] == {"scene": str(recorded.parent / "scene.yaml"), **Settings().model_dump()}
 
 
 def test_the_reader_of_mcap_gives_the_same_bytes(recorded: Path) -> None:
