@@ -162,7 +162,7 @@ class Storage:
                 self._write(item)
 
     def _note(self, now: float) -> None:
-        """All that was taken until then is on the disk; asked here, because a disk that stalls does not answer this either."""
+        """All that was taken until `now` is on the disk; its room is asked here, because a stalled disk holds up that too."""
         self._safe, self._flushed, self._written = self._taken, now, self._bag.written
         self._free = disk_usage(self._bag.directory).free
 

@@ -30,11 +30,9 @@ class Board:
         self._levels: dict[str, Level] = {}
 
     def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all, and log those whose level is another than before; one that is new is taken to have been well."""
+        """Publish all, and log in one line those whose level is another than before; a new one is taken to have been well."""
         before, self._levels = self._levels, {status.name: status.level for status in statuses}
-        for status in statuses:
-            if before.get(status.name, Level.OK) != status.level:
-                self._log(status)
+        self._log([status for status in statuses if before.get(status.name, Level.OK) != status.level])
         message = DiagnosticArray(status=[self._message(status) for status in statuses])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
@@ -43,12 +41,16 @@ class Board:
         """Wait until those that listen have got it, at most a second."""
         self._publisher.wait_for_all_acked(Duration(seconds=1))
 
-    def _log(self, status: Status) -> None:
-        logger, text = self._node.get_logger(), f"{status.name}: {status.message}"
-        if status.level == Level.OK:
-            logger.info(text)
-        else:
-            logger.warning(text)
+    def _log(self, changed: Sequence[Status]) -> None:
+        """Names of the same state together: the sensors of a topic fall silent as one."""
+        groups: dict[str, list[str]] = {}
+        for status in changed:
+            groups.setdefault(status.message, []).append(status.name)
+        text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
+        if any(status.level != Level.OK for status in changed):
+            self._node.get_logger().warning(text)
+        elif changed:
+            self._node.get_logger().info(text)
 
     def _message(self, status: Status) -> DiagnosticStatus:
         return DiagnosticStatus(

@@ -30,6 +30,8 @@ class Figures:
         Readings a second, by their stamps; NaN where fewer than two are known.
     gap : float
         Longest step between their stamps, s.
+    gaps : int
+        Steps longer than is allowed, since listening began.
     missing, outside : float
         Share of the messages without a finite value, and with one out of range; NaN without messages.
     unchanged : int
@@ -40,6 +42,7 @@ class Figures:
     stamp: int
     rate: float
     gap: float
+    gaps: int
     missing: float
     outside: float
     unchanged: int
@@ -60,9 +63,9 @@ class Channel:
 
     def forget(self) -> None:
         """Begin anew."""
-        self._value, self._stamp, self._unchanged = nan, 0, 0
+        self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
 
-    def look(self, stamps: NDArray[np.int64], values: Array, refused: int) -> Figures:
+    def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> Figures:
         """The figures of what came since the last look.
 
         Parameters
@@ -73,17 +76,21 @@ class Channel:
             In the sensor's unit; NaN where the message had none.
         refused : int
             Messages that held nothing of use for any sensor.
+        longest : float
+            Step between stamps that is allowed, s.
         """
         messages, usable = len(values) + refused, np.isfinite(values)
         stamps, values = stamps[usable], values[usable]
         outside = np.count_nonzero((values < self._low) | (values > self._high))
         steps = self._take(stamps, values)
         total = float(steps.sum())
+        self._gaps += int(np.count_nonzero(steps > longest))
         return Figures(
             value=self._value,
             stamp=self._stamp,
             rate=len(steps) / total if total > 0.0 else nan,
             gap=float(steps.max(initial=0.0)),
+            gaps=self._gaps,
             missing=1.0 - len(values) / messages if messages else nan,
             outside=outside / messages if messages else nan,
             unchanged=self._unchanged,

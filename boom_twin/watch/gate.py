@@ -14,12 +14,11 @@ class Limits:
 
     warn: float = nan
     error: float = nan
-    stale: float = nan
     low: bool = False
 
     def level(self, value: float, held: Level, release: float) -> Level:
         """The level of `value`, where a level that is `held` is left at `release` times its limit (if low: over `release`)."""
-        for level, limit in ((Level.STALE, self.stale), (Level.ERROR, self.error), (Level.WARN, self.warn)):
+        for level, limit in ((Level.ERROR, self.error), (Level.WARN, self.warn)):
             share = release if level <= held else 1.0
             if value < limit / share if self.low else value > limit * share:
                 return level
@@ -33,11 +32,6 @@ class Patience:
     raise_after: float
     clear_after: float
     release: float
-
-    @property
-    def none(self) -> Patience:
-        """No waiting."""
-        return Patience(0.0, 0.0, self.release)
 
 
 class Gate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 from math import isfinite
 
 from ..settings import Settings
@@ -22,6 +23,7 @@ class Judge:
     def __init__(self, name: str) -> None:
         self.name = name
         self._gates: defaultdict[str, Gate] = defaultdict(Gate)
+        self._words: dict[str, str] = {}
         self._level: Level | None = None
         self._since = 0.0
 
@@ -42,13 +44,33 @@ class Judge:
         self._values[key] = value
 
     def check(self, key: str, value: float, limits: Limits, words: str, at_once: bool = False) -> None:
-        """Judge a value, and tell it with its limits; `words` say what is wrong if it is, `at_once` without waiting."""
+        """Judge a value, and tell it with its limits.
+
+        Parameters
+        ----------
+        key : str
+        value : float
+        limits : Limits
+        words : str
+            What is wrong if it is; those that were true last are told as long as the level is held.
+        at_once : bool
+            A worse level counts at once.
+        """
         self._values[key] = value
-        for name, limit in (("warn", limits.warn), ("error", limits.error), ("stale", limits.stale)):
+        for name, limit in (("warn", limits.warn), ("error", limits.error)):
             if isfinite(limit):
                 self._values[f"{key}_{name}"] = limit
-        level = self._gates[key].update(value, limits, self._patience.none if at_once else self._patience, self._now)
-        self.fault(level, words)
+        if limits.level(value, Level.OK, 1.0) != Level.OK:
+            self._words[key] = words
+        patience = replace(self._patience, raise_after=0.0) if at_once else self._patience
+        level = self._gates[key].update(value, limits, patience, self._now)
+        self.fault(level, self._words.get(key, words))
+
+    def check_age(self, age: float, limit: float, words: str) -> None:
+        """Stale if nothing came for longer than `limit`, s; with the next message all is well."""
+        self._values |= {"age_s": age, "age_s_stale": limit}
+        if age > limit:
+            self.fault(Level.STALE, words)
 
     def fault(self, level: Level, words: str) -> None:
         """A level that needs no judging."""

@@ -69,7 +69,7 @@ class ModelWatch:
         values : dict
             Told too.
         is_active, is_fed : bool
-            Whether it is listened, and strokes come.
+            Whether the twin listens, and strokes come.
         settings : Settings
         now, clock : float
             As for `boom_twin.watch.sensor.SensorJudge`.
@@ -100,6 +100,6 @@ class ModelWatch:
         judge.note("step_mean_s", self._busy / steps if steps else nan)
         judge.note("step_longest_s", self._longest if steps else nan)
         judge.note("step_budget_s", span / steps if steps else nan)
-        told = f"a step takes {load:.0%} of the time between two strokes: raise step or look_step, or lower modes"
+        told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
         judge.check("load", load, Limits(settings.load_warn, settings.load_error), told)
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0

@@ -69,9 +69,9 @@ class RecordingJudge:
         judge.begin(now, settings)
         if end:
             judge.fault(Level.ERROR, end)
-        judge.check("never_arrived", missed, Limits(warn=0), f"{missed} messages were published and never arrived", True)
+        judge.check("never_arrived", missed, Limits(warn=0), f"{missed} messages were published and never arrived")
         told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
-        judge.check("lag_s", disk.lag, Limits(settings.lag_warn, settings.lag_error), told, at_once=True)
+        judge.check("lag_s", disk.lag, Limits(settings.lag_warn, settings.lag_error), told)
         room = Limits(settings.disk_warn, settings.disk_error, low=True)
         judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
         judge.note("disk_free_bytes", disk.free)

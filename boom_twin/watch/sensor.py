@@ -55,8 +55,9 @@ class SensorJudge:
         judge.note(f"value_{sensor.unit}", figures.value)
         judge.note("rate_Hz", figures.rate)
         told = f"no reading for {age:.1f} s" if figures.stamp else "no reading yet"
-        judge.check("age_s", age, Limits(stale=settings.stale_after), told, at_once=True)
-        judge.check("gap_s", figures.gap, Limits(settings.gap), f"gap of {figures.gap:.3f} s")
+        judge.check_age(age, settings.stale_after, told)
+        judge.check("gap_s", figures.gap, Limits(settings.gap), f"gap of {figures.gap:.3f} s", at_once=True)
+        judge.note("gaps", figures.gaps)
         share = Limits(settings.unusable_warn, settings.unusable_error)
         judge.check("missing_share", figures.missing, share, f"{figures.missing:.1%} of the messages without a value")
         self._check_range(figures, share)

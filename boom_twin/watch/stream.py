@@ -66,12 +66,12 @@ class StreamWatch:
             return self.age(now)
         return self.age(now) + max(0, self.newest - figures.stamp) * NANO
 
-    def look(self) -> list[Figures]:
-        """The figures of every channel since the last look."""
+    def look(self, longest: float) -> list[Figures]:
+        """The figures of every channel since the last look; `longest` (s) is the step between stamps that is allowed."""
         samples, self._samples = self._samples, []
         refused = max(0, self.count - self._told - len(samples))
         self._told = self.count
         self.lag, self._least = self._least, nan
         stamps = np.array([sample.stamp for sample in samples], dtype=np.int64)
         table = np.concatenate([np.zeros(0), *(sample.values for sample in samples)]).reshape(-1, len(self._channels))
-        return [channel.look(stamps, table[:, i], refused) for i, channel in enumerate(self._channels)]
+        return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]

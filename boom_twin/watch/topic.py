@@ -51,13 +51,14 @@ class TopicJudge:
         names = ", ".join(publishers.names)
         judge.note("publisher_names", names)
         told = f"{len(publishers.names)} publishers of the same readings: {names}"
-        judge.check("publishers", len(publishers.names), Limits(warn=1), told)
+        judge.note("publishers", len(publishers.names))
+        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Limits(warn=0), told)
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
         if stream.newest is None and not self._required:
             return judge.finish(clock, "not there; optional")
         told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
-        judge.check("age_s", age, Limits(stale=settings.stale_after), told, at_once=True)
+        judge.check_age(age, settings.stale_after, told)
         if stream.newest is not None:
             judge.note("newest_stamp_s", seconds(stream.newest))
             judge.note("clock_minus_stamp_s", clock - stream.newest * NANO)

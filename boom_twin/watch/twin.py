@@ -129,7 +129,7 @@ class TwinWatch:
         watch = self._streams[stream]
         return [
             judge.status(figures, watch.age_of(figures, now), self.settings, now, clock)
-            for judge, figures in zip(self._sensors[stream], watch.look(), strict=True)
+            for judge, figures in zip(self._sensors[stream], watch.look(self.settings.gap), strict=True)
         ]
 
     def _look_at_residuals(self, now: float, clock: float) -> list[Status]:

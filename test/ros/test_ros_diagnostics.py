@@ -60,6 +60,7 @@ def test_diagnostics_follow_the_strokes(node: Any, bench: Any, motion: dict[str,
     bench.strokes.publish(_strokes(101 * 10**9, [50.0, -50.0, 50.0, -50.0]))
     bench.strokes.publish(_strokes(200 * 10**9, [50.0, -50.0, 50.0, -50.0]))
     bench.until(lambda: shows(ERROR, OK))
+    assert node.said().count("silent for") == 1  # a line for the topic, its sensors and the model
     assert node.said().count("newest stamp is") == 1 and "set use_sim_time or play with --clock" in node.said()
     assert node.stop() == 0
 

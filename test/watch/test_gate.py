@@ -37,14 +37,17 @@ def test_a_level_must_last(values: list[float], expected: str) -> None:
     assert levels(values) == expected
 
 
+NONE = Patience(0.0, 0.0, 0.8)
+
+
 def test_without_patience_a_level_counts_at_once() -> None:
-    assert levels([0, 1.5, 2.5, 0], PATIENCE.none) == "OWEO"
+    assert levels([0, 1.5, 2.5, 0], NONE) == "OWEO"
 
 
 def test_a_quantity_of_which_little_is_bad() -> None:
     gate, limits = Gate(), Limits(warn=100.0, error=10.0, low=True)
     values = [inf, 101.0, 99.0, 9.0, 11.0, 13.0, 120.0, 126.0]
-    assert "".join(gate.update(value, limits, PATIENCE.none, 0.0).name[0] for value in values) == "OOWEEWWO"
+    assert "".join(gate.update(value, limits, NONE, 0.0).name[0] for value in values) == "OOWEEWWO"
 
 
 def test_a_status_tells_value_limit_and_since_when() -> None:
@@ -68,6 +71,11 @@ def test_the_worst_fault_is_told_first() -> None:
     judge = Judge("pump")
     judge.begin(0.0, Settings())
     judge.check("a", 5.0, Limits(warn=1.0), "first", at_once=True)
-    judge.check("b", 5.0, Limits(stale=1.0), "second", at_once=True)
+    judge.check_age(5.0, 1.0, "second")
     status = judge.finish(0.0, "well")
     assert (status.level, status.message) == (Level.STALE, "second; first")
+    judge.begin(1.0, Settings())
+    judge.check("a", 0.5, Limits(warn=1.0), "not true any more", at_once=True)
+    judge.check_age(0.5, 1.0, "not true any more")
+    status = judge.finish(1.0, "well")
+    assert (status.level, status.message) == (Level.WARN, "first")

@@ -23,13 +23,13 @@ ALL = dict.fromkeys(Stream, True)
 
 
 def look(stamps: np.ndarray = STAMPS, values: np.ndarray = NOISE, refused: int = 0) -> Figures:
-    return Channel(-4.0, 4.0).look(np.asarray(stamps, dtype=np.int64), np.asarray(values, dtype=float), refused)
+    return Channel(-4.0, 4.0).look(np.asarray(stamps, dtype=np.int64), np.asarray(values, dtype=float), refused, 0.1)
 
 
 def test_a_healthy_second() -> None:
     channel = Channel(-4.0, 4.0)
-    channel.look(STAMPS, NOISE, 0)
-    figures = channel.look(STAMPS + SECOND, NOISE, 0)
+    channel.look(STAMPS, NOISE, 0, 0.1)
+    figures = channel.look(STAMPS + SECOND, NOISE, 0, 0.1)
     assert figures.rate == pytest.approx(200.0) and figures.gap == pytest.approx(0.005)
     assert (figures.missing, figures.outside, figures.unchanged) == (0.0, 0.0, 0)
     assert (figures.value, figures.stamp) == (NOISE[-1], STAMPS[-1] + SECOND)
@@ -40,7 +40,7 @@ def test_missing_and_refused_readings() -> None:
     values[50:70] = nan
     figures = look(values=values, refused=20)
     assert figures.missing == pytest.approx(40 / 220)
-    assert figures.gap == pytest.approx(21 * 0.005)
+    assert figures.gap == pytest.approx(21 * 0.005) and figures.gaps == 1
     assert figures.rate == pytest.approx(179 / (199 * 0.005))
 
 
@@ -53,9 +53,9 @@ def test_readings_out_of_range() -> None:
 def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
     channel, values = Channel(), NOISE.copy()
     values[150:] = 1.0
-    counts = [channel.look(STAMPS + k * SECOND, values if k == 0 else np.ones(200), 0).unchanged for k in range(3)]
+    counts = [channel.look(STAMPS + k * SECOND, values if k == 0 else np.ones(200), 0, 0.1).unchanged for k in range(3)]
     assert counts == [49, 249, 449]
-    assert channel.look(STAMPS + 3 * SECOND, NOISE, 0).unchanged == 0
+    assert channel.look(STAMPS + 3 * SECOND, NOISE, 0, 0.1).unchanged == 0
 
 
 def test_nothing_came() -> None:
@@ -77,11 +77,11 @@ def test_a_stream_gives_each_channel_its_own() -> None:
         watch.seen(SECOND + k * 10_000_000)
         if k != 4:
             watch.took(Sample(Stream.ANGLES, SECOND + k * 10_000_000, np.array([0.1 * k, nan if k > 6 else 2.0])))
-    first, second = watch.look()
+    first, second = watch.look(0.1)
     assert (watch.count, first.missing, first.outside) == (10, pytest.approx(0.1), 0.0)
     assert (second.missing, second.outside, second.unchanged) == (pytest.approx(0.4), pytest.approx(0.6), 5)
     assert watch.age_of(second, 1e9) - watch.age_of(first, 1e9) == pytest.approx(0.03)
-    assert [figures.missing for figures in watch.look()] == [pytest.approx(nan, nan_ok=True)] * 2
+    assert [figures.missing for figures in watch.look(0.1)] == [pytest.approx(nan, nan_ok=True)] * 2
 
 
 def test_lags_tell_how_clocks_are_apart() -> None:
@@ -90,12 +90,12 @@ def test_lags_tell_how_clocks_are_apart() -> None:
         for stream, behind in zip(streams, (0, 70_000_000), strict=True):
             stream.seen(SECOND + k * 5_000_000 - behind)
     for stream in streams:
-        stream.look()
+        stream.look(0.1)
     assert streams[1].lag - streams[0].lag == pytest.approx(0.07, abs=0.005)
 
 
 SENSOR = Sensor("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
-GOOD = Figures(value=0.1, stamp=1, rate=200.0, gap=0.005, missing=0.0, outside=0.0, unchanged=1)
+GOOD = Figures(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 
 
 def judged(changes: dict[str, float], age: float = 0.0, sensor: Sensor = SENSOR) -> tuple[Level, str]:

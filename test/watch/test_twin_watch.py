@@ -146,6 +146,8 @@ def test_other_ends(rig: Rig) -> None:
     assert status.level == Level.WARN
     assert "2 publishers of the same readings: /a, /b" in status.message
     assert "incompatible QoS: /b: Best effort publisher" in status.message
+    rig.peers[Stream.STROKES] = Peers("/strokes", ("/a",))
+    assert after(rig, 7)["cylinder_strokes"].level == Level.OK
 
 
 def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
