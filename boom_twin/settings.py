@@ -6,17 +6,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
-from .errors import UsageError
+from .parameter_file import checked, read_parameters
+from .thresholds import Thresholds
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Share = Annotated[float, Field(gt=0, le=1)]
 
 
 class Settings(BaseModel):
@@ -40,28 +38,6 @@ class Settings(BaseModel):
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
-    raise_after: NotNegative = Field(default=2.0, description="time for which a limit is passed before it is told, s")
-    clear_after: NotNegative = Field(default=5.0, description="time for which all is well again before it is told, s")
-    release: Share = Field(default=0.8, description="share of a limit below which its level is left")
-    stale_after: Positive = Field(default=2.0, description="a sensor without readings for so long is stale, s")
-    unusable_warn: Share = Field(default=0.01, description="share of readings missing or out of range: warning")
-    unusable_error: Share = Field(default=0.5, description="share of readings missing or out of range: error")
-    frozen_after: Positive = Field(default=1.0, description="a reading unchanged for so long, at least, is frozen, s")
-    frozen_false_alarm: Annotated[float, Field(gt=0, lt=1)] = Field(
-        default=1e-9, description="probability that a live sensor is taken for frozen, for each reading"
-    )
-    clock_offset: Positive = Field(default=0.05, description="clocks of two streams that differ by more are told, s")
-    stamp_offset: Positive = Field(default=1.0, description="stamps and node's clock that differ by more are told once, s")
-    residual_window: Positive = Field(default=10.0, description="time over which a residual is judged, s")
-    residual_warn: Positive = Field(default=2.0, description="root mean square of a normalised residual: warning")
-    residual_error: Positive = Field(default=4.0, description="root mean square of a normalised residual: error")
-    load_warn: Positive = Field(default=0.5, description="time of a step over the time between strokes: warning")
-    load_error: Positive = Field(default=0.9, description="time of a step over the time between strokes: error")
-    lag_warn: Positive = Field(default=2.0, description="recorded messages not on the disk for so long: warning, s")
-    lag_error: Positive = Field(default=5.0, description="recorded messages not on the disk for so long: error, s")
-    disk_warn: Positive = Field(default=1800.0, description="the disk is full in less, at the present pace: warning, s")
-    disk_error: Positive = Field(default=120.0, description="the disk is full in less, at the present pace: error, s")
-
     @property
     def stroke_variance(self) -> float:
         """Noise and rounding of a stroke, m^2."""
@@ -75,27 +51,14 @@ class Settings(BaseModel):
 
 def settings_from(values: dict[str, Any], source: str) -> Settings:
     """Settings from names and values; UsageError names every value that is out of bounds."""
-    try:
-        return Settings(**values)
-    except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
-        known = ", ".join(Settings.model_fields)
-        raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+    return checked(Settings, values, source)
 
 
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``autostart``) are passed over.
+    Parameters of the node alone (``scene``, ``autostart``) and of ``/diagnostics`` are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    try:
-        content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
-        values = dict(next(iter(content.values()))["ros__parameters"])
-    except OSError as error:
-        raise UsageError(f"{source}: {error.strerror}. Give a parameter file.") from None
-    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
-        raise UsageError(f"{source}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
-    for name in ("scene", "autostart"):
-        values.pop(name, None)
-    return settings_from(values, str(source))
+    others = {"scene", "autostart", *Thresholds.model_fields}
+    return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))

@@ -21,7 +21,7 @@ from .play import positive
 if TYPE_CHECKING:
     from ..ros.recorder import Count
     from ..ros.wanted import Wanted
-    from ..settings import Settings
+    from ..thresholds import Thresholds
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -58,7 +58,7 @@ def run(args: Namespace) -> int:
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    wanted, scene, settings, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
+    wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
@@ -74,7 +74,7 @@ def run(args: Namespace) -> int:
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, settings, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
+        counts = record(storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
     _tell(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if not any(count.received for count in counts):
@@ -125,11 +125,14 @@ def _scene_text(source: str | None) -> str:
     return default_text() if source is None else Path(source).read_text(encoding="utf-8")
 
 
-def _parameters(path: Path | None) -> tuple[Settings, str]:
-    """The parameter file, and its text."""
+def _parameters(path: Path | None) -> tuple[Thresholds, str]:
+    """The recorder's part of the parameter file, which must be valid, and all its text."""
     from ..settings import DEFAULT_FILE, load_settings
+    from ..thresholds import load_thresholds
 
-    return load_settings(path), (path or DEFAULT_FILE).read_text(encoding="utf-8")
+    load_settings(path)
+    file = path or DEFAULT_FILE
+    return load_thresholds(file), file.read_text(encoding="utf-8")
 
 
 def size(text: str) -> int:

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from ..io.intake import Intake
 from ..io.topics import Output, Topics
 from ..records import Report, Sample, Stream
-from ..settings import Settings
+from ..thresholds import Thresholds
 from ..twin import EVENTS, Twin
 from ..watch.sensors import sensors_of
 from ..watch.twin import TwinWatch
@@ -39,7 +39,7 @@ class Diagnostics:
         self._peers = PeerBook(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._ticks, self._active = 0, False
-        self._watch = TwinWatch({}, {}, Settings())
+        self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._scene = ""
         self._told: set[str] = set()
@@ -47,14 +47,14 @@ class Diagnostics:
     def watch(self, twin: Twin, intake: Intake, scene: str) -> None:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required)
-        self._watch = TwinWatch(sensors, self._inputs, twin.settings)
+        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
         self._counts = {"samples": twin.counts, "messages": intake.oddities}
         self._scene = scene
         self._told.clear()
 
-    def tune(self, settings: Settings) -> None:
-        """Limits have changed."""
-        self._watch.settings = settings
+    def tune(self, thresholds: Thresholds) -> None:
+        """Judge by these from now on."""
+        self._watch.thresholds = thresholds
 
     def start(self) -> None:
         """The node is active: from now on an input that is silent is stale."""
@@ -102,7 +102,7 @@ class Diagnostics:
     def _tell_clock(self, clock: float) -> None:
         """Log that the strokes are stamped by another clock than the node's."""
         newest = self._watch.newest if self._active else None
-        if newest is not None and abs(clock - newest * NANO) > self._watch.settings.stamp_offset:
+        if newest is not None and abs(clock - newest * NANO) > self._watch.thresholds.stamp_offset:
             apart = clock - newest * NANO
             self._tell("clock", f"newest stamp is {apart:.1f} s from the node's clock: set use_sim_time or play with --clock")
 

@@ -19,7 +19,7 @@ from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, refuse_while, scene_path, settings_of
+from .parameters import declare, on_thresholds, refuse_while, scene_path, settings_of
 from .qos import qos_profile
 from .types import RclpyTypes, message_class
 
@@ -48,6 +48,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         declare(self)
         refuse_while(self, frozen=lambda: self._twin is not None)
         self._diagnostics = Diagnostics(self, self._topics)
+        on_thresholds(self, self._diagnostics.tune)
 
     @property
     def autostart(self) -> bool:

@@ -13,7 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from ..errors import BagError, BoomTwinError
 from ..io.storage import Storage
 from ..io.topics import Output, load_topics
-from ..settings import Settings
+from ..thresholds import Thresholds
 from ..watch.recording import RecordingJudge, TopicState
 from .board import Board
 from .remote import RemoteParameters
@@ -97,8 +97,8 @@ class _Channel:
 class _Recording:
     """What is recorded, told on ``/diagnostics``."""
 
-    def __init__(self, node: Any, storage: Storage, wanted: Sequence[Wanted], settings: Settings) -> None:
-        self.node, self.storage, self._settings = node, storage, settings
+    def __init__(self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds) -> None:
+        self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage) for each in wanted]
         self._board, self._judge = Board(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
         self.twin = RemoteParameters(node)
@@ -116,7 +116,7 @@ class _Recording:
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * 1e-9
         disk = self.storage.state()
-        self._board.show([self._judge.status(topics, disk, end, self._settings, time.monotonic(), clock)])
+        self._board.show([self._judge.status(topics, disk, end, self._thresholds, time.monotonic(), clock)])
         if end is not None:
             self._board.settle()
 
@@ -124,7 +124,7 @@ class _Recording:
 def record(
     storage: Storage,
     wanted: Sequence[Wanted],
-    settings: Settings,
+    thresholds: Thresholds,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
     meet: Callable[[Mapping[str, object]], None],
@@ -136,8 +136,8 @@ def record(
     storage : Storage
         Completed at the end.
     wanted : sequence of Wanted
-    settings : Settings
-        Limits of the state on ``/diagnostics``.
+    thresholds : Thresholds
+        Of the state on ``/diagnostics``.
     stopped : callable
         Asked after every message, and ten times a second.
     tell : callable
@@ -158,7 +158,7 @@ def record(
         The type of a topic is not installed.
     """
     node = rclpy.create_node(NAME)
-    recording = _Recording(node, storage, wanted, settings)
+    recording = _Recording(node, storage, wanted, thresholds)
     try:
         try:
             _spin(recording, stopped, tell, meet)

@@ -9,7 +9,7 @@ from .status import Level
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class Bounds:
     """Above these a quantity has that level, or below these if it is `low` that is bad; NaN is no limit."""
 
     warn: float = nan
@@ -41,9 +41,9 @@ class Gate:
         self.level = Level.OK
         self._agreed: float | None = None
 
-    def update(self, value: float, limits: Limits, patience: Patience, now: float) -> Level:
+    def update(self, value: float, bounds: Bounds, patience: Patience, now: float) -> Level:
         """The level at the time `now` (s, of a clock that only goes forward)."""
-        seen = limits.level(value, self.level, patience.release)
+        seen = bounds.level(value, self.level, patience.release)
         if seen == self.level or self._agreed is None:
             self._agreed = now
         wait = patience.raise_after if seen > self.level else patience.clear_after

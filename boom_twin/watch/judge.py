@@ -6,8 +6,8 @@ from collections import defaultdict
 from dataclasses import replace
 from math import isfinite
 
-from ..settings import Settings
-from .gate import Gate, Limits, Patience
+from ..thresholds import Thresholds
+from .gate import Bounds, Gate, Patience
 from .status import Level, Status
 
 
@@ -32,10 +32,10 @@ class Judge:
         """As it was told last; None before."""
         return self._level
 
-    def begin(self, now: float, settings: Settings) -> None:
+    def begin(self, now: float, thresholds: Thresholds) -> None:
         """A new look, at the time `now` (s, of a clock that only goes forward)."""
         self._now = now
-        self._patience = Patience(settings.raise_after, settings.clear_after, settings.release)
+        self._patience = Patience(thresholds.raise_after, thresholds.clear_after, thresholds.release)
         self._faults: list[tuple[Level, str]] = []
         self._values: dict[str, str | int | float] = {}
 
@@ -43,27 +43,27 @@ class Judge:
         """Tell a value that is not judged."""
         self._values[key] = value
 
-    def check(self, key: str, value: float, limits: Limits, words: str, at_once: bool = False) -> None:
-        """Judge a value, and tell it with its limits.
+    def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
+        """Judge a value, and tell it with its bounds.
 
         Parameters
         ----------
         key : str
         value : float
-        limits : Limits
+        bounds : Bounds
         words : str
             What is wrong if it is; those that were true last are told as long as the level is held.
         at_once : bool
             A worse level counts at once.
         """
         self._values[key] = value
-        for name, limit in (("warn", limits.warn), ("error", limits.error)):
+        for name, limit in (("warn", bounds.warn), ("error", bounds.error)):
             if isfinite(limit):
                 self._values[f"{key}_{name}"] = limit
-        if limits.level(value, Level.OK, 1.0) != Level.OK:
+        if bounds.level(value, Level.OK, 1.0) != Level.OK:
             self._words[key] = words
         patience = replace(self._patience, raise_after=0.0) if at_once else self._patience
-        level = self._gates[key].update(value, limits, patience, self._now)
+        level = self._gates[key].update(value, bounds, patience, self._now)
         self.fault(level, self._words.get(key, words))
 
     def check_age(self, age: float, limit: float, words: str) -> None:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from math import nan
 
 from ..records import Report
-from ..settings import Settings
-from .gate import Limits
+from ..thresholds import Thresholds
+from .gate import Bounds
 from .judge import Judge
 from .status import Level, Status
 
@@ -60,7 +60,7 @@ class ModelWatch:
         self._failure, self._new = reason, True
 
     def status(
-        self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, settings: Settings, now: float, clock: float
+        self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, thresholds: Thresholds, now: float, clock: float
     ) -> Status:
         """State of the model.
 
@@ -70,15 +70,15 @@ class ModelWatch:
             Told too.
         is_active, is_fed : bool
             Whether the twin listens, and strokes come.
-        settings : Settings
+        thresholds : Thresholds
         now, clock : float
             As for `boom_twin.watch.sensor.SensorJudge`.
         """
         judge = self._judge
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         for key, value in values.items():
             judge.note(key, value)
-        self._check_load(settings, now)
+        self._check_load(thresholds, now)
         for key in ("predictions", "failures"):
             judge.note(key, getattr(self, key))
         judge.note("unhandled messages", self.broken)
@@ -92,7 +92,7 @@ class ModelWatch:
             judge.fault(Level.WARN, "waiting for strokes")
         return judge.finish(clock, "following the strokes")
 
-    def _check_load(self, settings: Settings, now: float) -> None:
+    def _check_load(self, thresholds: Thresholds, now: float) -> None:
         """Time of a step against the time there is for it."""
         judge, span, steps = self._judge, now - self._looked, self._steps
         self.predictions += steps
@@ -101,5 +101,5 @@ class ModelWatch:
         judge.note("step_longest_s", self._longest if steps else nan)
         judge.note("step_budget_s", span / steps if steps else nan)
         told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
-        judge.check("load", load, Limits(settings.load_warn, settings.load_error), told)
+        judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0

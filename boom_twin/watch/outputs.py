@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..settings import Settings
+from ..thresholds import Thresholds
 from .judge import Judge
 from .peers import Peers
 from .status import Level, Status
@@ -16,10 +16,10 @@ class OutputsJudge:
     def __init__(self) -> None:
         self._judge = Judge("outputs")
 
-    def status(self, peers: Iterable[Peers], settings: Settings, now: float, clock: float) -> Status:
+    def status(self, peers: Iterable[Peers], thresholds: Thresholds, now: float, clock: float) -> Status:
         """State of the outputs; `peers` are their subscribers, times as for `boom_twin.watch.sensor.SensorJudge`."""
         judge = self._judge
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         for each in peers:
             judge.note(f"subscribers {each.address}", len(each.names))
             if each.incompatible:

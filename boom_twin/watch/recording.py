@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..settings import Settings
-from .gate import Limits
+from ..thresholds import Thresholds
+from .gate import Bounds
 from .judge import Judge
 from .status import Level, Status
 
@@ -51,7 +51,13 @@ class RecordingJudge:
         self._judge = Judge("recording")
 
     def status(
-        self, topics: Mapping[str, TopicState], disk: DiskState, end: str | None, settings: Settings, now: float, clock: float
+        self,
+        topics: Mapping[str, TopicState],
+        disk: DiskState,
+        end: str | None,
+        thresholds: Thresholds,
+        now: float,
+        clock: float,
     ) -> Status:
         """State of the recording.
 
@@ -61,18 +67,18 @@ class RecordingJudge:
         disk : DiskState
         end : str or None
             Why it ended too early; empty if it ended in order, None while it runs.
-        settings : Settings
+        thresholds : Thresholds
         now, clock : float
             As for `boom_twin.watch.sensor.SensorJudge`.
         """
         judge, missed = self._judge, sum(topic.missed or 0 for topic in topics.values())
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         if end:
             judge.fault(Level.ERROR, end)
-        judge.check("never_arrived", missed, Limits(warn=0), f"{missed} messages were published and never arrived")
+        judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
         told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
-        judge.check("lag_s", disk.lag, Limits(settings.lag_warn, settings.lag_error), told)
-        room = Limits(settings.disk_warn, settings.disk_error, low=True)
+        judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
+        room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
         judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
         judge.note("disk_free_bytes", disk.free)
         judge.note("waiting_bytes", disk.waiting)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..records import Array
-from ..settings import Settings
-from .gate import Limits
+from ..thresholds import Thresholds
+from .gate import Bounds
 from .judge import Judge
 from .status import Level, Status
 
@@ -45,19 +45,19 @@ class ResidualJudge:
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
-    def status(self, settings: Settings, now: float, clock: float) -> Status:
+    def status(self, thresholds: Thresholds, now: float, clock: float) -> Status:
         """State of the channel; times as for `boom_twin.watch.sensor.SensorJudge`."""
-        while self._window and self._window[0].time <= now - settings.residual_window:
+        while self._window and self._window[0].time <= now - thresholds.residual_window:
             self._window.popleft()
         judge, count = self._judge, sum(sums.number for sums in self._window)
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
-        told = f"{rms:.2f} times as large as noise explains, for {settings.residual_window:g} s"
-        judge.check("rms_normalised", rms, Limits(settings.residual_warn, settings.residual_error), told)
+        told = f"{rms:.2f} times as large as noise explains, for {thresholds.residual_window:g} s"
+        judge.check("rms_normalised", rms, Bounds(thresholds.residual_warn, thresholds.residual_error), told)
         judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
         judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))
         judge.note("count", count)
-        judge.note("window_s", settings.residual_window)
+        judge.note("window_s", thresholds.residual_window)
         if not count:
-            judge.fault(Level.STALE, f"none for {settings.residual_window:g} s")
+            judge.fault(Level.STALE, f"none for {thresholds.residual_window:g} s")
         return judge.finish(clock, "as large as noise explains")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan
 
-from ..settings import Settings
+from ..thresholds import Thresholds
 from .channel import Figures
 from .frozen import readings_of_frozen
-from .gate import Limits
+from .gate import Bounds
 from .judge import Judge
 from .status import Status
 
@@ -35,7 +35,7 @@ class SensorJudge:
     def __init__(self, sensor: Sensor) -> None:
         self._sensor, self._judge = sensor, Judge(f"sensor {sensor.name}")
 
-    def status(self, figures: Figures, age: float, settings: Settings, now: float, clock: float) -> Status:
+    def status(self, figures: Figures, age: float, thresholds: Thresholds, now: float, clock: float) -> Status:
         """State of the sensor.
 
         Parameters
@@ -43,28 +43,28 @@ class SensorJudge:
         figures : Figures
         age : float
             Since its last reading, s.
-        settings : Settings
-            The limits.
+        thresholds : Thresholds
+            The thresholds.
         now, clock : float
             Time (s) of a clock that only goes forward, and of the one that people know.
         """
         judge, sensor = self._judge, self._sensor
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         if not figures.stamp and not sensor.required:
             return judge.finish(clock, "not there; optional")
         judge.note(f"value_{sensor.unit}", figures.value)
         judge.note("rate_Hz", figures.rate)
         told = f"no reading for {age:.1f} s" if figures.stamp else "no reading yet"
-        judge.check_age(age, settings.stale_after, told)
-        judge.check("gap_s", figures.gap, Limits(settings.gap), f"gap of {figures.gap:.3f} s", at_once=True)
+        judge.check_age(age, thresholds.stale_after, told)
+        judge.check("gap_s", figures.gap, Bounds(thresholds.gap_warn), f"gap of {figures.gap:.3f} s", at_once=True)
         judge.note("gaps", figures.gaps)
-        share = Limits(settings.unusable_warn, settings.unusable_error)
+        share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
         judge.check("missing_share", figures.missing, share, f"{figures.missing:.1%} of the messages without a value")
         self._check_range(figures, share)
-        self._check_frozen(figures, settings)
+        self._check_frozen(figures, thresholds)
         return judge.finish(clock, "measuring" if figures.stamp else "waiting for a reading")
 
-    def _check_range(self, figures: Figures, share: Limits) -> None:
+    def _check_range(self, figures: Figures, share: Bounds) -> None:
         if self._sensor.high < inf:
             low, high, unit = self._sensor.low, self._sensor.high, self._sensor.unit
             told = f"{figures.outside:.1%} of the readings out of {low:.6g} to {high:.6g} {unit}, newest {figures.value:.6g}"
@@ -72,10 +72,10 @@ class SensorJudge:
             self._judge.note(f"high_{unit}", high)
             self._judge.check("outside_share", figures.outside, share, told)
 
-    def _check_frozen(self, figures: Figures, settings: Settings) -> None:
+    def _check_frozen(self, figures: Figures, thresholds: Thresholds) -> None:
         """How long the reading has not changed, against what noise explains."""
         known = 0.0 if isnan(figures.rate) else 1.0 / figures.rate
-        needed = readings_of_frozen(self._sensor.sigma, self._sensor.resolution, settings.frozen_false_alarm)
-        limit, unchanged = max(settings.frozen_after, needed * known), figures.unchanged * known
+        needed = readings_of_frozen(self._sensor.sigma, self._sensor.resolution, thresholds.frozen_false_alarm)
+        limit, unchanged = max(thresholds.frozen_after, needed * known), figures.unchanged * known
         told = f"the reading has not changed for {unchanged:.1f} s: frozen"
-        self._judge.check("unchanged_s", unchanged, Limits(error=limit), told)
+        self._judge.check("unchanged_s", unchanged, Bounds(error=limit), told)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import nan
 
-from ..settings import Settings
+from ..thresholds import Thresholds
 from .channel import NANO
-from .gate import Limits
+from .gate import Bounds
 from .judge import Judge
 from .peers import Peers
 from .status import Level, Status
@@ -29,7 +29,7 @@ class TopicJudge:
         self._counted = (nan, 0)
 
     def status(
-        self, stream: StreamWatch, publishers: Peers, offset: float, settings: Settings, now: float, clock: float
+        self, stream: StreamWatch, publishers: Peers, offset: float, thresholds: Thresholds, now: float, clock: float
     ) -> Status:
         """State of the topic.
 
@@ -40,30 +40,30 @@ class TopicJudge:
         publishers : Peers
         offset : float
             By how much the stamps are behind those of the strokes, s; NaN where it is not known.
-        settings : Settings
+        thresholds : Thresholds
         now, clock : float
             As for `boom_twin.watch.sensor.SensorJudge`.
         """
         judge, age = self._judge, stream.age(now)
-        judge.begin(now, settings)
+        judge.begin(now, thresholds)
         judge.note("topic", publishers.address)
         self._count(stream, now)
         names = ", ".join(publishers.names)
         judge.note("publisher_names", names)
         told = f"{len(publishers.names)} publishers of the same readings: {names}"
         judge.note("publishers", len(publishers.names))
-        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Limits(warn=0), told)
+        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Bounds(warn=0), told)
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
         if stream.newest is None and not self._required:
             return judge.finish(clock, "not there; optional")
         told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
-        judge.check_age(age, settings.stale_after, told)
+        judge.check_age(age, thresholds.stale_after, told)
         if stream.newest is not None:
             judge.note("newest_stamp_s", seconds(stream.newest))
             judge.note("clock_minus_stamp_s", clock - stream.newest * NANO)
         told = f"stamped {offset:+.3f} s behind the strokes: synchronise the sensors' clocks"
-        judge.check("clock_offset_s", abs(offset), Limits(settings.clock_offset), told)
+        judge.check("clock_offset_s", abs(offset), Bounds(thresholds.clock_offset), told)
         return judge.finish(clock, "listened to" if stream.newest is not None else "waiting for a message")
 
     def _count(self, stream: StreamWatch, now: float) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..records import Report, Residuals, Sample, Stream
-from ..settings import Settings
+from ..thresholds import Thresholds
 from .model import ModelWatch
 from .outputs import OutputsJudge
 from .peers import Peers
@@ -28,12 +28,12 @@ class TwinWatch:
         In the order of a sample's values; empty before the node is configured.
     names : dict of Stream to str
         Names of the input topics.
-    settings : Settings
+    thresholds : Thresholds
         May be replaced while it runs.
     """
 
-    def __init__(self, sensors: Mapping[Stream, Sequence[Sensor]], names: Mapping[Stream, str], settings: Settings) -> None:
-        self.settings = settings
+    def __init__(self, sensors: Mapping[Stream, Sequence[Sensor]], names: Mapping[Stream, str], thresholds: Thresholds) -> None:
+        self.thresholds = thresholds
         self._sensors = {stream: [SensorJudge(sensor) for sensor in each] for stream, each in sensors.items()}
         self._topics = {stream: TopicJudge(names[stream], each[0].required) for stream, each in sensors.items()}
         self._streams = {
@@ -108,28 +108,28 @@ class TwinWatch:
         """
         now = time.monotonic()
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], now)
-        found = [self._model.status(counts, is_active, is_fed, self.settings, now, clock)]
+        found = [self._model.status(counts, is_active, is_fed, self.thresholds, now, clock)]
         if not is_active:
             return found
         sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
         found += [self._topic(stream, publishers[stream], now, clock) for stream in self._streams]
-        found.append(self._outputs.status(subscribers, self.settings, now, clock))
+        found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
         return found + sensors + self._look_at_residuals(now, clock)
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
-        return stream.newest is None or stream.age(now) > self.settings.stale_after
+        return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
     def _topic(self, stream: Stream, peers: Peers, now: float, clock: float) -> Status:
         watch = self._streams[stream]
         offset = watch.lag - self._streams[Stream.STROKES].lag
-        return self._topics[stream].status(watch, peers, offset, self.settings, now, clock)
+        return self._topics[stream].status(watch, peers, offset, self.thresholds, now, clock)
 
     def _look_at(self, stream: Stream, now: float, clock: float) -> list[Status]:
         """The sensors of one stream."""
         watch = self._streams[stream]
         return [
-            judge.status(figures, watch.age_of(figures, now), self.settings, now, clock)
-            for judge, figures in zip(self._sensors[stream], watch.look(self.settings.gap), strict=True)
+            judge.status(figures, watch.age_of(figures, now), self.thresholds, now, clock)
+            for judge, figures in zip(self._sensors[stream], watch.look(self.thresholds.gap_warn), strict=True)
         ]
 
     def _look_at_residuals(self, now: float, clock: float) -> list[Status]:
@@ -140,4 +140,4 @@ class TwinWatch:
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name)).take(column, now)
-        return [judge.status(self.settings, now, clock) for judge in self._judges.values()]
+        return [judge.status(self.thresholds, now, clock) for judge in self._judges.values()]

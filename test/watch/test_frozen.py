@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin.settings import Settings
+from boom_twin.thresholds import Thresholds
 from boom_twin.watch.frozen import readings_of_frozen
 
 
@@ -27,11 +28,11 @@ def test_live_sensors_are_rarely_taken_for_frozen(sigma: float, resolution: floa
 
 
 def test_numbers_that_are_stated() -> None:
-    settings = Settings()
+    settings, alarm = Settings(), Thresholds().frozen_false_alarm
     needed = [
-        readings_of_frozen(settings.stroke_sigma, settings.stroke_resolution, settings.frozen_false_alarm),
-        readings_of_frozen(settings.angle_sigma, settings.angle_resolution, settings.frozen_false_alarm),
-        readings_of_frozen(settings.imu_sigma, 0.0, settings.frozen_false_alarm),
+        readings_of_frozen(settings.stroke_sigma, settings.stroke_resolution, alarm),
+        readings_of_frozen(settings.angle_sigma, settings.angle_resolution, alarm),
+        readings_of_frozen(settings.imu_sigma, 0.0, alarm),
     ]
     assert needed == [10.0, 14.0, 2.0]
     assert readings_of_frozen(1.0, 7.0, 1e-9) == pytest.approx(4.4e4, rel=0.1)

@@ -6,18 +6,18 @@ from math import inf, nan
 
 import pytest
 
-from boom_twin.settings import Settings
-from boom_twin.watch.gate import Gate, Limits, Patience
+from boom_twin.thresholds import Thresholds
+from boom_twin.watch.gate import Bounds, Gate, Patience
 from boom_twin.watch.judge import Judge
 from boom_twin.watch.status import Level
 
-LIMITS, PATIENCE = Limits(warn=1.0, error=2.0), Patience(raise_after=2.0, clear_after=5.0, release=0.8)
+BOUNDS, PATIENCE = Bounds(warn=1.0, error=2.0), Patience(raise_after=2.0, clear_after=5.0, release=0.8)
 
 
 def levels(values: list[float], patience: Patience = PATIENCE) -> str:
     """First letters of the levels at one value a second."""
     gate = Gate()
-    return "".join(gate.update(value, LIMITS, patience, float(now)).name[0] for now, value in enumerate(values))
+    return "".join(gate.update(value, BOUNDS, patience, float(now)).name[0] for now, value in enumerate(values))
 
 
 @pytest.mark.parametrize(
@@ -45,17 +45,17 @@ def test_without_patience_a_level_counts_at_once() -> None:
 
 
 def test_a_quantity_of_which_little_is_bad() -> None:
-    gate, limits = Gate(), Limits(warn=100.0, error=10.0, low=True)
+    gate, bounds = Gate(), Bounds(warn=100.0, error=10.0, low=True)
     values = [inf, 101.0, 99.0, 9.0, 11.0, 13.0, 120.0, 126.0]
-    assert "".join(gate.update(value, limits, NONE, 0.0).name[0] for value in values) == "OOWEEWWO"
+    assert "".join(gate.update(value, bounds, NONE, 0.0).name[0] for value in values) == "OOWEEWWO"
 
 
 def test_a_status_tells_value_limit_and_since_when() -> None:
-    judge, settings = Judge("pump"), Settings(raise_after=0.0, clear_after=0.0)
+    judge, thresholds = Judge("pump"), Thresholds(raise_after=0.0, clear_after=0.0)
 
     def look(now: float, value: float) -> tuple[Level, str, dict[str, object]]:
-        judge.begin(now, settings)
-        judge.check("heat_K", value, Limits(300.0, 400.0), f"{value:g} K is hot")
+        judge.begin(now, thresholds)
+        judge.check("heat_K", value, Bounds(300.0, 400.0), f"{value:g} K is hot")
         judge.note("colour", "red")
         status = judge.finish(1000.0 + now, "cool")
         return status.level, status.message, dict(status.values)
@@ -69,13 +69,13 @@ def test_a_status_tells_value_limit_and_since_when() -> None:
 
 def test_the_worst_fault_is_told_first() -> None:
     judge = Judge("pump")
-    judge.begin(0.0, Settings())
-    judge.check("a", 5.0, Limits(warn=1.0), "first", at_once=True)
+    judge.begin(0.0, Thresholds())
+    judge.check("a", 5.0, Bounds(warn=1.0), "first", at_once=True)
     judge.check_age(5.0, 1.0, "second")
     status = judge.finish(0.0, "well")
     assert (status.level, status.message) == (Level.STALE, "second; first")
-    judge.begin(1.0, Settings())
-    judge.check("a", 0.5, Limits(warn=1.0), "not true any more", at_once=True)
+    judge.begin(1.0, Thresholds())
+    judge.check("a", 0.5, Bounds(warn=1.0), "not true any more", at_once=True)
     judge.check_age(0.5, 1.0, "not true any more")
     status = judge.finish(1.0, "well")
     assert (status.level, status.message) == (Level.WARN, "first")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from boom_twin.settings import Settings
+from boom_twin.thresholds import Thresholds
 from boom_twin.watch.recording import DiskState, RecordingJudge, TopicState
 from boom_twin.watch.status import Level, Status
 
@@ -19,7 +19,7 @@ def judged(topics: dict[str, TopicState] = TOPICS, end: str | None = None, **dis
     """After ten seconds of it."""
     judge, state = RecordingJudge(), DiskState(**(DISK | disk))
     for now in range(10):
-        status = judge.status(topics, state, end, Settings(), float(now), 1e9)
+        status = judge.status(topics, state, end, Thresholds(), float(now), 1e9)
     return status
 
 

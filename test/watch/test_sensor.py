@@ -10,6 +10,7 @@ import pytest
 from boom_twin.records import Sample, Stream
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
+from boom_twin.thresholds import Thresholds
 from boom_twin.watch.channel import Channel, Figures
 from boom_twin.watch.sensor import Sensor, SensorJudge
 from boom_twin.watch.sensors import sensors_of
@@ -103,7 +104,7 @@ def judged(changes: dict[str, float], age: float = 0.0, sensor: Sensor = SENSOR)
     judge = SensorJudge(sensor)
     figures = Figures(**{name: changes.get(name, getattr(GOOD, name)) for name in Figures.__dataclass_fields__})  # type: ignore[arg-type]
     for now in range(10):
-        status = judge.status(figures, age, Settings(), float(now), 1e9 + now)
+        status = judge.status(figures, age, Thresholds(), float(now), 1e9 + now)
     return status.level, status.message
 
 

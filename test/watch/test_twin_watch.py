@@ -10,6 +10,7 @@ import pytest
 from boom_twin.records import Report, Residuals, Sample, Stream
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
+from boom_twin.thresholds import Thresholds
 from boom_twin.watch import twin as module
 from boom_twin.watch.peers import Peers
 from boom_twin.watch.sensors import sensors_of
@@ -28,9 +29,8 @@ class Rig:
         self.now, self.random = 100.0, np.random.default_rng(5)
         for name in ("twin", "stream"):
             monkeypatch.setattr(f"boom_twin.watch.{name}.time.monotonic", lambda: self.now)
-        settings = Settings()
-        sensors = sensors_of(load_scene(), settings, REQUIRED)
-        self.watch = TwinWatch(sensors, NAMES, settings)
+        sensors = sensors_of(load_scene(), Settings(), REQUIRED)
+        self.watch = TwinWatch(sensors, NAMES, Thresholds())
         self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
         self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
         self.behind = dict.fromkeys(Stream, 0.0)
@@ -153,5 +153,5 @@ def test_other_ends(rig: Rig) -> None:
 def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
     (status,) = rig.watch.look({}, False, {}, [], 0.0)
     assert (status.level, status.message) == (Level.WARN, "not active")
-    (status,) = module.TwinWatch({}, {}, Settings()).look({}, False, {}, [], 0.0)
+    (status,) = module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0)
     assert status.message == "not active"
