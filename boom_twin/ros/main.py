@@ -61,7 +61,7 @@ def _run(arguments: list[str]) -> int:
 
 def _live(node: TwinNode) -> int:
     """Start, spin, stop in order."""
-    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.experimental import EventsExecutor as SingleThreadedExecutor
     from rclpy.lifecycle import TransitionCallbackReturn as Outcome
 
     from .context import STOPPED
