@@ -108,6 +108,28 @@ class Residuals:
 
 
 @dataclass(frozen=True, slots=True)
+class Change:
+    """What holds from one stroke sample on; with it a replay repeats what was done to a running twin.
+
+    Attributes
+    ----------
+    stamp : int
+        Of that sample, nanoseconds.
+    from_rest : bool
+        Whether the model began with it, at rest.
+    settings : dict of str to float
+        All that can change while the twin runs, see `boom_twin.settings.Settings`.
+    zeros : dict of str to float
+        What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2); 0 if not named.
+    """
+
+    stamp: int
+    from_rest: bool
+    settings: dict[str, float]
+    zeros: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """What one sample caused.
 
@@ -125,6 +147,8 @@ class Report:
         What was out of the ordinary, by the names in `boom_twin.twin.EVENTS`.
     status : str
         ``ok``, or one sentence on a failure of the model.
+    change : Change or None
+        Set where the model began from rest, or something that was asked for took effect.
     """
 
     stamp: int
@@ -133,3 +157,4 @@ class Report:
     residuals: tuple[Residuals, ...] = ()
     events: tuple[str, ...] = ()
     status: str = "ok"
+    change: Change | None = None

@@ -24,7 +24,7 @@ from .io.behind import Behind
 from .io.reader import Session, scan
 from .io.topics import load_topics
 from .io.writer import FILE_NAME
-from .records import Array, Prediction, Report, Residuals, Sample, Stream
+from .records import Array, Change, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .truth import TipTruth, load_truth
@@ -102,13 +102,16 @@ def replay(
         twin = _ready_twin(scene, settings)
         ahead.wait_ready()
         behind.wait_ready()
-        samples: Iterator[Sample | None] = iter(ahead)
+        samples: Iterator[Sample | Change | None] = iter(ahead)
         if progress is not None:
             samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
         began = time.perf_counter()
         for sample in samples:
             if sample is None:
                 recording.refused += 1
+                continue
+            if isinstance(sample, Change):
+                twin.requests.repeat(sample)
                 continue
             report = twin.update(sample)
             recording.add(report)

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .analysis.statics import outline, settle
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
-from .errors import BoomTwinError
+from .errors import BoomTwinError, UsageError
 from .estimate.follower import Tuning, follow, new_track
+from .load import loaded
 from .memory import Expected, Memory
+from .physics.linkage import cylinder_length
 from .plan.compile import compile_scene
-from .records import Array, Prediction, Report, Residuals, Sample, Stream
+from .recent import Recent
+from .records import Array, Change, Prediction, Report, Residuals, Sample, Stream
+from .requests import Requests
 from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
 from .undeflected import Undeflected
+from .zeros import Zeros, channels_of
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -30,6 +35,10 @@ EVENTS = {
     "restart": "pause too long to bridge; started again from rest",
     "jump back": "time was set back; everything started again",
     "model": "the model failed; it starts again with the next full sample",
+    "reset": "asked for; the model started again from rest",
+    "load": "payload or line fill changed; the model started again from rest",
+    "limits": "other settings changed while the twin ran",
+    "zero": "the zero of a sensor was set anew",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
@@ -65,6 +74,9 @@ class Twin:
     ----------
     counts : Counter
         How often each of `EVENTS` happened.
+    requests : Requests
+        What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
+        stroke sample, which `Report.change` tells.
 
     Notes
     -----
@@ -74,27 +86,82 @@ class Twin:
 
     def __init__(self, scene: Scene, settings: Settings | None = None) -> None:
         self.scene, self.settings = scene, settings or Settings()
-        self.plan = compile_scene(scene)
         self.counts: Counter[str] = Counter()
         tuned = self.settings
         self._tuning = Tuning(
             tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
         )
-        lengths = np.array([section.length for section in scene.sections])
-        self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
-        self._undeflected = Undeflected(scene, self.plan)
-        self._track = new_track(self.plan, lengths)
+        self._build()
         self._row = np.zeros(4 * self.plan.joints + 11)
-        self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
+        self._channels = channels_of(self.plan.joints)
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
         self._pending: deque[Sample] = deque()
+        self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent()
 
     def reset(self) -> None:
-        """Forget everything but the counts; the next full stroke sample starts from static equilibrium."""
-        self._run = None
+        """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
+        self._begin_anew()
         self._newest_measured = {}
         self._pending = deque()
+
+    def rezero(self, sensor: str) -> dict[str, float]:
+        """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
+
+        Parameters
+        ----------
+        sensor : str
+            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m). A stroke has no residual of its own:
+            its zero becomes the one that explains the residual of ``joint_i``, which must read right for that; and the
+            model, which the strokes drive, starts again from rest.
+
+        Raises
+        ------
+        UsageError
+            Too few residuals within the last second.
+        """
+        if self._run is None:
+            raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
+        offsets = self._recent.offsets(sensor, self._run.newest, self._slope)
+        found = {name: self.requests.zeros.get(name, 0.0) + offset for name, offset in offsets.items()}
+        self.requests.zero(found)
+        return found
+
+    def _slope(self, joint: int) -> float:
+        """Stroke over angle, m/rad, by rigid geometry at the newest strokes."""
+        return float(cylinder_length(self.plan.tables.linkages[joint], self._track.angles[joint])[1])
+
+    def _build(self) -> None:
+        """The model under the present load."""
+        self.plan = compile_scene(loaded(self.scene, *self.settings.load))
+        lengths = np.array([section.length for section in self.scene.sections])
+        self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
+        self._undeflected = Undeflected(self.scene, self.plan)
+        self._track = new_track(self.plan, lengths)
+
+    def _take_over(self, stamp: int) -> list[str]:
+        """Make what was asked for hold; gives the events."""
+        asked, before = self.requests, self.settings
+        from_rest, self.settings = asked.take(), asked.settings
+        events = ["load"] if before.load != self.settings.load else []
+        if before.limits != self.settings.limits:
+            events.append("limits")
+        if asked.zeros != self._zeros.values:
+            events.append("zero")
+            self._zeros.put(stamp, asked.zeros)
+            self._recent.clear()
+        if from_rest and self._run is not None:
+            events += [] if events else ["reset"]
+            self._begin_anew()
+            self._pending = deque(sample for sample in self._pending if sample.stamp >= stamp)
+        if "load" in events:
+            self._build()
+        return events
+
+    def _begin_anew(self) -> None:
+        self._run = None
+        self._zeros.forget_past()
+        self._recent.clear()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -129,9 +196,21 @@ class Twin:
                 events.append("gap")
         if not complete:
             events.append("partial")
+        asked = complete and self.requests.due
+        if asked:
+            events += self._take_over(sample.stamp)
+        zeros = self._zeros.of(Stream.STROKES, sample.stamp)
+        if zeros is not None:
+            sample = replace(sample, values=sample.values - zeros)
         if self._run is not None:
-            return self._step(self._run, sample, events)
-        return self._start(sample, events) if complete else self._refuse(sample, "waiting", *events)
+            report, from_rest = self._step(self._run, sample, events), False
+        elif complete:
+            report, from_rest = self._start(sample, events), True
+        else:
+            return self._refuse(sample, "waiting", *events)
+        if asked or (from_rest and report.accepted):
+            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
+        return report
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
@@ -238,11 +317,15 @@ class Twin:
         if expected is None:
             return None
         if sample.stream is Stream.ANGLES:
-            values, sigmas, names = sample.values - expected.joints, expected.joint_sigmas, self._names
+            values, sigmas = sample.values - expected.joints, expected.joint_sigmas
         else:
             values, sigmas = sample.values - expected.force, expected.force_sigmas
-            names = ("tip_imu_x", "tip_imu_z")
-        return Residuals(sample.stream, sample.stamp, names, values, sigmas)
+        zeros = self._zeros.of(sample.stream, sample.stamp)
+        if zeros is not None:
+            values = values - zeros
+        residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+        self._recent.add(residuals)
+        return residuals
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BoomTwinError
-from ..records import Sample, Stream
+from ..records import Change, Sample, Stream
+from .changes import Changes, decode
 from .intake import Intake, stamp_of
 from .pipe import Pipe, post, say_ready
-from .reader import read, scan
-from .topics import TYPES
+from .reader import Session, read, scan
+from .topics import TYPES, Output, load_topics
 
 BATCH = 400  # samples in one pickle
-Packed = tuple[str, int, bytes] | None
+Packed = tuple[str, int, bytes] | Change | None
 
 
 class Ahead:
@@ -47,16 +48,16 @@ class Ahead:
         """Until the process can begin."""
         self._pipe.wait_ready()
 
-    def __iter__(self) -> Iterator[Sample | None]:
-        """Samples in the order of log times; None for a message without any usable value."""
+    def __iter__(self) -> Iterator[Sample | Change | None]:
+        """Samples in the order of log times, changes before theirs; None for a message without any usable value."""
         streams = {stream.value: stream for stream in Stream}
         for batch in self._pipe.receive():
             if isinstance(batch, Counter):
                 self.oddities = batch
                 continue
             for packed in batch:
-                if packed is None:
-                    yield None
+                if packed is None or isinstance(packed, Change):
+                    yield packed
                 else:
                     yield Sample(streams[packed[0]], packed[1], np.frombuffer(packed[2]))
         self._pipe.finish()
@@ -66,6 +67,15 @@ class Ahead:
         self._pipe.stop()
 
 
+def _changes(session: Session) -> Changes:
+    """What was changed while the session was recorded."""
+    topic = load_topics().outputs[Output.CHANGES]
+    info = session.find(topic.absolute)
+    if info is None or info.count == 0:
+        return Changes([])
+    return Changes((log, decode(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
+
+
 def main(arguments: list[str]) -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
     wanted = {name: Stream(role) for name, role in (text.rsplit("=", 1) for text in arguments[2:])}
@@ -73,8 +83,12 @@ def main(arguments: list[str]) -> int:
     say_ready()
     batch: list[Packed] = []
     try:
-        for name, _, message in read(scan(Path(arguments[0])), {name: TYPES[role] for name, role in wanted.items()}):
+        session = scan(Path(arguments[0]))
+        changes = _changes(session)
+        for name, log, message in read(session, {name: TYPES[role] for name, role in wanted.items()}):
             role = wanted[name]
+            if role is Stream.STROKES:
+                batch += changes.due(log, stamp_of(message))
             sample = intake.put(role, stamp_of(message), message)
             batch.append(None if sample is None else (role.value, sample.stamp, sample.values.tobytes()))
             if len(batch) == BATCH:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BoomTwinError
-from ..records import Array, Prediction, Report, Residuals, Stream
+from ..records import Array, Change, Prediction, Report, Residuals, Stream
 from ..scene.parts import Scene
 from ..settings import Settings
 from .factory import RosbagsTypes
@@ -20,7 +20,8 @@ from .topics import Output, Topic, load_topics
 from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
-Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, list[tuple[str, int, tuple[str, ...], bytes, bytes]]]
+Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
+Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, Rows, Change | None]
 
 
 def pack(report: Report) -> Packed:
@@ -28,23 +29,24 @@ def pack(report: Report) -> Packed:
     residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
     p = report.prediction
     if p is None:
-        return report.stamp, None, None, residuals
+        return report.stamp, None, None, residuals, report.change
     turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
     tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
     numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
     if p.shape is None or p.undeflected is None or p.pins is None:
-        return report.stamp, numbers, None, residuals
-    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals
+        return report.stamp, numbers, None, residuals, report.change
+    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals, report.change
 
 
 def unpack(packed: Packed) -> Report:
     """What `pack` was given, less what it leaves out."""
-    stamp, numbers, lines, rows = packed
+    stamp, numbers, lines, rows, change = packed
     residuals = tuple(
         Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
         for stream, at, names, values, sigmas in rows
     )
-    return Report(stamp, True, None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines), residuals)
+    prediction = None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines)
+    return Report(stamp, True, prediction, residuals, change=change)
 
 
 def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:
@@ -105,7 +107,7 @@ class Behind:
 
     def put(self, report: Report) -> None:
         """Write what `report` holds, in its turn; its stamp becomes the log time."""
-        if report.prediction is None and not report.residuals:
+        if report.prediction is None and not report.residuals and report.change is None:
             return
         self._batch.append(pack(report))
         if len(self._batch) == BATCH:
@@ -139,7 +141,8 @@ def main(directory: Path) -> int:
                 for packed in batch:
                     report = unpack(packed)
                     for key, message in outlet.fill(report):
-                        writer.write(key, report.stamp, message)
+                        write = writer.write_encoded if isinstance(message, bytes) else writer.write
+                        write(key, report.stamp, message)
     except BoomTwinError as error:
         print(error, file=sys.stderr)
     except OSError as error:

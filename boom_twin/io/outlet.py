@@ -12,6 +12,7 @@ from ..records import Prediction, Report, Residuals
 from ..scene.parts import Scene
 from ..scene.passive import PassiveJoints
 from ..settings import Settings
+from .changes import encode
 from .markers import ShapeMarkers
 from .places import fill_header, fill_xz
 from .topics import TYPES, Output
@@ -63,6 +64,8 @@ class Outlet:
             ]
         for place, residuals in enumerate(report.residuals):
             messages.append((Output.RESIDUALS, self._residuals(residuals, place)))
+        if report.change is not None:
+            messages.append((Output.CHANGES, encode(report.change)))
         if prediction is not None and prediction.shape is not None:
             messages.append((Output.SHAPE, self._markers.fill(prediction)))
         return messages

@@ -27,6 +27,7 @@ class Output(StrEnum):
     JOINT_STATES = "joint_states"
     RESIDUALS = "residuals"
     SHAPE = "shape"
+    CHANGES = "changes"
     DIAGNOSTICS = "diagnostics"
 
 
@@ -40,6 +41,7 @@ TYPES: dict[Stream | Output, str] = {
     Output.JOINT_STATES: "sensor_msgs/msg/JointState",
     Output.RESIDUALS: "sensor_msgs/msg/JointState",
     Output.SHAPE: "visualization_msgs/msg/MarkerArray",
+    Output.CHANGES: "sensor_msgs/msg/JointState",
     Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 """The one message type that the program reads or fills for each role."""
