@@ -1,4 +1,4 @@
-"""Fill messages and write a result bag in a process behind the replay."""
+"""Encode messages and write a result bag in a process behind the replay."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from ..errors import BoomTwinError
 from ..records import Array, Change, Prediction, Report, Residuals, Stream
 from ..scene.parts import Scene
 from ..settings import Settings
-from .factory import RosbagsTypes
 from .outlet import Outlet
 from .pipe import Pipe, say_ready
 from .topics import Output, Topic, load_topics
@@ -51,9 +50,9 @@ def unpack(packed: Packed) -> Report:
 
 def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:
     n = (len(row) - 11) // 3
-    line, undeflected, pins = lines or (None, None, None)
-    turn, velocity, acceleration = (float(value) for value in row[8:11])
-    joints, strokes, forces = (row[11 + i * n : 11 + (i + 1) * n] for i in range(3))
+    line, undeflected, pins = (None, None, None) if lines is None else map(_table, lines, (2, 2, 4))
+    turn, velocity, acceleration = row[8:11].tolist()
+    joints, strokes, forces = row[11:].reshape(3, n)
     return Prediction(
         stamp=stamp,
         tip_position=row[0:2],
@@ -66,14 +65,14 @@ def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None
         joints=joints,
         strokes=strokes,
         cylinder_forces=forces,
-        shape=_table(line, 2),
-        undeflected=_table(undeflected, 2),
-        pins=_table(pins, 4),
+        shape=line,
+        undeflected=undeflected,
+        pins=pins,
     )
 
 
-def _table(data: bytes | None, columns: int) -> Array | None:
-    return None if data is None else np.frombuffer(data).reshape(-1, columns)
+def _table(data: bytes, columns: int) -> Array:
+    return np.frombuffer(data).reshape(-1, columns)
 
 
 class Behind:
@@ -130,7 +129,7 @@ def main(directory: Path) -> int:
     outputs: dict[str, Topic] = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
     try:
         notes, scene, settings = pickle.load(stream)
-        outlet = Outlet(RosbagsTypes(), scene, settings)
+        outlet = Outlet(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             while True:
@@ -140,9 +139,8 @@ def main(directory: Path) -> int:
                     return 0
                 for packed in batch:
                     report = unpack(packed)
-                    for key, message in outlet.fill(report):
-                        write = writer.write_encoded if isinstance(message, bytes) else writer.write
-                        write(key, report.stamp, message)
+                    for key, data in outlet.fill(report):
+                        writer.write_encoded(key, report.stamp, data)
     except BoomTwinError as error:
         print(error, file=sys.stderr)
     except OSError as error:

@@ -20,7 +20,7 @@ from ..twin import Twin
 from .diagnostics import Diagnostics
 from .parameters import declare, refuse_while, scene_path, settings_of
 from .qos import qos_profile
-from .types import RclpyTypes, message_class
+from .types import message_class
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -127,7 +127,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, Intake(twin.plan.joints)
-        self._outlet = Outlet(RclpyTypes(), scene, settings)
+        self._outlet = Outlet(scene, settings)
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
 
@@ -160,5 +160,5 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return
         report = self._twin.update(sample)
         self._diagnostics.reported(report)
-        for key, filled in self._outlet.fill(report):
-            self._outputs[key].publish(filled)
+        for key, encoded in self._outlet.fill(report):
+            self._outputs[key].publish(encoded)

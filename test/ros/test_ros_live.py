@@ -13,7 +13,6 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.reader import read, scan
@@ -77,7 +76,7 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
     twin = Twin(scene, settings)
-    intake, outlet = Intake(twin.plan.joints), Outlet(RosbagsTypes(), scene, settings)
+    intake, outlet = Intake(twin.plan.joints), Outlet(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     for name, _, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):
         stream, stamp = inputs[name], stamp_of(msg)
@@ -85,8 +84,8 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
             continue
         sample = intake.put(stream, stamp, msg)
         assert sample is not None
-        for key, filled in outlet.fill(twin.update(sample)):
-            made[key].append((_stamp(filled), bytes(jazzy().serialize_cdr(filled, TYPES[key]))))
+        for key, data in outlet.fill(twin.update(sample)):
+            made[key].append((_stamp(jazzy().deserialize_cdr(data, TYPES[key])), data))
     return made
 
 
