@@ -42,6 +42,9 @@ EVENTS = {
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
+TOLD_AT_ONCE = frozenset({"restart", "jump back", "reset", "load", "limits", "zero"})
+"""Events that `Report.change` goes with."""
+
 NANO = 1e-9
 SMOOTHING = 0.05  # weight of the newest interval in the running mean
 PENDING = 4096  # most samples that wait for a stroke

@@ -50,8 +50,9 @@ def run(args: Namespace) -> int:
     from ..io.bagwriter import BagWriter
     from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
-    from ..ros.context import on_stop_signal, ros
+    from ..ros.context import ros
     from ..ros.recorder import record
+    from ..ros.stop import on_stop_signal
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))

@@ -26,7 +26,7 @@ def encode(change: Change) -> bytes:
     types = RosbagsTypes()
     msg = types.make(TYPES[Output.CHANGES])
     fill_header(msg.header, change.stamp)
-    msg.name, msg.position = list(values), types.doubles(values.values())
+    msg.name, msg.position = list(values), types.doubles(list(values.values()))
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
 
 

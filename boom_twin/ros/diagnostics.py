@@ -11,7 +11,7 @@ from rclpy.node import Node
 from ..io.intake import Intake
 from ..io.topics import Output, Topics
 from ..records import Report, Stream
-from ..twin import EVENTS, Twin
+from ..twin import EVENTS, TOLD_AT_ONCE, Twin
 from .input_watch import InputWatch, seconds
 from .qos import qos_profile
 
@@ -161,7 +161,7 @@ class Diagnostics:
         """Log the first sample of every kind that is out of the ordinary; all of them are counted."""
         if self._twin is None or self._intake is None:
             return
-        for name in sorted({*self._twin.counts, *self._intake.oddities} - self._oddities_told):
+        for name in sorted({*self._twin.counts, *self._intake.oddities} - self._oddities_told - TOLD_AT_ONCE):
             self._oddities_told.add(name)
             meaning = EVENTS.get(name, "seen in a message")
             self._node.get_logger().warning(f"{name}: {meaning} (told once; counted on /diagnostics)")

@@ -8,18 +8,22 @@ from functools import partial
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from ..errors import BoomTwinError
-from ..io.intake import Intake, stamp_of
+from ..io.intake import Intake
 from ..io.outlet import Outlet
 from ..io.topics import NODE, Output, load_topics
+from ..io.wire import Wire
 from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, refuse_while, scene_path, settings_of
+from .parameters import declare, guard, scene_path, settings_of
 from .qos import qos_profile
+from .services import Services
+from .started import Started
 from .types import message_class
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -45,13 +49,17 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
-        refuse_while(self, frozen=lambda: self._twin is not None)
+        guard(self, lambda: self._twin is not None, self._tune)
         self._diagnostics = Diagnostics(self, self._topics)
 
     @property
     def autostart(self) -> bool:
         """Whether the node is to configure and activate itself."""
         return bool(self.get_parameter("autostart").value)
+
+    def start(self) -> bool:
+        """Configure and activate; whether both went well."""
+        return bool(self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS)
 
     # -- transitions --------------------------------------------------------------------------------------------------
 
@@ -80,9 +88,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         gc.freeze()  # what lives from here on as long as the node is not searched again
         outcome = super().on_activate(state)
         for stream, topic in self._topics.inputs.items():
-            receive = partial(self._receive, stream)
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos))
+            wire = Wire(stream, partial(deserialize_message, message_type=kind))
+            receive = partial(self._receive, stream, wire)
+            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
         return outcome
@@ -128,8 +137,15 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         twin.warm_up()
         self._twin, self._intake = twin, Intake(twin.plan.joints)
         self._outlet = Outlet(scene, settings)
+        self._asked = Services(self, twin, lambda: bool(self._subscriptions_in))
+        self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
+
+    def _tune(self, live: dict[str, float]) -> None:
+        """Live parameters were set."""
+        assert self._twin is not None
+        self._twin.requests.tune(live)
 
     def _go_quiet(self) -> None:
         self._diagnostics.stop()
@@ -141,15 +157,17 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
+        if self._twin is not None:
+            self._asked.close()
         self._twin = None
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, stream: Stream, msg: Any) -> None:
+    def _receive(self, stream: Stream, wire: Wire, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
         try:
-            self._take(stream, stamp_of(msg), msg)
-        except Exception as error:  # the last resort, such as a stamp that no message can carry back
+            self._take(stream, *wire.read(data))
+        except Exception as error:  # the last resort, such as a message that is not whole
             self._diagnostics.broken(stream, error)
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
@@ -160,5 +178,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return
         report = self._twin.update(sample)
         self._diagnostics.reported(report)
+        if report.change is not None:
+            self._started.tell(report, report.change)
         for key, encoded in self._outlet.fill(report):
             self._outputs[key].publish(encoded)

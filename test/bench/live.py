@@ -87,7 +87,10 @@ def source(rate_text: str, duration_text: str) -> None:
     rate, duration = float(rate_text), float(duration_text)
     node, scene = rclpy.create_node("source"), load_scene()
     publishers = [node.create_publisher(JointState, name, SENSOR) for name in ("cylinder_strokes", "joint_angles")]
+    end = time.monotonic() + 30.0
     while any(publisher.get_subscription_count() < 1 for publisher in publishers):
+        if time.monotonic() > end:
+            raise SystemExit("nobody listens")
         time.sleep(0.1)
     time.sleep(1.0)
     random, rest = np.random.default_rng(1), strokes_of_posture(scene, "arch")
@@ -186,6 +189,7 @@ def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, 
     return {
         "rate": len(sent) / told["seconds"],
         "lost": len(set(sent) - set(stamps)),
+        "first lost": min((k for k, stamp in enumerate(sent) if stamp not in set(stamps)), default=-1),
         "twice": len(stamps) - len(set(stamps)),
         "residuals lost": len(sent) - len(heard["residuals"]),
         "p50": float(np.quantile(delays, 0.5)),
