@@ -7,11 +7,12 @@ from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from .context import STOPPED, one_line
 
 WAKE = 0.2
-"""Longest wait (s) for work: a stop is noticed between two waits."""
+"""Time (s) between looks at whether it is over."""
 
 
 def spin(node: Node, is_over: Callable[[], bool]) -> None:
@@ -26,7 +27,7 @@ def spin(node: Node, is_over: Callable[[], bool]) -> None:
         raise
     except Exception as error:
         told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
-        node.get_logger().warning(told % (one_line(error) or type(error).__name__))
+        node.get_logger().warning(told % one_line(error))
         _drive(SingleThreadedExecutor(), node, is_over)
 
 
@@ -38,8 +39,9 @@ def _events_executor() -> Any:
 
 def _drive(executor: Any, node: Node, is_over: Callable[[], bool]) -> None:
     executor.add_node(node)
+    never: Future[None] = Future()
     try:
         while not is_over():
-            executor.spin_once(timeout_sec=WAKE)
+            executor.spin_until_future_complete(never, timeout_sec=WAKE)
     finally:
         executor.remove_node(node)
