@@ -11,11 +11,11 @@ import numpy as np
 
 from ..errors import BoomTwinError
 from ..records import Change, Sample, Stream
-from .changes import Changes, decode
+from .changes import recorded_changes
 from .intake import Intake, stamp_of
 from .pipe import Pipe, post, say_ready
-from .reader import Session, read, scan
-from .topics import TYPES, Output, load_topics
+from .reader import read, scan
+from .topics import TYPES
 
 BATCH = 400  # samples in one pickle
 Packed = tuple[str, int, bytes] | Change | None
@@ -67,15 +67,6 @@ class Ahead:
         self._pipe.stop()
 
 
-def _changes(session: Session) -> Changes:
-    """What was changed while the session was recorded."""
-    topic = load_topics().outputs[Output.CHANGES]
-    info = session.find(topic.absolute)
-    if info is None or info.count == 0:
-        return Changes([])
-    return Changes((log, decode(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
-
-
 def main(arguments: list[str]) -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
     wanted = {name: Stream(role) for name, role in (text.rsplit("=", 1) for text in arguments[2:])}
@@ -84,7 +75,7 @@ def main(arguments: list[str]) -> int:
     batch: list[Packed] = []
     try:
         session = scan(Path(arguments[0]))
-        changes = _changes(session)
+        changes = recorded_changes(session)
         for name, log, message in read(session, {name: TYPES[role] for name, role in wanted.items()}):
             role = wanted[name]
             if role is Stream.STROKES:

@@ -12,7 +12,8 @@ from ..settings import Settings
 from .factory import RosbagsTypes
 from .intake import stamp_of
 from .places import fill_header
-from .topics import TYPES, Output
+from .reader import Session, read
+from .topics import TYPES, Output, load_topics
 from .typestore import jazzy
 
 FROM_REST = "from_rest"
@@ -74,3 +75,18 @@ class Changes:
         if abs(log - logged) > NEAR:
             return log > logged
         return stamp == change.stamp or self._before < change.stamp < stamp
+
+
+def recorded_changes(session: Session) -> Changes:
+    """What was changed while the session was recorded.
+
+    Raises
+    ------
+    BagError
+        The session cannot be read, or holds what is no change.
+    """
+    topic = load_topics().outputs[Output.CHANGES]
+    info = session.find(topic.absolute)
+    if info is None or info.count == 0:
+        return Changes([])
+    return Changes((log, decode(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
