@@ -1,60 +1,75 @@
-"""Residuals of the last second, from which a sensor's zero is found."""
+"""How far sensors were from the prediction within the last second, from which their zeros are found."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from .errors import UsageError
-from .records import Residuals
+from .records import Array, Stream
 
 SPAN = 1_000_000_000  # ns
 FEWEST = 5  # readings that make a mean
 
 
 class Recent:
-    """The newest residuals, all streams in the order in which they became known."""
+    """Measured minus predicted, without any zero, in the order in which it became known.
 
-    def __init__(self) -> None:
-        self._past: deque[Residuals] = deque()
+    Parameters
+    ----------
+    channels : dict of Stream to tuple of str
+        See `boom_twin.zeros.channels_of`.
+    """
 
-    def add(self, residuals: Residuals) -> None:
-        """Remember, and forget what is too old."""
-        self._past.append(residuals)
-        while self._past[0].stamp < residuals.stamp - SPAN:
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+        self._places = {name: (stream, i) for stream, names in channels.items() for i, name in enumerate(names)}
+        self._past: deque[tuple[int, Stream, Array]] = deque()
+
+    def add(self, stamp: int, stream: Stream, differences: Array) -> None:
+        """Remember, and forget what is too old; stamp in ns."""
+        self._past.append((stamp, stream, differences))
+        while self._past[0][0] < stamp - SPAN:
             self._past.popleft()
 
     def clear(self) -> None:
         """Forget everything."""
         self._past.clear()
 
-    def offsets(self, sensor: str, now: int, slope: Callable[[int], float]) -> dict[str, float]:
-        """What a sensor reads too much, by channel, as the second before `now` (ns) has it.
+    def zeros_of(
+        self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]
+    ) -> dict[str, float]:
+        """The zeros of a sensor, by channel, that the second before `now` (ns) tells.
 
         Parameters
         ----------
         sensor : str
-            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m): the offset that explains the residual of
+            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m): the zero that explains the residual of
             ``joint_i``.
         now : int
+        zeros : dict of str to float
+            Those that hold.
         slope : callable
-            Stroke over angle (m/rad) of joint i - 1.
+            Stroke over angle (m/rad) of joint i, counted from 0.
 
         Raises
         ------
         UsageError
-            There is no such sensor, or it has too few readings in that time.
+            It has too few readings in that time.
         """
         if sensor == "tip_imu":
             return {name: self._mean(name, now) for name in ("tip_imu_x", "tip_imu_z")}
         kind, _, number = sensor.partition("_")
-        mean = self._mean(f"joint_{number}", now)
-        return {sensor: mean if kind == "joint" else -mean * slope(int(number) - 1)}
+        joint = f"joint_{number}"
+        mean = self._mean(joint, now)
+        if kind == "joint":
+            return {joint: mean}
+        return {sensor: zeros.get(sensor, 0.0) - (mean - zeros.get(joint, 0.0)) * slope(int(number) - 1)}
 
     def _mean(self, channel: str, now: int) -> float:
-        ready = [r for r in self._past if channel in r.names and r.stamp > now - SPAN]
-        values = [value for r in ready if math.isfinite(value := float(r.values[r.names.index(channel)]))]
+        own, place = self._places[channel]
+        rows = [row for stamp, stream, row in self._past if stream is own and stamp > now - SPAN]
+        values = [value for row in rows if math.isfinite(value := float(row[place]))]
         if len(values) < FEWEST:
             told = f"{channel}: {len(values)} residuals in the last second, {FEWEST} are needed"
             raise UsageError(f"{told}. Let its sensor and the strokes run, then ask again.")

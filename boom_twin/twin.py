@@ -100,7 +100,7 @@ class Twin:
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
         self._pending: deque[Sample] = deque()
-        self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent()
+        self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent(self._channels)
 
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
@@ -125,8 +125,7 @@ class Twin:
         """
         if self._run is None:
             raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
-        offsets = self._recent.offsets(sensor, self._run.newest, self._slope)
-        found = {name: self.requests.zeros.get(name, 0.0) + offset for name, offset in offsets.items()}
+        found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._slope)
         self.requests.zero(found)
         return found
 
@@ -152,7 +151,6 @@ class Twin:
         if asked.zeros != self._zeros.values:
             events.append("zero")
             self._zeros.put(stamp, asked.zeros)
-            self._recent.clear()
         if from_rest and self._run is not None:
             events += [] if events else ["reset"]
             self._begin_anew()
@@ -323,12 +321,11 @@ class Twin:
             values, sigmas = sample.values - expected.joints, expected.joint_sigmas
         else:
             values, sigmas = sample.values - expected.force, expected.force_sigmas
+        self._recent.add(sample.stamp, sample.stream, values)
         zeros = self._zeros.of(sample.stream, sample.stamp)
         if zeros is not None:
             values = values - zeros
-        residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
-        self._recent.add(residuals)
-        return residuals
+        return Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

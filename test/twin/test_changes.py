@@ -97,6 +97,10 @@ def test_the_zero_of_an_angle(strokes: Any, joints: Any) -> None:
     assert abs(report.residuals[0].values[1]) < 1e-9 and abs(report.residuals[0].values[0]) > 1e-9
     late = twin.update(angle(99, joints + offset))
     assert not late.accepted
+    assert twin.rezero("joint_2") == pytest.approx({"joint_2": before})
+    twin.reset()
+    twin.update(stroke(101, strokes))
+    twin.update(angle(101, joints + offset))
     with pytest.raises(UsageError, match=r"joint_2: 1 residuals in the last second, 5 are needed"):
         twin.rezero("joint_2")
 
