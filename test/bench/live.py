@@ -18,6 +18,7 @@ import tempfile
 import time
 from argparse import ArgumentParser
 from array import array
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -119,13 +120,14 @@ def source(rate_text: str, duration_text: str) -> None:
     time.sleep(1.0)
 
 
-def listen(who: str) -> None:
-    """Until SIGTERM; prints stamps and delays by topic."""
+def listen(who: str, *forget: str) -> None:
+    """Until SIGTERM; prints stamps and delays by topic, unless it is to forget them."""
     node, heard = rclpy.create_node("listener"), {}
     qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 
     def hear(name: str, kind: type) -> None:
-        rows = heard[name] = []
+        rows: Any = deque(maxlen=1 if forget else None)
+        heard[name] = rows
         node.create_subscription(kind, f"/{who}/{name}", lambda data: rows.append((data[:12], time.time_ns())), qos, raw=True)
 
     for name, kind in OUT.items():
