@@ -75,6 +75,7 @@ def replay(
     out: str | Path,
     settings: Settings | None = None,
     progress: Progress | None = None,
+    changes: bool = True,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -88,6 +89,8 @@ def replay(
         Sensors' noise and tuning; the package's own by default.
     progress : callable, optional
         Wraps the iterator over messages, of which it is told the number.
+    changes : bool
+        Repeat what was changed while the session was recorded (load, limits, zeros, starts from rest), at the same stamps.
 
     Raises
     ------
@@ -111,7 +114,8 @@ def replay(
                 recording.refused += 1
                 continue
             if isinstance(sample, Change):
-                twin.requests.repeat(sample)
+                if changes:
+                    twin.requests.repeat(sample)
                 continue
             report = twin.update(sample)
             recording.add(report)

@@ -17,7 +17,7 @@ class Requests:
     zeros : dict of str to float
         As they will be.
     from_rest : bool
-        Whether the model is to begin again.
+        Whether a start from rest is asked for.
     due : bool
         Whether anything waits.
     """
@@ -28,24 +28,21 @@ class Requests:
         self.from_rest = self.due = False
 
     def tune(self, live: Mapping[str, float]) -> None:
-        """Other live settings; another load needs a start from rest.
+        """Other live settings.
 
         Raises
         ------
         UsageError
             A value is out of bounds, or cannot change while the twin runs.
         """
-        settings = self.settings.tuned(live)
-        self.from_rest |= settings.load != self.settings.load
-        self.settings, self.due = settings, True
+        self.settings, self.due = self.settings.tuned(live), True
 
     def zero(self, values: Mapping[str, float]) -> None:
-        """Other zeros of some sensors; those of strokes drive the model, which then starts from rest."""
-        self.from_rest |= any(name.startswith("cylinder") for name in values)
+        """Other zeros of some sensors."""
         self.zeros, self.due = {**self.zeros, **values}, True
 
     def rest(self) -> None:
-        """The model is to begin again."""
+        """A start of the model from rest."""
         self.from_rest = self.due = True
 
     def repeat(self, change: Change) -> None:
@@ -54,6 +51,6 @@ class Requests:
         self.zeros, self.from_rest, self.due = change.zeros, change.from_rest, True
 
     def take(self) -> bool:
-        """Nothing waits any more; tells whether the model is to begin again."""
+        """Nothing waits any more; tells whether a start from rest was asked for."""
         from_rest, self.from_rest, self.due = self.from_rest, False, False
         return from_rest

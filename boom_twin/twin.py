@@ -142,7 +142,7 @@ class Twin:
         self._track = new_track(self.plan, lengths)
 
     def _take_over(self, stamp: int) -> list[str]:
-        """Make what was asked for hold; gives the events."""
+        """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
         from_rest, self.settings = asked.take(), asked.settings
         events = ["load"] if before.load != self.settings.load else []
@@ -150,8 +150,8 @@ class Twin:
             events.append("limits")
         if asked.zeros != self._zeros.values:
             events.append("zero")
-            self._zeros.put(stamp, asked.zeros)
-        if from_rest and self._run is not None:
+            from_rest |= self._zeros.put(stamp, asked.zeros)
+        if (from_rest or "load" in events) and self._run is not None:
             events += [] if events else ["reset"]
             self._begin_anew()
             self._pending = deque(sample for sample in self._pending if sample.stamp >= stamp)

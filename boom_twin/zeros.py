@@ -40,15 +40,16 @@ class Zeros:
         self.values: dict[str, float] = {}
         self._past: deque[tuple[int, dict[Stream, Array]]] = deque([(0, {})], maxlen=KEPT)
 
-    def put(self, stamp: int, values: Mapping[str, float]) -> None:
-        """Others from `stamp` (ns) on; samples of earlier stamps keep what they had."""
-        self.values = dict(values)
+    def put(self, stamp: int, values: Mapping[str, float]) -> bool:
+        """Others from `stamp` (ns) on; samples of earlier stamps keep what they had. Tells whether those of strokes differ."""
+        before, self.values = self.values, dict(values)
         rows = {}
         for stream, names in self._channels.items():
             row = np.array([self.values.get(name, 0.0) for name in names])
             if row.any():
                 rows[stream] = row
         self._past.append((stamp, rows))
+        return any(before.get(name) != values.get(name) for name in self._channels[Stream.STROKES])
 
     def forget_past(self) -> None:
         """The newest zeros hold for every stamp."""

@@ -25,6 +25,7 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.JOINT_STATES: "/boom_twin/joint_states",
         Output.RESIDUALS: "/boom_twin/residuals",
         Output.SHAPE: "/boom_twin/shape",
+        Output.CHANGES: "/boom_twin/changes",
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"

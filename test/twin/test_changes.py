@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin import Report, Sample, Stream, Twin, load_scene
+from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.load import loaded
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -61,6 +61,18 @@ def test_a_load_starts_the_loaded_boom_from_rest(strokes: Any) -> None:
     back = twin.update(stroke(2, strokes))
     assert back.prediction is not None
     assert back.prediction.tip_position.tobytes() == first.prediction.tip_position.tobytes()
+
+
+def test_another_load_starts_from_rest_even_where_the_first_twin_had_it_before(strokes: Any) -> None:
+    twin, other = Twin(load_scene(), Settings(payload=40.0)), Twin(load_scene())
+    for each in (twin, other):
+        each.update(stroke(0, strokes))
+    twin.requests.tune({"gap": 0.2})
+    change = twin.update(stroke(1, strokes)).change
+    assert change is not None and not change.from_rest
+    other.requests.repeat(change)
+    report = other.update(stroke(1, strokes))
+    assert report.change is not None and report.change.from_rest and report.events == ("load", "limits")
 
 
 def test_limits_hold_at_once_and_do_not_disturb(strokes: Any) -> None:
