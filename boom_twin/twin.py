@@ -95,7 +95,7 @@ class Twin:
             tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
         )
         self._build()
-        self._row = np.zeros(4 * self.plan.joints + 11)
+        self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
         self._channels = channels_of(self.plan.joints)
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
@@ -250,7 +250,7 @@ class Twin:
         return Prediction(
             stamp=stamp,
             tip_position=tip[0:2],
-            tip_displacement=tip[0:2] - row[4 * n + 9 :],
+            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
             tip_velocity=tip[3:5],
             tip_acceleration=tip[6:8],
             tip_angle=float(tip[2]),
@@ -262,6 +262,7 @@ class Twin:
             shape=shape,
             undeflected=undeflected,
             pins=pins,
+            clearances=row[4 * n + 11 :].reshape(-1, 4),
         )
 
     def _lines(self, run: _Run, stamp: int) -> tuple[Array, Array, Array] | tuple[None, None, None]:
