@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,11 +14,13 @@ from .deviations import Deviations, specific_force
 from .errors import BoomTwinError
 from .estimate.follower import Tuning, follow, new_track
 from .memory import Expected, Memory
+from .mounting import Mounting
 from .plan.compile import compile_scene
-from .records import Array, Prediction, Report, Residuals, Sample, Stream
+from .records import Array, Mount, Prediction, Report, Residuals, Sample, Stream
 from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
+from .stray import Strays
 from .undeflected import Undeflected
 
 EVENTS = {
@@ -28,6 +31,7 @@ EVENTS = {
     "waiting": "not all strokes known yet; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge; started again from rest",
+    "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
     "jump back": "time was set back; everything started again",
     "model": "the model failed; it starts again with the next full sample",
     "unmatched": "no prediction at the stamp of this sample; no residual",
@@ -60,6 +64,9 @@ class Twin:
         The boom.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
+    mounts : sequence of Mount or None, optional
+        Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
+        `boom_twin.mounting.Mounting`.
 
     Attributes
     ----------
@@ -72,7 +79,7 @@ class Twin:
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
-    def __init__(self, scene: Scene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
         self.scene, self.settings = scene, settings or Settings()
         self.plan = compile_scene(scene)
         self.counts: Counter[str] = Counter()
@@ -85,6 +92,8 @@ class Twin:
         self._undeflected = Undeflected(scene, self.plan)
         self._track = new_track(self.plan, lengths)
         self._row = np.zeros(4 * self.plan.joints + 11)
+        self._mounting = Mounting(self.plan, scene.base.inclination, mounts)
+        self._strays = Strays(self.settings)
         self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
@@ -93,6 +102,7 @@ class Twin:
     def reset(self) -> None:
         """Forget everything but the counts; the next full stroke sample starts from static equilibrium."""
         self._run = None
+        self._strays = Strays(self.settings)
         self._newest_measured = {}
         self._pending = deque()
 
@@ -118,6 +128,8 @@ class Twin:
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         events: list[str] = []
+        if self._strays.hold(sample, None if self._run is None else self._run.newest):
+            return self._hold(sample)
         if self._run is not None:
             span = (sample.stamp - self._run.newest) * NANO
             if -self.settings.jump_back <= span <= 0.0:
@@ -199,14 +211,18 @@ class Twin:
         """Keep what residuals need."""
         n, interval = self.plan.joints, run.interval or self.settings.step
         variances = self._row[3 * n + 9 : 4 * n + 9]
-        sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        angles = self._mounting.expected(prediction.joints, self._live)
+        angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
         force = specific_force(prediction, self.plan.tables.gravity)
-        run.memory.add(Expected(prediction.stamp, prediction.joints, force, *sigmas))
+        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
     def _take_measured(self, sample: Sample, complete: bool) -> Report:
         newest = self._newest_measured.get(sample.stream)
+        if self._strays.hold(sample, newest):
+            return self._hold(sample)
         if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
             return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
         self._newest_measured[sample.stream] = sample.stamp
@@ -238,11 +254,17 @@ class Twin:
         if expected is None:
             return None
         if sample.stream is Stream.ANGLES:
-            values, sigmas, names = sample.values - expected.joints, expected.joint_sigmas, self._names
+            values = self._mounting.residuals(sample.values, expected.angles)
+            sigmas, names = expected.angle_sigmas, self._names
         else:
             values, sigmas = sample.values - expected.force, expected.force_sigmas
             names = ("tip_imu_x", "tip_imu_z")
         return Residuals(sample.stream, sample.stamp, names, values, sigmas)
+
+    def _hold(self, sample: Sample) -> Report:
+        """Taken as a witness of time alone."""
+        self.counts["leap"] += 1
+        return Report(sample.stamp, True, events=("leap",))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

@@ -12,13 +12,14 @@ from rclpy.subscription import Subscription
 
 from ..errors import BoomTwinError
 from ..io.intake import Intake, stamp_of
+from ..io.mapping import load_mapping
 from ..io.outlet import Outlet
-from ..io.topics import NODE, Output, load_topics
+from ..io.topics import NODE, Output
 from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, refuse_while, scene_path, settings_of
+from .parameters import declare, mapping_path, refuse_while, scene_path, settings_of
 from .qos import qos_profile
 from .types import message_class
 
@@ -41,10 +42,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
-        self._topics = load_topics()
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
+        self._topics = load_mapping(mapping_path(self))
         refuse_while(self, frozen=lambda: self._twin is not None)
         self._diagnostics = Diagnostics(self, self._topics)
 
@@ -79,10 +80,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         gc.collect()
         gc.freeze()  # what lives from here on as long as the node is not searched again
         outcome = super().on_activate(state)
-        for stream, topic in self._topics.inputs.items():
-            receive = partial(self._receive, stream)
+        for name, streams in self._topics.heard.items():
+            topic, receive = self._topics.inputs[streams[0]], partial(self._receive, streams)
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos))
+            self._subscriptions_in.append(self.create_subscription(kind, name, receive, qos))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
         return outcome
@@ -121,12 +122,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         scene, oddities = examine(path)
         for oddity in oddities:
             self.get_logger().warning(str(oddity))
-        settings = settings_of(self)
-        twin = Twin(scene, settings)
+        settings, joints = settings_of(self), len(scene.joints)
+        topics = load_mapping(mapping_path(self), joints)
+        twin = Twin(scene, settings, topics.mounts(joints))
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
-        self._twin, self._intake = twin, Intake(twin.plan.joints)
+        self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
@@ -145,12 +147,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, stream: Stream, msg: Any) -> None:
+    def _receive(self, streams: list[Stream], msg: Any) -> None:
         """Take one message; whatever it holds, the node lives on."""
-        try:
-            self._take(stream, stamp_of(msg), msg)
-        except Exception as error:  # the last resort, such as a stamp that no message can carry back
-            self._diagnostics.broken(stream, error)
+        for stream in streams:
+            try:
+                self._take(stream, stamp_of(msg), msg)
+            except Exception as error:  # the last resort, such as a stamp that no message can carry back
+                self._diagnostics.broken(stream, error)
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None

@@ -22,7 +22,7 @@ _LARGEST = sys.float_info.max
 
 
 def declare(node: Node) -> None:
-    """Declare ``scene``, ``autostart`` and all settings.
+    """Declare ``scene``, ``mapping``, ``autostart`` and all settings.
 
     Raises
     ------
@@ -31,6 +31,7 @@ def declare(node: Node) -> None:
     """
     try:
         node.declare_parameter("scene", "", _text("path of the scene file; empty = the scene of the package"))
+        node.declare_parameter("mapping", "", _fixed_text("path of the file of topics and sensors; empty = topics.yaml"))
         node.declare_parameter("autostart", True, _switch("the node configures and activates itself"))
         for name, field in Settings.model_fields.items():
             node.declare_parameter(name, float(field.default), _number(name, field))
@@ -65,6 +66,12 @@ def scene_path(node: Node) -> Path | None:
     return Path(text) if text else None
 
 
+def mapping_path(node: Node) -> Path | None:
+    """The mapping to load; None = the package's own."""
+    text: str = node.get_parameter("mapping").value
+    return Path(text) if text else None
+
+
 def settings_of(node: Node) -> Settings:
     """The settings as the parameters stand; UsageError if a value is out of bounds."""
     return settings_from({name: node.get_parameter(name).value for name in Settings.model_fields}, SOURCE)
@@ -72,6 +79,10 @@ def settings_of(node: Node) -> Settings:
 
 def _text(description: str) -> ParameterDescriptor:
     return ParameterDescriptor(type=ParameterType.PARAMETER_STRING, description=description)
+
+
+def _fixed_text(description: str) -> ParameterDescriptor:
+    return ParameterDescriptor(type=ParameterType.PARAMETER_STRING, description=description, read_only=True)
 
 
 def _switch(description: str) -> ParameterDescriptor:
