@@ -14,7 +14,7 @@ from .errors import BoomTwinError
 
 LARGEST = 4 * 2**20
 """Bytes of a file that is read."""
-MOST = 100_000
+MOST = 50_000
 """Values that it may hold, aliases written out."""
 DEEPEST = 30
 
