@@ -67,6 +67,8 @@ class Prediction:
         The same points of rigid sections on incompressible cylinders at the same strokes, m; when `shape` is there.
     pins : ndarray, shape (n, 4), or None
         Barrel pin (x, y) and rod pin (x, y) of every cylinder of the deflected boom, m; when `shape` is there.
+    clearances : ndarray, shape (k, 4), or None
+        Of every pin with clearance the journal's offset x, y (m), contact force (N), and 1 where it touches.
     """
 
     stamp: int
@@ -83,6 +85,7 @@ class Prediction:
     shape: Array | None
     undeflected: Array | None = None
     pins: Array | None = None
+    clearances: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

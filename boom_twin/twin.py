@@ -91,7 +91,7 @@ class Twin:
         self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
         self._undeflected = Undeflected(scene, self.plan)
         self._track = new_track(self.plan, lengths)
-        self._row = np.zeros(4 * self.plan.joints + 11)
+        self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
         self._mounting = Mounting(self.plan, scene.base.inclination, mounts)
         self._strays = Strays(self.settings)
         self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
@@ -182,7 +182,7 @@ class Twin:
         return Prediction(
             stamp=stamp,
             tip_position=tip[0:2],
-            tip_displacement=tip[0:2] - row[4 * n + 9 :],
+            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
             tip_velocity=tip[3:5],
             tip_acceleration=tip[6:8],
             tip_angle=float(tip[2]),
@@ -194,6 +194,7 @@ class Twin:
             shape=shape,
             undeflected=undeflected,
             pins=pins,
+            clearances=row[4 * n + 11 :].reshape(-1, 4),
         )
 
     def _lines(self, run: _Run, stamp: int) -> tuple[Array, Array, Array] | tuple[None, None, None]:

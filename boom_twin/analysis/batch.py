@@ -12,11 +12,11 @@ import numpy as np
 
 from ..chain.batch import run_each
 from ..chain.status import OK, SENTENCES
-from ..chain.step import observe
 from ..errors import UsageError
 from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import Plan
 from ..records import Array
+from .rows import first_row, row_width
 from .simulate import PASSES, RHO, TOLERANCE
 from .statics import settle
 
@@ -50,7 +50,7 @@ class Batch:
     def settle(self, strokes: Array, angles: Array) -> Array:
         """Bring every boom to rest at `strokes` (m) next to joint `angles` (rad), both (n,) or (booms, n).
 
-        Returns their first rows, shape (booms, 2 n + 9): joint angles, cylinder forces, x, v, a of the tip.
+        Returns their first rows, shape (booms, row_width), see `analysis.rows`.
 
         Raises
         ------
@@ -58,12 +58,12 @@ class Batch:
             A boom has no equilibrium there.
         """
         n = self.plans[0].joints
-        rows = np.empty((len(self.plans), 2 * n + 9))
+        rows = np.empty((len(self.plans), row_width(self.plans[0])))
         every = (len(self.plans), n)
         for i, (at, near) in enumerate(zip(np.broadcast_to(strokes, every), np.broadcast_to(angles, every), strict=True)):
             plan, state = self.plans[i], _part(self._states, i)
             settle(plan, state, _part(self._works, i), at, near)
-            observe(plan.tables, state, rows[i])
+            rows[i] = first_row(plan, state)
         return rows
 
     def run(self, step: float, strokes: Array, rates: Array, every: int = 1, rho: float = RHO) -> Array:
@@ -80,8 +80,8 @@ class Batch:
 
         Returns
         -------
-        ndarray, shape (booms, steps/every, 2 n + 9)
-            Joint angles, cylinder forces, x, v, a of tip x, y, angle. NaN from where a boom's step failed; see `failures`.
+        ndarray, shape (booms, steps/every, row_width)
+            See `analysis.rows`. NaN from where a boom's step failed; see `failures`.
         """
         count, n = len(self.plans), self.plans[0].joints
         total = np.shape(strokes)[-2]
@@ -92,7 +92,7 @@ class Batch:
         speeds = np.ascontiguousarray(np.broadcast_to(rates, (count, total, n)))
         rows = total // every
         steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
-        out, self._ends = np.full((count, rows, 2 * n + 9), np.nan), np.zeros((count, 3), np.int64)
+        out, self._ends = np.full((count, rows, row_width(self.plans[0])), np.nan), np.zeros((count, 3), np.int64)
 
         def share(bounds: tuple[int, int]) -> None:
             run_each(

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..chain.clearance import load_pins
 from ..chain.place import place
 from ..chain.program import Motion, State, Work
 from ..chain.status import OK
@@ -61,14 +62,13 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     status, negative = _condense(plan, state, work, motion, drive)
     if status != OK:
         return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
-    blocks = work.blocks.copy()
-    blocks[0, 2:, 2:] = np.eye(4)  # joint A, always the first, condenses two unknowns only
-    return int(negative) + _negative_eigenvalues(blocks)
+    return int(negative) + _negative_eigenvalues(work.blocks) + _negative_eigenvalues(work.ends)
 
 
 def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int]:
     """Sweep the whole boom in; status and negative pivots."""
     clear_cut(work, FREE)
+    load_pins(plan.tables, state, work, motion)
     operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
     status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE)
     return int(status), int(negative)
@@ -81,8 +81,8 @@ def _drive(plan: Plan, state: State, work: Work) -> Array:
 
 
 def _negative_eigenvalues(blocks: Array) -> int:
-    """Of small symmetric matrices (k, 6, 6) whose rows differ by many orders of magnitude: balanced first, signs stay."""
-    for _ in range(6):
+    """Of small symmetric matrices (k, m, m) whose rows differ by many orders of magnitude: balanced first, signs stay."""
+    for _ in range(6 if len(blocks) else 0):
         size = np.sqrt(np.abs(blocks).max(axis=2))
         size[size == 0.0] = 1.0
         blocks = blocks / (size[:, :, None] * size[:, None, :])

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..chain.plain import new_product
 from ..chain.status import OK, SENTENCES
-from ..chain.step import observe, run
+from ..chain.step import run
 from ..errors import UsageError
 from ..physics import integrators
 from ..plan.compile import BasisName, compile_scene
@@ -19,6 +19,7 @@ from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
 from .doubt import doubt
+from .rows import first_row, row_width, taken_apart
 from .simulate import PASSES, RHO, TOLERANCE
 from .statics import settle
 
@@ -82,6 +83,8 @@ class March:
         m, m/s^2.
     joints, cylinder_forces : ndarray, shape (m, n)
         rad, N.
+    pins : ndarray, shape (m, k, 4)
+        Pins with clearance, see `analysis.rows`.
     seconds : float
         Wall time of the stepping alone, median of the repeats.
     steps : int
@@ -98,6 +101,7 @@ class March:
     tip_acceleration: Array
     joints: Array
     cylinder_forces: Array
+    pins: Array
     seconds: float
     steps: int
     passes: float
@@ -130,7 +134,7 @@ def march(
     Raises
     ------
     UsageError
-        Duration is not a multiple of `every` steps.
+        Duration is not a multiple of `every` steps; the plain product for a scene with clearance, which it does not know.
     SolverError
         No equilibrium at t = 0. A step that fails is a status, not an error.
     """
@@ -139,6 +143,8 @@ def march(
     if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
         raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
     plan = compile_scene(scene, basis)
+    if plan.pins and method.product == "plain":
+        raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
     family = FAMILIES[method.integrator]
     depth = integrators.depth_of(family)
     strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
@@ -150,23 +156,24 @@ def march(
     seconds = []
     for _ in range(repeats):
         state = type(start)(*(array.copy() for array in start))
-        out = np.full((rows + 1, 2 * plan.joints + 9), np.nan)
-        observe(plan.tables, state, out[0])
+        out = np.full((rows + 1, row_width(plan)), np.nan)
+        out[0] = first_row(plan, state)
         begun = time.perf_counter()
         status, row, total, jolt, shake = run(
             plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
             method.tolerance, np.int64(method.passes), product, out[1:],
         )  # fmt: skip
         seconds.append(time.perf_counter() - begun)
-    n, done = plan.joints, max(int(row), 1) * every
-    tip = out[:, 2 * n :].reshape(-1, 3, 3)
+    found, done = taken_apart(plan, out), max(int(row), 1) * every
+    tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return March(
         times=np.asarray(step * every * np.arange(rows + 1), float),
         tip=tip[:, 0, :2],
         tip_acceleration=tip[:, 2, :2],
-        joints=out[:, :n],
-        cylinder_forces=out[:, n : 2 * n],
+        joints=found.joints,
+        cylinder_forces=found.cylinder_forces,
+        pins=found.pins,
         seconds=statistics.median(seconds),
         steps=rows * every,
         passes=total / done,

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chain.status import OK, SENTENCES
-from ..chain.step import observe, run
+from ..chain.step import run
 from ..errors import SolverError, UsageError
+from ..physics.contact import LOST
 from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import Plan, compile_scene
 from ..records import Array
@@ -18,6 +19,7 @@ from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
 from .doubt import doubt
 from .pchip import pchip
+from .rows import first_row, row_width, taken_apart
 from .statics import checked_strokes, settle
 
 RHO = 0.8
@@ -44,6 +46,13 @@ class Simulation:
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     doubt : str
         What the motion gives reason to doubt: too coarse a step, ringing. Empty if nothing; see `analysis.doubt`.
+    pin_names : tuple of str
+        Pins with clearance.
+    pins : ndarray, shape (m, k, 4)
+        Offset x, y of the journal in its bush (m, model axes), contact force (N), 1 where they touch. Of a cylinder's pin the
+        cylinder's eye is the journal, of a section's pivot the outer section, of a link's pin the link, of Q link R.
+    lost_contacts : ndarray of int, shape (k,)
+        How often each of them lost contact.
     """
 
     times: Array
@@ -56,6 +65,9 @@ class Simulation:
     passes: float
     step_error: float
     doubt: str
+    pin_names: tuple[str, ...]
+    pins: Array
+    lost_contacts: NDArray[np.int64]
 
     def columns(self) -> dict[str, Array]:
         """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
@@ -65,7 +77,11 @@ class Simulation:
         columns |= {f"joint_{i + 1}_rad": self.joints[:, i] for i in range(n)}
         columns |= {"tip_x_m": self.tip[:, 0], "tip_y_m": self.tip[:, 1]}
         columns |= {"tip_ax_m_s2": self.tip_acceleration[:, 0], "tip_ay_m_s2": self.tip_acceleration[:, 1]}
-        return columns | {f"cylinder_force_{i + 1}_N": self.cylinder_forces[:, i] for i in range(n)}
+        columns |= {f"cylinder_force_{i + 1}_N": self.cylinder_forces[:, i] for i in range(n)}
+        for k, name in enumerate(self.pin_names):
+            for j, quantity in enumerate(("dx_m", "dy_m", "force_N", "contact")):
+                columns[f"{name.replace('.', '_')}_{quantity}"] = self.pins[:, k, j]
+        return columns
 
 
 def simulate(
@@ -97,20 +113,22 @@ def simulate(
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-    n = plan.joints
-    rows = np.empty((len(times), 2 * n + 9))
-    observe(plan.tables, state, rows[0])
+    rows = np.empty((len(times), row_width(plan)))
+    rows[0] = first_row(plan, state)
     steps, counts, drives, rates = _drive(plan, times, strokes, dt)
     status, row, passes, jolt, shake = run(
         plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     if status != OK:
         raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
-    tip = rows[:, 2 * n :].reshape(-1, 3, 3)
+    found = taken_apart(plan, rows)
+    tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return Simulation(
-        times, strokes, rows[:, :n], rows[:, n : 2 * n], tip[:, 0], tip[:, 1], tip[:, 2], passes / max(int(counts.sum()), 1),
-        abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt, doubt(jolt, shake, travel, float(counts @ steps**2)),
+        times, strokes, found.joints, found.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
+        passes / max(int(counts.sum()), 1), abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt,
+        doubt(jolt, shake, travel, float(counts @ steps**2)), plan.pins, found.pins,
+        state.contacts[:, LOST].astype(np.int64),
     )  # fmt: skip
 
 

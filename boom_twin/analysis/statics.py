@@ -17,6 +17,7 @@ from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_
 from ..scene.parts import Scene
 from .frequencies import Mode, constraints, natural_modes, negative_pivots
 from .posture import rigid_tip, set_undeformed
+from .seating import clamp_pins, linearise_pins, release_pins
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
@@ -109,21 +110,30 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then gradually. Histories are left without motion.
+    The full load at once is tried first, then gradually, both with ideal pins; then those with clearance are seated.
+    Histories are left without motion.
     """
-    drive = plan.closed_lengths + strokes
+    drive, where = plan.closed_lengths + strokes, ", ".join(f"{stroke:.4f}" for stroke in strokes)
+    state.drives[0], state.drives[1], state.pace[0] = drive, 0.0, 0
+    clamp_pins(state)
     set_undeformed(plan, state, angles)
-    if _rests(plan, state, work, drive, 1.0):
-        return
-    set_undeformed(plan, state, angles)
-    share = _load_gradually(plan, state, work, drive)
-    if share < 1.0:
-        where = ", ".join(f"{stroke:.4f}" for stroke in strokes)
-        raise SolverError(
-            f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
-            "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's "
-            "range."
-        )
+    if not _rests(plan, state, work, drive, 1.0):
+        set_undeformed(plan, state, angles)
+        share = _load_gradually(plan, state, work, drive)
+        if share < 1.0:
+            raise SolverError(
+                f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
+                "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's "
+                "range."
+            )
+    if plan.pins:
+        release_pins(plan, state)
+        if not _rests(plan, state, work, drive, 1.0):
+            raise SolverError(
+                f"no equilibrium at strokes {where} m with clearance in {', '.join(plan.pins)}, though there is one with ideal "
+                "pins. Check radial_clearance (m), and how near the posture is to a dead centre."
+            )
+        linearise_pins(plan, state)
 
 
 def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:

@@ -20,9 +20,11 @@ OPERATION = np.dtype([("kind", np.int64), ("row", np.int64)])
 
 JOINT = np.dtype(
     [
-        ("z", np.int64),  # A: theta, N.  B: theta, alpha_L, alpha_R, lambda_x, lambda_y, N
+        # A: theta, N.  B: theta, alpha_L, alpha_R, lambda_x, lambda_y, N.  Both: offsets (2) of the pins with clearance
+        ("z", np.int64),
         ("x", float), ("y", float),  # pivot of joint A in the base, m
         ("first_link", np.int64), ("links", np.int64),  # rows of LINK: those that have mass
+        ("first_clearance", np.int64), ("clearances", np.int64),  # rows of CLEARANCE: pivot and link pins
     ]
 )  # fmt: skip
 
@@ -68,6 +70,7 @@ class Tables(NamedTuple):
     outlets: np.recarray
     cylinders: np.recarray
     parts: np.recarray
+    clearances: np.recarray  # pins that are not ideal, see `physics.contact`
     gravity: Array  # (2,), m/s^2
     moving: Array  # (unknowns,): 1 for coordinates, 0 for forces
     scale: Array  # (unknowns,): turns an increment into an angle, rad; 0 for forces
@@ -90,7 +93,10 @@ class State(NamedTuple):
     history : (depth, histories) of every unknown and then of every mass point; rows: see `physics.integrators`.
     frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
     turns : (joints, 8) cosine and sine of a six-bar's head, section, link L, link R.
-    pins : (cylinders, 4) pins C and R of every cylinder, m.
+    pins : (cylinders, 4) ends C and R of every cylinder, m.
+    contacts : (clearances, 8) what pins with clearance remember, see `physics.contact`.
+    drives : (2, cylinders) length (m) and rate (m/s) of the drives at the newest history.
+    pace : (1,) ticks of the last sub-step, see `chain.step`.
     """
 
     z: Array
@@ -98,6 +104,9 @@ class State(NamedTuple):
     frames: Array
     turns: Array
     pins: Array
+    contacts: Array
+    drives: Array
+    pace: np.ndarray
 
 
 class Work(NamedTuple):
@@ -107,22 +116,30 @@ class Work(NamedTuple):
     hat: Array
     offset: Array
     weights: Array  # of the scheme, see `physics.integrators`
+    finer: Array  # of a sub-step's
     s: Array  # (SLOTS, SLOTS)
     p: Array  # (SLOTS,)
     g: Array  # (size,) of a six-bar's system
     h: Array  # (size, size)
     own_g: Array  # (5,) of a cylinder
     own_h: Array  # (5, 5)
-    matrix: Array  # (6, 6)
-    right: Array  # (6, SLOTS)
+    matrix: Array  # (inner, inner), inner: most unknowns of a joint
+    right: Array  # (inner, SLOTS)
     gains: Array  # (operations, rows, SLOTS): decrements of the condensed unknowns by increments of the cut ..
     free: Array  # (operations, rows): .. and those that do not depend on it
     block: Array  # (rows, rows): H_qq of a beam part
-    blocks: Array  # (cylinders, 6, 6) what a joint condenses, kept for counting natural frequencies
+    blocks: Array  # (joints, inner, inner) what a joint condenses, kept for counting natural frequencies
+    ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
+    end_gains: Array  # (clearances, 2, 5), and its gains
+    end_free: Array  # (clearances, 2)
+    hold: Array  # (clearances, 9) force, tangent and torque of a pin, see `physics.contact.bearing`
+    apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
     angles: Array  # (P+1,)
     turn: Array  # (beams, P, 4)
     local: Array  # (P, 2)
+    drive: Array  # (cylinders,) of a sub-step, m
+    drive_rate: Array  # (cylinders,), m/s
     dz: Array  # (unknowns,)
     cut: Array  # (SLOTS,)

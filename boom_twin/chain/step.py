@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 
-from ..physics.integrators import A, V, X, finish_step, prepare, start_step
+import numpy as np
+
+from ..physics.contact import CLOSED, bearing
+from ..physics.integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..physics.jit import inner, kernel
+from .clearance import axis_of, coarseness, load_pins, note_contacts, shorten
 from .place import place
 from .plain import plain_pass
 from .program import JOINT_A, JOINT_B, Motion
 from .status import NOT_CONVERGED, NOT_FINITE, OK
 from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
+TICKS = np.int64(1024)  # of a step, the grid of its sub-steps
+SHORTEST = 1e-5  # s, of a sub-step; steps below twice that are not divided
+EASY = 0.1  # of the error allowed: the next sub-step is twice as long
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
 
 
@@ -19,8 +26,9 @@ LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the s
 def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product):
     """Step the boom to drive lengths (m) and rates (m/s), both shape (n,), at the instant that `scheme` solves for.
 
-    Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Kept in one function,
-    because every kernel that calls this one costs seconds of compiling.
+    Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Where journals with
+    clearance hit their bushes the step is divided, so that impacts are resolved. Kept in one function, because every kernel
+    that calls this one costs seconds of compiling.
 
     Parameters
     ----------
@@ -38,28 +46,97 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     Returns
     -------
     status, passes, last increment (rad)
-        On failure the histories stay as they were.
+        On failure the histories stay as they were, or as the last sub-step left them.
+    """
+    done, total, size = 0, 0, 0.0
+    part, least = first_part(t, state, scheme), least_part(t, scheme)
+    now = scheme
+    while True:
+        if part < TICKS:
+            now = prepare(scheme.family, scheme.parameter, scheme.reach * part / TICKS, work.finer)
+        lead(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
+        status, count, size = converge(t, state, work, now, tolerance, passes, longest, product)
+        total += count
+        if part > least and (status != OK or coarseness(t, state, work, now) > 1.0):
+            part //= 2
+            for i in range(state.z.shape[0]):
+                state.z[i] = state.history[X, i]
+            continue
+        if status != OK:
+            return status, total, size
+        easy = coarseness(t, state, work, now) < EASY
+        note_contacts(t, state, work)
+        finish_step(now, work.position, work.hat, work.offset, state.history)
+        done += part
+        state.pace[0] = part
+        if easy and part < TICKS and done % (2 * part) == 0:
+            part *= 2
+        if done == TICKS:
+            break
+    for i in range(drive.shape[0]):
+        state.drives[0, i], state.drives[1, i] = drive[i], drive_rate[i]
+    return OK, total, size
+
+
+@inner
+def first_part(t, state, scheme):
+    """Ticks of the first sub-step: all, unless the last step was divided to its end."""
+    if t.clearances.shape[0] == 0 or least_part(t, scheme) == TICKS or state.pace[0] == 0:
+        return TICKS
+    return max(state.pace[0], least_part(t, scheme))
+
+
+@inner
+def least_part(t, scheme):
+    """Ticks of the shortest sub-step: all where nothing touches and parts, and for schemes with a longer memory."""
+    part = TICKS
+    if t.clearances.shape[0] > 0 and (scheme.family == GENERALISED_ALPHA or scheme.family == NEWMARK):
+        while part > 1 and scheme.reach * part > 2.0 * SHORTEST * TICKS:
+            part //= 2
+    return part
+
+
+@inner
+def lead(state, work, drive, drive_rate, span, share):
+    """Drive of a sub-step that ends at `share` of a step of `span` s: on the cubic from the last step's drive to this one's."""
+    u = share
+    for i in range(drive.shape[0]):
+        work.drive[i], work.drive_rate[i] = drive[i], drive_rate[i]
+        if u < 1.0:
+            start, v = state.drives[0, i], state.drives[1, i] * span
+            gap, end = drive[i] - start - v, drive_rate[i] * span - v
+            c2, c3 = 3.0 * gap - end, end - 2.0 * gap
+            work.drive[i] = start + u * (v + u * (c2 + u * c3))
+            work.drive_rate[i] = (v + u * (2.0 * c2 + u * 3.0 * c3)) / span
+
+
+@inner
+def converge(t, state, work, scheme, tolerance, passes, longest, product):
+    """Newton passes to the instant that `scheme` solves for, with the drive in `work`; the histories are not written.
+
+    Returns status, passes, last increment (rad).
     """
     start_step(scheme, state.history, work.hat, work.offset)
     predict(t, state, scheme.reach)
     motion, operations, size = Motion(scheme.gain, scheme.rate, work.hat, work.offset), t.operations.shape[0], 0.0
     place(t, state, work)
     for k in range(passes):
+        load_pins(t, state, work, motion)
         if product is None:
             clear_cut(work, FREE)
-            status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, ROOT, operations, FREE)
+            status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
             if status == OK:
                 sweep_out(t, state, work, ROOT, operations, FREE)
         else:
-            status = plain_pass(t, state, work, motion, drive, drive_rate, product)
+            status = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
         if status != OK:
             return reason(work, status), k + 1, size
+        shorten(t, state, work)
         size = add_increments(t, state, work, longest)
         if not math.isfinite(size):
             return NOT_FINITE, k + 1, size
         place(t, state, work)
         if size < tolerance or passes == 1:
-            finish_step(scheme, work.position, work.hat, work.offset, state.history)
             return OK, k + 1, size
     return NOT_CONVERGED, passes, size
 
@@ -114,6 +191,21 @@ def observe(t, state, out):
         out[2 * n + 6 + j] = state.history[A, t.tip + j]
 
 
+@inner
+def observe_pins(t, state, out, at):
+    """Write from place `at` on, for every pin with clearance: offset of its journal (2), force (N), 1 where it touches."""
+    v = state.history[V]
+    for k in range(t.clearances.shape[0]):
+        row, memory = t.clearances[k], state.contacts[k]
+        x, y, vx, vy, turning = state.z[row.z], state.z[row.z + 1], v[row.z], v[row.z + 1], 0.0
+        if row.friction > 0.0:
+            turning = v[row.turn]
+        ax, ay = axis_of(t, state, row)
+        fx, fy, _, _, _, _, _, _, _ = bearing(row, memory, x, y, vx, vy, vx, vy, turning, ax, ay, 0.0)
+        out[at + 4 * k], out[at + 4 * k + 1] = x, y
+        out[at + 4 * k + 2], out[at + 4 * k + 3] = math.hypot(fx, fy), memory[CLOSED]
+
+
 @kernel
 def run(t, state, work, steps, counts, drives, rates, family, parameter, tolerance, passes, product, out):
     """Follow drive lengths through many rows.
@@ -130,8 +222,8 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         See `physics.integrators.prepare`.
     product : Product or None
         See `advance`.
-    out : ndarray, shape (rows, 2 n + 9)
-        See `observe`.
+    out : ndarray, shape (rows, 2 n + 9 + 4 pins)
+        See `observe` and `observe_pins`.
 
     Returns
     -------
@@ -158,4 +250,5 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             jolt += steps[row] * steps[row] * math.hypot(a[t.tip] - ax, a[t.tip + 1] - ay)
             shake += steps[row] * steps[row] * math.hypot(a[t.tip], a[t.tip + 1])
         observe(t, state, out[row])
+        observe_pins(t, state, out[row], 2 * t.joints.shape[0] + 9)
     return OK, steps.shape[0], total, jolt, shake

@@ -1,14 +1,16 @@
 """Substructure A, slider-crank: cylinder 1 between the base and section 1.
 
-Sweeping in, the rod pin adds the cylinder to the cut and opens a column for its force N; at the pivot, which does not move,
-the section's angle and N are what is left to solve.
+Sweeping in, the rod pin adds the cylinder to the cut and opens a column for its force N; at the pivot the section's angle and
+N are what is left to solve. The pivot does not move, or by the offset of its journal only, which is solved with them.
 """
 
 from __future__ import annotations
 
 from ..physics.algebra import solve
+from ..physics.contact import ROD
 from ..physics.cylinder import cylinder_terms
 from ..physics.jit import inner
+from .clearance import condense_ends, torque_of
 
 
 @inner
@@ -21,6 +23,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
         cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[0], drive_rate[0],
         motion, t.gravity, work.position, g, h,
     )  # fmt: skip
+    condense_ends(t, state, work, cylinder, g, h)
     bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
     for i in range(m + 1):
         s[m, i] = 0.0
@@ -32,7 +35,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     s[m, m], p[m] = h[4, 4], g[4]
     turn_x = -by * h[2, 2] + bx * h[2, 3]  # row of the turning against x, y of the rod pin
     turn_y = -by * h[3, 2] + bx * h[3, 3]
-    p[2] += bx * g[3] - by * g[2]
+    p[2] += bx * g[3] - by * g[2] - torque_of(t, work, cylinder, ROD)
     for i in range(2):
         for j in range(2):
             s[i, j] += h[2 + i, 2 + j]
@@ -47,16 +50,36 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
 
 
 @inner
-def close_base(work, operation):
-    """Solve increments of theta and N of joint A into the gains of `operation`; False if singular."""
-    s, p, a, b = work.s, work.p, work.matrix, work.right
-    for i in range(2):
-        b[i, 0] = p[2 + i]
-        for j in range(2):
-            a[i, j] = s[2 + i, 2 + j]
+def close_base(t, work, operation):
+    """Solve increments of joint A into the gains of `operation`: theta, N, and x, y if the pivot has clearance.
+
+    False if singular.
+    """
+    s, p, a, b, joint = work.s, work.p, work.matrix, work.right, t.joints[0]
+    size = 2 + 2 * joint.clearances
+    for i in range(size):
+        of = 2 + i if i < 2 else i - 2
+        b[i, 0] = p[of]
+        for j in range(size):
+            a[i, j] = s[of, 2 + j if j < 2 else j - 2]
+    if joint.clearances:
+        hold = work.hold[joint.first_clearance]
+        b[0, 0] += hold[5]
+        b[2, 0] += hold[0]
+        b[3, 0] += hold[1]
+        a[2, 2] += hold[2]
+        a[2, 3] += hold[3]
+        a[3, 2] += hold[3]
+        a[3, 3] += hold[4]
+        a[0, 0] += hold[8]
+        for i in range(2):
+            a[0, 2 + i] += hold[6 + i]
+            a[2 + i, 0] += hold[6 + i]
+    for i in range(size):
+        for j in range(size):
             work.blocks[0, i, j] = a[i, j]
-    if not solve(a, b, 2, 1):
+    if not solve(a, b, size, 1):
         return False
-    work.free[operation, 0] = b[0, 0]
-    work.free[operation, 1] = b[1, 0]
+    for i in range(size):
+        work.free[operation, i] = b[i, 0]
     return True

@@ -8,6 +8,10 @@ the place where C sits. With P the pivot, L the vector of link L from D to Q, an
     rod pin:            R = r_base + along u + left n, on link L from D, or on link R from E.
 
 B1, B2, B3 differ in the numbers of the rod pin only (see `physics.linkage`).
+
+A pivot or link pin with clearance has its journal's offset as two more unknowns, behind the six: it moves all that hangs on it,
+as the head's pivot would. So its rows are those of the head's pivot as far as they come from these parts, which are therefore
+assembled in turn: link L, link R, section i.
 """
 
 from __future__ import annotations
@@ -15,15 +19,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..physics.algebra import solve
+from ..physics.contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
 from ..physics.cylinder import cylinder_terms
 from ..physics.jit import inner
-from ..physics.linkage import LINK_L
+from ..physics.linkage import LINK_L, LINK_R
 from ..physics.rotation import rotated
+from .clearance import add_turning, condense_ends, move_ends, torque_of
 from .place import link_frame
 
 # places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
 HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
 INNER = np.int64(6)  # typed, because numba compiles once more for every literal
+MOST_INNER = 14  # with the offsets of all four pins of a joint
 
 
 @inner
@@ -71,10 +78,12 @@ def _add_closure(joint, linkage, z, turns, g, h):
 
 
 @inner
-def _add_links(t, joint, linkage, turns, motion, position, g, h):
-    """Inertia and weight of the links that have mass."""
+def _add_link(t, joint, linkage, side, turns, motion, position, g, h):
+    """Inertia and weight of the link on `side`, if it has mass."""
     for k in range(joint.first_link, joint.first_link + joint.links):
         row = t.links[k]
+        if row.side != side:
+            continue
         i = row.history
         bx, by, c, s = link_frame(row.side, linkage, turns)
         wx, wy = row.middle * c, row.middle * s
@@ -98,6 +107,7 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
         cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[index], drive_rate[index],
         motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
+    condense_ends(t, state, work, cylinder, own_g, own_h)
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
     wx, wy = rotated(c, s, linkage.along, linkage.left)
     base, link = SECTION, ALPHA_R
@@ -124,6 +134,83 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     h[FORCE, 1] += ey
     h[FORCE, base] += bx * ey - by * ex
     h[FORCE, link] += wx * ey - wy * ex
+    g[link] -= torque_of(t, work, cylinder, ROD)
+
+
+@inner
+def _add_side(t, state, work, index, side, motion, drive, drive_rate, g, h):
+    """Link L or R of joint `index`, with the cylinder if it pushes on it."""
+    linkage = t.linkages[index]
+    _add_link(t, t.joints[index], linkage, side, state.turns[index], motion, work.position, g, h)
+    if linkage.mount == side:
+        _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
+
+
+@inner
+def _add_cut(work, m, behind, g, h):
+    """Section i: x, y of its pivot, its angle, and what is carried already, which stands from place `behind` on."""
+    for i in range(m):
+        a = i if i < 2 else SECTION if i == 2 else behind + i - 3
+        g[a] += work.p[i]
+        for j in range(i + 1):
+            h[a, j if j < 2 else SECTION if j == 2 else behind + j - 3] += work.s[i, j]
+
+
+@inner
+def _keep(apart, g, h, size):
+    """Keep force and tangent of the head's pivot, as assembled so far."""
+    for i in range(2):
+        apart[i, size] = g[i]
+        for j in range(size):
+            apart[i, j] = h[max(i, j), min(i, j)]
+
+
+@inner
+def _take(t, work, joint, place, size, g, h):
+    """Rows of the offset of pin `place`: those of the head's pivot less the kept ones, and the pin's own force."""
+    apart = work.apart
+    for k in range(joint.clearances):
+        row = joint.first_clearance + k
+        if t.clearances[row].place != place:
+            continue
+        at, hold = SIZE + 2 * k, work.hold[row]
+        for i in range(2):
+            g[at + i] += g[i] - apart[i, size] + hold[i]
+            for j in range(size):
+                value = h[max(i, j), min(i, j)] - apart[i, j]
+                if j < at:
+                    h[at + i, j] += value
+                elif j > at + 1:
+                    h[j, at + i] += value
+            for j in range(i + 1):
+                h[at + i, at + j] += h[i, j] - apart[i, j] + hold[2 + i + j]
+
+
+@inner
+def _free_pins(t, state, work, joint, g, h):
+    """Closure of pin Q with all offsets, the force of pin Q's own, and friction in all four pins."""
+    lx, ly = state.z[joint.z + 3], state.z[joint.z + 4]
+    for k in range(joint.clearances):
+        row = joint.first_clearance + k
+        place, hold, at = t.clearances[row].place, work.hold[row], SIZE + 2 * k
+        sign = 1.0 if place == LINK_L_PIN or place == Q_PIN else -1.0
+        g[at] += sign * lx
+        g[at + 1] += sign * ly
+        dx, dy = state.z[t.clearances[row].z], state.z[t.clearances[row].z + 1]
+        g[LAMBDA] += sign * dx
+        g[LAMBDA + 1] += sign * dy
+        h[at, LAMBDA] += sign
+        h[at + 1, LAMBDA + 1] += sign
+        if place == Q_PIN:
+            for i in range(2):
+                g[at + i] += hold[i]
+                for j in range(i + 1):
+                    h[at + i, at + j] += hold[2 + i + j]
+        journal = SECTION if place == PIVOT else ALPHA_L if place == LINK_L_PIN else ALPHA_R
+        bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
+        g[journal] += hold[5]
+        g[bush] -= hold[5]
+        add_turning(hold, h, at, journal, bush)
 
 
 @inner
@@ -133,48 +220,57 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
     Returns False if the loop's system is singular (a linkage at its dead centre, no inertia).
     """
     joint, linkage, turns, g, h = t.joints[index], t.linkages[index], state.turns[index], work.g, work.h
-    size = SIZE + m - 3
+    behind = SIZE + 2 * joint.clearances
+    size = behind + m - 3
     for i in range(size):
         g[i] = 0.0
         for j in range(i + 1):
             h[i, j] = 0.0
-    for i in range(m):  # slots: x, y of the pivot, the section's angle, and what is carried already
-        a = i if i < 2 else SECTION if i == 2 else SIZE + i - 3
-        g[a] = work.p[i]
-        for j in range(i + 1):
-            h[a, j if j < 2 else SECTION if j == 2 else SIZE + j - 3] = work.s[i, j]
+    if joint.clearances == 0:
+        _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
+        _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
+        _add_cut(work, m, behind, g, h)
+        _add_closure(joint, linkage, state.z, turns, g, h)
+        return _condense_loop(work, index, operation, INNER, size)
+    _keep(work.apart, g, h, size)
+    _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
+    _take(t, work, joint, LINK_L_PIN, size, g, h)
+    _keep(work.apart, g, h, size)
+    _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
+    _take(t, work, joint, LINK_R_PIN, size, g, h)
+    _add_cut(work, m, behind, g, h)
+    _take(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, g, h)
-    _add_links(t, joint, linkage, turns, motion, work.position, g, h)
-    _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
-    return _condense_loop(work, index, operation, size)
+    _free_pins(t, state, work, joint, g, h)
+    return _condense_loop(work, index, operation, behind - 5, size)
 
 
 @inner
-def _condense_loop(work, index, operation, size):
-    """Solve the six inner unknowns for all others; gains and block are kept, the cut is rewritten."""
+def _condense_loop(work, index, operation, count, size):
+    """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten."""
     s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
-    block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - INNER
-    for i in range(INNER):
+    block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - count
+    for i in range(count):
         for j in range(5):
             right[i, j] = h[5 + i, j]
-        for j in range(SIZE, size):
-            right[i, j - INNER] = h[j, 5 + i]
+        for j in range(5, others):
+            right[i, j] = h[j + count, 5 + i]
         right[i, others] = g[5 + i]
         for j in range(i + 1):
             block[i, j], matrix[i, j] = h[5 + i, 5 + j], h[5 + i, 5 + j]
             block[j, i], matrix[j, i] = h[5 + i, 5 + j], h[5 + i, 5 + j]
-    if not solve(matrix, right, INNER, others + 1):
+    if not solve(matrix, right, count, others + 1):
         return False
-    for i in range(INNER):
+    for i in range(count):
         for j in range(others):
             gains[i, j] = right[i, j]
         free[i] = right[i, others]
     for i in range(others):
-        a = i if i < 5 else i + INNER
+        a = i if i < 5 else i + count
         p[i] = g[a]
         for j in range(i + 1):
-            s[i, j] = h[a, j if j < 5 else j + INNER]
-        for k in range(INNER):
+            s[i, j] = h[a, j if j < 5 else j + count]
+        for k in range(count):
             coupling = h[5 + k, a] if a < 5 else h[a, 5 + k]
             p[i] -= coupling * free[k]
             for j in range(i + 1):
@@ -182,3 +278,42 @@ def _condense_loop(work, index, operation, size):
         for j in range(i):
             s[j, i] = s[i, j]
     return True
+
+
+@inner
+def open_loop(t, state, work, index, gains, free, m):
+    """Increments of joint B `index` from the cut at its head (m slots), which becomes that of section i; returns its slots."""
+    joint, cut, dz = t.joints[index], work.cut, work.dz
+    for i in range(INNER + 2 * joint.clearances):
+        value = -free[i]
+        for j in range(m):
+            value -= gains[i, j] * cut[j]
+        dz[joint.z + i] = value
+    if t.cylinders[index].clearances:
+        _move_cylinder(t, state, work, index)
+    for k in range(joint.clearances):
+        if t.clearances[joint.first_clearance + k].place == PIVOT:
+            cut[0] += dz[joint.z + INNER + 2 * k]
+            cut[1] += dz[joint.z + INNER + 2 * k + 1]
+    cut[2] = dz[joint.z]
+    for i in range(5, m):
+        cut[i - 2] = cut[i]
+    return m - 2
+
+
+@inner
+def _move_cylinder(t, state, work, index):
+    """Increments of the ends of a six-bar's cylinder from those of its pins."""
+    joint, linkage, cut, dz = t.joints[index], t.linkages[index], work.cut, work.dz
+    bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
+    wx, wy = rotated(c, s, linkage.along, linkage.left)
+    base, link = cut[2], dz[joint.z + 1]
+    rx, ry = cut[0], cut[1]
+    if linkage.mount != LINK_L:
+        base, link = dz[joint.z], dz[joint.z + 2]
+    for k in range(joint.clearances):
+        place, at = t.clearances[joint.first_clearance + k].place, joint.z + INNER + 2 * k
+        if (place == LINK_L_PIN) == (linkage.mount == LINK_L) and place != Q_PIN:
+            rx, ry = rx + dz[at], ry + dz[at + 1]
+    rx, ry = rx - by * base - wy * link, ry + bx * base + wx * link
+    move_ends(t, work, t.cylinders[index], cut[3], cut[4], rx, ry, dz[joint.z + 5])

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..physics.beam import USUAL, Sizes, is_usual, transfer_beam
+from ..physics.contact import BARREL
 from ..physics.jit import inner, kernel
 from ..physics.rigid import add_body, merge_outlet, pull_back
+from .clearance import move_ends, torque_of
 from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
 from .status import OK, SINGULAR
 from .substructure_a import close_base, join_rod
-from .substructure_b import close_loop
+from .substructure_b import close_loop, open_loop
 
 # The first operation; slots of a cut with nothing carried: x, y, theta. Typed, because numba compiles once more for literals.
 ROOT, FREE = np.int64(0), np.int64(3)
@@ -80,13 +82,14 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
             m = merge_outlet(s, p, m, c * bx - sn * by, sn * bx + c * by)
+            p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL)
         elif kind == ROD_PIN:
             m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:
             if not close_loop(t, state, work, motion, drive, drive_rate, row, k, m):
                 return SINGULAR, negative, m
             m += 2
-        elif kind == JOINT_A and not close_base(work, k):
+        elif kind == JOINT_A and not close_base(t, work, k):
             return SINGULAR, negative, m
     return OK, negative, m
 
@@ -115,21 +118,17 @@ def sweep_out(t, state, work, first, last, m):
             m += 2
         elif kind == ROD_PIN:
             m -= 1
+            bx, by = t.outlets[row].x, t.outlets[row].y
+            rx, ry = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
+            move_ends(t, work, t.cylinders[0], 0.0, 0.0, rx, ry, cut[m])
         elif kind == JOINT_B:
-            at = t.joints[row].z
-            for i in range(6):
-                value = -free[i]
-                for j in range(m):
-                    value -= gains[i, j] * cut[j]
-                dz[at + i] = value
-            cut[2] = dz[at]
-            for i in range(5, m):
-                cut[i - 2] = cut[i]
-            m -= 2
+            m = open_loop(t, state, work, row, gains, free, m)
         elif kind == JOINT_A:
             at = t.joints[row].z
-            dz[at], dz[at + 1] = -free[0], -free[1]
-            cut[0], cut[1], cut[2], cut[3] = 0.0, 0.0, dz[at], dz[at + 1]
+            dz[at], dz[at + 1], cut[0], cut[1] = -free[0], -free[1], 0.0, 0.0
+            if t.joints[row].clearances:
+                dz[at + 2], dz[at + 3], cut[0], cut[1] = -free[2], -free[3], -free[2], -free[3]
+            cut[2], cut[3] = dz[at], dz[at + 1]
             m = FREE + 1
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..chain.status import OK
-from ..chain.step import LONGEST_INCREMENT, advance, observe
+from ..chain.step import LONGEST_INCREMENT, advance, observe, observe_pins
 from ..physics.integrators import GENERALISED_ALPHA, REST, prepare
 from ..physics.jit import inner, kernel
 from ..physics.linkage import angle_of_length
@@ -79,8 +79,8 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
 
     The first sample of a track without nodes is taken as rest, in equilibrium; `anchor` holds a first guess of it.
 
-    out : ndarray, shape (4 n + 11,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
-    variances, tip of the rigid boom (2).
+    out : ndarray, shape (4 n + 11 + 4 pins,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
+    variances, tip of the rigid boom (2), pins with clearance (see `chain.step.observe_pins`).
 
     Returns a status of `chain.status`.
     """
@@ -179,6 +179,7 @@ def report(t, live, track, out):
     for i in range(n):
         out[at + i], out[at + n + i] = track.x[0, i, 0], track.c[0, i, 0, 0]
     out[at + 2 * n], out[at + 2 * n + 1] = rigid_tip(t, track)
+    observe_pins(t, live, out, at + 2 * n + 2)
 
 
 @inner
@@ -198,6 +199,9 @@ def copy_state(source, target):
     copy_rows(source.frames, target.frames)
     copy_rows(source.turns, target.turns)
     copy_rows(source.pins, target.pins)
+    copy_rows(source.contacts, target.contacts)
+    copy_rows(source.drives, target.drives)
+    target.pace[0] = source.pace[0]
 
 
 @inner

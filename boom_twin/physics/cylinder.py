@@ -24,6 +24,7 @@ CYLINDER = np.dtype(
         ("z", np.int64),  # place of N among the unknowns
         ("history", np.int64),  # place of l among the histories
         ("first_part", np.int64), ("parts", np.int64),  # rows of CYLINDER_PART
+        ("first_clearance", np.int64), ("clearances", np.int64),  # rows of CLEARANCE: its rod and barrel pins
         ("closed_length", float),  # m
         ("compliance", float),  # 1/k, m/N; 0 = incompressible
         ("lag", float),  # tau = damping over stiffness, s

@@ -40,11 +40,14 @@ DEPTH, LONG_DEPTH = 4, 8
 class Scheme(NamedTuple):
     """One scheme at one step size.
 
+    family, parameter : what `prepare` was given.
     reach : time from the newest history to the instant that is solved for, s.
     gain, rate : A (1/s^2) and C (1/s).
     weights : (2 + depth, 3 + depth), see the module's constants.
     """
 
+    family: np.int64
+    parameter: float
     reach: float
     gain: float
     rate: float
@@ -64,30 +67,31 @@ def new_weights(depth: int) -> Array:
 @inner
 def prepare(family, parameter, step, weights):
     """Scheme of `family` for `step` (s); `parameter` is rho, Newmark's gamma, or theta. Fills `weights`."""
+    family = np.int64(family)
     for k in range(weights.shape[0]):
         for j in range(weights.shape[1]):
             weights[k, j] = 0.0
     if family == REST:
         for k in range(ROWS, weights.shape[0] - 3, 2):
             weights[k, NEW_X] = 1.0
-        return Scheme(0.0, 0.0, 0.0, weights)
+        return Scheme(family, parameter, 0.0, 0.0, 0.0, weights)
     weights[X, NEW_X], weights[V, NEW_V], weights[A, NEW_A] = 1.0, 1.0, 1.0
     if family == GENERALISED_ALPHA:
         am, af = (2.0 * parameter - 1.0) / (parameter + 1.0), parameter / (parameter + 1.0)
-        return one_step(am, af, 0.5 + af - am, step, weights)
+        return one_step(family, parameter, am, af, 0.5 + af - am, step, weights)
     if family == NEWMARK:
-        return one_step(0.0, 0.0, parameter, step, weights)
+        return one_step(family, parameter, 0.0, 0.0, parameter, step, weights)
     if family == WILSON:
-        return wilson(parameter, step, weights)
+        return wilson(family, parameter, step, weights)
     for k in range(4):  # x, v of two steps ago, and of one step ago
         weights[ROWS + k, OLD + k + 2] = 1.0
     if family == HOUBOLT:
-        return houbolt(step, weights)
-    return park(step, weights)
+        return houbolt(family, parameter, step, weights)
+    return park(family, parameter, step, weights)
 
 
 @inner
-def one_step(am, af, gamma, h, weights):
+def one_step(family, parameter, am, af, gamma, h, weights):
     """Generalised-alpha with its four coefficients."""
     beta = 0.25 * (gamma + 0.5) ** 2
     gain, rate = (1.0 - am) / ((1.0 - af) * beta * h * h), gamma / (beta * h)
@@ -97,11 +101,11 @@ def one_step(am, af, gamma, h, weights):
     weights[OFFSET, X], weights[OFFSET, V] = -rate, 1.0 - rate * h
     weights[OFFSET, P] = h * (1.0 - gamma) - rate * h * h * (0.5 - beta)
     weights[P, NEW_A], weights[P, A], weights[P, P] = (1.0 - af) / (1.0 - am), af / (1.0 - am), -am / (1.0 - am)
-    return Scheme(h, gain, rate, weights)
+    return Scheme(family, parameter, h, gain, rate, weights)
 
 
 @inner
-def wilson(theta, h, weights):
+def wilson(family, theta, h, weights):
     """Wilson-theta, theta >= 1.37 for unconditional stability on an oscillator."""
     reach, part = theta * h, 1.0 / theta
     weights[HAT, X], weights[HAT, V], weights[HAT, A] = 1.0, reach, reach * reach / 3.0
@@ -111,25 +115,25 @@ def wilson(theta, h, weights):
     weights[V, NEW_V], weights[V, V] = 0.0, 1.0
     weights[V, NEW_A], weights[V, A] = 0.5 * h * part, 0.5 * h * (2.0 - part)
     weights[A, NEW_A], weights[A, A] = part, 1.0 - part
-    return Scheme(reach, 6.0 / (reach * reach), 3.0 / reach, weights)
+    return Scheme(family, theta, reach, 6.0 / (reach * reach), 3.0 / reach, weights)
 
 
 @inner
-def houbolt(h, weights):
+def houbolt(family, parameter, h, weights):
     """Houbolt's backward differences."""
     weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 2.5, -2.0, 0.5
     weights[OFFSET, X], weights[OFFSET, OLD + 2], weights[OFFSET, OLD] = -3.0 / h, 1.5 / h, -1.0 / (3.0 * h)
-    return Scheme(h, 2.0 / (h * h), 11.0 / (6.0 * h), weights)
+    return Scheme(family, parameter, h, 2.0 / (h * h), 11.0 / (6.0 * h), weights)
 
 
 @inner
-def park(h, weights):
+def park(family, parameter, h, weights):
     """Park's stiffly stable backward differences."""
     weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 1.5, -0.6, 0.1
     weights[HAT, V], weights[HAT, OLD + 3], weights[HAT, OLD + 1] = 0.9 * h, -0.36 * h, 0.06 * h
     weights[OFFSET, X], weights[OFFSET, OLD + 2], weights[OFFSET, OLD] = -2.5 / h, 1.0 / h, -1.0 / (6.0 * h)
     rate = 10.0 / (6.0 * h)
-    return Scheme(h, rate * rate, rate, weights)
+    return Scheme(family, parameter, h, rate * rate, rate, weights)
 
 
 @inner

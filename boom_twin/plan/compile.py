@@ -5,6 +5,7 @@ Only what the scene names gets rows. Section axes: x from the inboard pivot; the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,12 +13,12 @@ import numpy as np
 
 from ..chain import program
 from ..chain.program import SLOTS, State, Tables, Work
-from ..physics import cylinder, modes
+from ..physics import contact, cylinder, modes
 from ..physics.integrators import DEPTH, new_weights
 from ..physics.linkage import LINK_L, LINK_R, LINKAGE
 from ..records import Array
 from ..scene.kinematics import gravity_in_base, linkage
-from ..scene.parts import Cylinder, RigidPart, Scene
+from ..scene.parts import Cylinder, Pin, RigidPart, Scene
 from ..scene.splits import SAME_PLACE, flexible_parts
 from .layout import Layout
 
@@ -26,7 +27,12 @@ BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantile
 # Gauss points beyond the number of shapes: polynomials, or functions that grow exponentially. The error of the quadrature
 # then stays below that of leaving out further shapes.
 MORE_POINTS = {"end-shapes": 1, "cantilever": 3}
-LOOP = 14  # most rows of the system of a six-bar
+LOOP = 11 + 8 + SLOTS - 3  # most rows of the system of a six-bar: see `chain.substructure_b`
+PLACES = {
+    "pivot": contact.PIVOT, "link_L": contact.LINK_L_PIN, "link_R": contact.LINK_R_PIN, "Q": contact.Q_PIN,
+    "rod": contact.ROD, "barrel": contact.BARREL,
+}  # fmt: skip
+FINE = 0.1  # increment of an offset, as a share of its clearance, that counts as one of 1 rad
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,10 @@ class Plan:
         Inertia of every history (kg, kg m^2; 0 for those of unknowns) and weight along it (N).
     outline : ndarray of int, shape (k, 2)
         Points of the centre line, base to tip: (0, row of frames) or (1, place of x among the histories).
+    closed_lengths : ndarray, shape (n,)
+        Of the cylinders, m.
+    pins : tuple of str
+        Pins with clearance, in the order of `tables.clearances`.
     """
 
     tables: Tables
@@ -51,6 +61,7 @@ class Plan:
     weights: Array
     outline: np.ndarray
     closed_lengths: Array
+    pins: tuple[str, ...] = ()
 
     @property
     def joints(self) -> int:
@@ -58,29 +69,30 @@ class Plan:
         return len(self.tables.joints)
 
     def state(self, depth: int = DEPTH) -> State:
-        """A fresh state, all zero but the pins in the base; `depth` rows of history."""
+        """A fresh state, all zero; `depth` rows of history."""
         histories, n = len(self.masses), self.joints
-        state = State(
+        return State(
             z=np.zeros(len(self.names)), history=np.zeros((depth, histories)),
             frames=np.zeros((len(self.tables.operations) + 1, 5)), turns=np.zeros((n, 8)), pins=np.zeros((n, 4)),
+            contacts=np.zeros((len(self.pins), contact.COLUMNS)), drives=np.zeros((2, n)), pace=np.zeros(1, np.int64),
         )  # fmt: skip
-        first = self.tables.linkages[0]
-        state.pins[0, :2] = self.tables.joints[0].x + first.cx, self.tables.joints[0].y + first.cy
-        return state
 
     def work(self, depth: int = DEPTH) -> Work:
         """Scratch arrays of the right sizes, for schemes of `depth`."""
         t, histories = self.tables, len(self.masses)
         points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
-        beams, operations = len(t.beams), len(t.operations)
+        beams, operations, n, pins = len(t.beams), len(t.operations), self.joints, len(self.pins)
+        inner = 6 + 2 * max((int(joint.clearances) for joint in t.joints), default=0)
         return Work(
             position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
-            s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
-            own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((6, 6)), right=np.zeros((6, SLOTS)),
-            gains=np.zeros((operations, max(6, shapes), SLOTS)), free=np.zeros((operations, max(6, shapes))),
-            block=np.zeros((shapes, shapes)), blocks=np.zeros((len(t.joints), 6, 6)),
+            finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP),
+            h=np.zeros((LOOP, LOOP)), own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
+            gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),
+            block=np.zeros((shapes, shapes)), blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
+            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, 9)), apart=np.zeros((2, LOOP + 1)),
             rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)), angles=np.zeros(points),
-            turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
+            turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)),
+            drive=np.zeros(n), drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
         )  # fmt: skip
 
 
@@ -110,6 +122,7 @@ class _Builder:
         self.scene, self.basis, self.more_points, self.layout = scene, BASES[basis], MORE_POINTS[basis], Layout()
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
         self.outline: list[tuple[int, int]] = []
+        self.pins: list[str] = []
         self.scale: list[float] = []
         self.gravity = gravity_in_base(scene)
 
@@ -126,7 +139,10 @@ class _Builder:
             kind, names = program.JOINT_B, ["theta", "alpha_L", "alpha_R", "lambda_x", "lambda_y", "N"]
             x, y = 0.0, 0.0
         self.scale += [0.0 if name in ("N", "lambda_x", "lambda_y") else 1.0 for name in names]
+        pins = sorted(self.scene.pins_of(f"joint_{n}"), key=lambda pin: PLACES[pin.at.split(".")[1]])
         z = self.layout.unknowns([f"{name}_{n}" for name in names])
+        heavy = {"pivot": True, "Q": bool(joint.mL or joint.mR), "link_L": bool(joint.mL), "link_R": bool(joint.mR)}
+        first_clearance = self._clearances(index, pins, heavy)
         first_link = len(self.layout.rows["links"])
         for side, length, mass in ((LINK_L, joint.lL, joint.mL), (LINK_R, joint.lR, joint.mR)):
             if mass and length is not None:
@@ -134,13 +150,43 @@ class _Builder:
                 history = self._point(mass, inertia)
                 self.layout.add("links", side=side, history=history, middle=length / 2, mass=mass, inertia=inertia)
         links = len(self.layout.rows["links"]) - first_link
-        row = self.layout.add("joints", z=z, x=x, y=y, first_link=first_link, links=links)
-        self._cylinder(joint.cylinder, z + len(names) - 1)
+        row = self.layout.add(
+            "joints", z=z, x=x, y=y, first_link=first_link, links=links, first_clearance=first_clearance, clearances=len(pins)
+        )
+        self._cylinder(n, joint.cylinder, z + len(names) - 1)
         self._mark_frame()
         self.layout.operate(kind, row)
 
-    def _cylinder(self, part: Cylinder, z: int) -> None:
-        first_part = len(self.layout.rows["parts"])
+    def _clearances(self, owner: int, pins: Sequence[Pin], heavy: dict[str, bool]) -> int:
+        """Rows for `pins`, with the offsets of their journals among the unknowns; returns the first."""
+        block, first = self.scene.clearance, len(self.layout.rows["clearances"])
+        for pin in pins:
+            assert block is not None
+            place, law = pin.at.split(".")[1], block.contact
+            self.pins.append(pin.at)
+            z = self.layout.unknowns([f"{pin.at}.x", f"{pin.at}.y"])
+            self.scale += [FINE / pin.radial_clearance] * 2
+            softness = sum((1.0 - m.nu**2) / m.E for m in (self.scene.material, law.bush or self.scene.material))
+            self.layout.add(
+                "clearances",
+                z=z,
+                owner=owner,
+                place=PLACES[place],
+                turn=self.layout.histories([0.0], [0.0]) if law.friction else -1,
+                heavy=heavy[place],
+                linear=block.treatment == "spring-damper",
+                gap=pin.radial_clearance,
+                stiffness=contact.contact_stiffness(pin.pin_radius, pin.radial_clearance, softness),
+                exponent=law.exponent,
+                loss=contact.LAWS[law.law](law.restitution),
+                friction=law.friction,
+                radius=pin.pin_radius,
+            )
+        return first
+
+    def _cylinder(self, n: int, part: Cylinder, z: int) -> None:
+        first_part, pins = len(self.layout.rows["parts"]), self.scene.pins_of(f"cylinder_{n}")
+        heavy = {end: own is not None and own.mass > 0.0 for end, own in (("rod", part.rod), ("barrel", part.barrel))}
         for end, own in ((cylinder.BARREL, part.barrel), (cylinder.ROD, part.rod)):
             if own is not None and (own.mass or own.inertia):
                 history = self._point(own.mass, own.inertia)
@@ -151,6 +197,8 @@ class _Builder:
             history=self.layout.histories([0.0], [0.0]),
             first_part=first_part,
             parts=len(self.layout.rows["parts"]) - first_part,
+            first_clearance=self._clearances(n - 1, pins, heavy),
+            clearances=len(pins),
             closed_length=part.closed_length,
             compliance=0.0 if part.k is None else 1.0 / part.k,
             lag=0.0 if part.k is None or part.d is None else part.d / part.k,
@@ -299,8 +347,9 @@ class _Builder:
         zeros = [0.0] * unknowns
         closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
         return Plan(
-            tables, tuple(layout.names), np.array(zeros + layout.masses), np.array(zeros + layout.weights), shift, closed
-        )
+            tables, tuple(layout.names), np.array(zeros + layout.masses), np.array(zeros + layout.weights), shift, closed,
+            tuple(self.pins),
+        )  # fmt: skip
 
 
 def _rod(mass_per_length: float, x0: float, x1: float) -> RigidPart:

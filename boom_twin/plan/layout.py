@@ -9,6 +9,7 @@ import numpy as np
 
 from ..chain import program
 from ..physics.beam import BEAM as BEAM_ROW
+from ..physics.contact import CLEARANCE
 from ..physics.cylinder import CYLINDER, CYLINDER_PART
 from ..physics.linkage import LINKAGE
 
@@ -23,6 +24,7 @@ DTYPES = {
     "outlets": program.OUTLET,
     "cylinders": CYLINDER,
     "parts": CYLINDER_PART,
+    "clearances": CLEARANCE,
 }
 
 
@@ -64,5 +66,5 @@ class Layout:
         rows = np.zeros(len(self.rows[name]), DTYPES[name])
         for i, values in enumerate(self.rows[name]):
             for key, value in values.items():
-                rows[key][i] = value + len(self.names) if key == "history" else value
+                rows[key][i] = value + len(self.names) if key in ("history", "turn") else value
         return rows.view(np.recarray)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from . import consistency, placement, reach, units
+from . import clearance, consistency, placement, reach, units
 from .draft import Draft
 from .finding import Finding
 
@@ -15,6 +15,7 @@ CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     placement.pins,
     placement.thin_parts,
     placement.centres,
+    clearance.pins,
     reach.joints,
     units.suspects,
 )

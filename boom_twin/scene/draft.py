@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .parts import Base, Joint, Material, Modes, Point, Section, Tip
+from .parts import Base, Clearance, Joint, Material, Modes, Point, Section, Tip
 from .read import Document
 
 
@@ -26,6 +26,7 @@ class Draft:
     joints: tuple[Joint | None, ...] = ()
     tip: Tip | None = None
     line_fill: float | None = None
+    clearance: Clearance | None = None
     postures: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def section(self, index: int) -> Section | None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from .parts import Base, Cylinder, CylinderPart, Joint, Material, RigidPart, Scene, Section, Tip
+from .parts import (
+    Base, Clearance, ContactLaw, Cylinder, CylinderPart, Joint, Material, Pin, RigidPart, Scene, Section, Tip
+)  # fmt: skip
 
 MEANING: dict[type[BaseModel], dict[str, str]] = {
     Scene: {
@@ -18,6 +20,7 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
         "sections": "a list with one block per section",
         "joints": "a list with one block per joint",
         "tip": "a block with payload (kg)",
+        "clearance": "a block with pins, and contact and treatment if they are not the usual ones",
         "line_fill": "the concrete in the pipe line, kg/m",
         "postures": "a block of names, each with a list of section angles in degrees",
     },
@@ -78,6 +81,23 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
         "inertia": "the inertia about the centre of mass in kg m^2",
         "com": "the distance of the centre of mass from the part's pin, m",
     },
+    Clearance: {
+        "treatment": "contact or spring-damper",
+        "contact": "a block with law, exponent, restitution, friction",
+        "pins": "a list with one block per pin",
+    },
+    ContactLaw: {
+        "law": "hertz, lankarani-nikravesh, flores or hunt-crossley",
+        "exponent": "the exponent of the penetration, 1 to 3; 1.5 for Hertz's",
+        "restitution": "the coefficient of restitution, above 0 and at most 1",
+        "friction": "Coulomb's coefficient of friction, 0 to 2",
+        "bush": "a block with E (Pa) and nu of the bush, if it is not of the boom's material",
+    },
+    Pin: {
+        "at": "which pin: cylinder_i.rod, cylinder_i.barrel, joint_i.pivot, joint_i.link_L, joint_i.link_R or joint_i.Q",
+        "pin_radius": "the radius of the pin, m",
+        "radial_clearance": "the radius of the hole less that of the pin, m",
+    },
     Tip: {"payload": "the point mass at the outboard pivot of the last section, kg"},
 }
 
@@ -90,12 +110,17 @@ HOME: dict[type[BaseModel], str] = {
     Joint: "joints[i]",
     Cylinder: "joints[i].cylinder",
     CylinderPart: "joints[i].cylinder.barrel or .rod",
+    Clearance: "clearance",
+    ContactLaw: "clearance.contact",
+    Pin: "clearance.pins[i]",
     Tip: "tip",
 }
 
 BLOCKS: dict[type[BaseModel], dict[str, type[BaseModel]]] = {
-    Scene: {"material": Material, "base": Base, "sections": Section, "joints": Joint, "tip": Tip},
+    Scene: {"material": Material, "base": Base, "sections": Section, "joints": Joint, "clearance": Clearance, "tip": Tip},
     Section: {"root": RigidPart, "head": RigidPart},
     Joint: {"cylinder": Cylinder},
+    Clearance: {"contact": ContactLaw, "pins": Pin},
+    ContactLaw: {"bush": Material},
     Cylinder: {"barrel": CylinderPart, "rod": CylinderPart},
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .parts import Joint, Scene
+from .parts import IDEAL_BELOW, Joint, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,14 @@ def left_out(scene: Scene) -> tuple[LeftOut, ...]:
         found.append(LeftOut("line_fill", "the pipe line is empty"))
     if not scene.base.inclination:
         found.append(LeftOut("base.inclination", "the base stands level"))
-    return (*found, LeftOut("clearance", "ideal pins"))
+    if scene.clearance is None or not scene.clearance.pins:
+        return (*found, LeftOut("clearance", "ideal pins"))
+    tight = [i for i, pin in enumerate(scene.clearance.pins) if pin.radial_clearance < IDEAL_BELOW]
+    if tight:
+        where = ", ".join(map(str, tight))
+        meaning = f"below {IDEAL_BELOW * 1e6:g} um, so the pin is ideal"
+        found.append(LeftOut(f"clearance.pins[{where}].radial_clearance", meaning))
+    return tuple(found)
 
 
 def _absent_in_section(scene: Scene, i: int) -> dict[str, str]:

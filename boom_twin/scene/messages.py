@@ -32,9 +32,6 @@ ITEMS = {MEANING[Scene][key]: "a block of keys, as in the default scene" for key
 def unknown_key(document: Document, place: Place, value: Any, model: type[BaseModel]) -> Fault:
     """A key that `model` does not have: the nearest one, and where the key belongs if it is known elsewhere."""
     key = str(place[-1])
-    if key == "clearance":
-        bound = "clearance is not built yet: this version knows ideal pins only"
-        return document.fault(place, value, bound, "Remove the block `clearance` to go on with ideal pins.")
     if key.isdigit() and value is None:
         bound = "a number stands where a key is expected"
         return document.fault(place, value, bound, "Decimals take a point, not a comma.")

@@ -16,6 +16,8 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Modes = Annotated[int, Field(ge=0, le=10)]
 
+IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
+
 
 class Part(BaseModel):
     """Base of all parts: frozen, unknown keys refused."""
@@ -109,6 +111,32 @@ class Joint(Part):
     cylinder: Cylinder
 
 
+class ContactLaw(Part):
+    """How journal and bush touch: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
+
+    law: Literal["hertz", "lankarani-nikravesh", "flores", "hunt-crossley"] = "lankarani-nikravesh"
+    exponent: Annotated[float, Field(ge=1, le=3)] = 1.5
+    restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.0
+    bush: Material | None = None
+
+
+class Pin(Part):
+    """A pin with play: ``at`` names it, as in ``cylinder_1.rod``; radius of the journal and radial clearance, m."""
+
+    at: str
+    pin_radius: Positive
+    radial_clearance: NotNegative
+
+
+class Clearance(Part):
+    """Pins that are not ideal, and whether they are real contact or springs and dampers linearised at their preload."""
+
+    treatment: Literal["contact", "spring-damper"] = "contact"
+    contact: ContactLaw = ContactLaw()
+    pins: tuple[Pin, ...] = ()
+
+
 class Tip(Part):
     """Payload: a point mass at the outboard pivot of the last section (kg)."""
 
@@ -133,7 +161,13 @@ class Scene(Part):
     joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
     tip: Tip | None = None
     line_fill: NotNegative | None = None
+    clearance: Clearance | None = None
     postures: dict[str, tuple[Finite, ...]] = {}
+
+    def pins_of(self, owner: str) -> tuple[Pin, ...]:
+        """Pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""
+        pins = () if self.clearance is None else self.clearance.pins
+        return tuple(pin for pin in pins if pin.at.split(".")[0] == owner and pin.radial_clearance >= IDEAL_BELOW)
 
     def modes_of(self, index: int) -> int:
         """Bending coordinates per flexible part of section `index` (0-based)."""

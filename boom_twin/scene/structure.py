@@ -14,6 +14,7 @@ from .parts import Scene
 from .read import Document, Place
 
 EMPTY: tuple[Any, ...] = (None, {}, ())
+LISTS = ("sections", "joints", "pins")
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
@@ -62,7 +63,7 @@ def _known(document: Document, values: Any, model: type[BaseModel], place: Place
             faults.append(unknown_key(document, here, value, model))
         elif value in EMPTY:
             continue
-        elif key in ("sections", "joints") and inner is not None:
+        elif key in LISTS and inner is not None:
             if not isinstance(value, tuple):
                 known[key] = value
                 continue

@@ -45,7 +45,7 @@ def released(scene, angles):
     state.history[X] = work.position
     weights = new_weights(DEPTH)
     weights[HAT, X] = weights[X, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
-    instant = Scheme(0.0, 2.0 / INSTANT**2, 0.0, weights)
+    instant = Scheme(np.int64(GENERALISED_ALPHA), 0.0, 0.0, 2.0 / INSTANT**2, 0.0, weights)
     still = np.zeros(plan.joints)
     status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None)
     assert status == 0

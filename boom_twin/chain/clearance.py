@@ -1,0 +1,189 @@
+"""Pins with clearance in the sweeps: the journal's offset is an unknown more, condensed where its pin is.
+
+The end of a cylinder stands off its pin by delta: R = R_pin + delta, C likewise. Its own system over (C, R, N) is written
+for the ends; delta and the pin's force are condensed there, and what goes on is a system over the pins. Pivots and link pins
+are unknowns of their joint (see `chain.substructure_a`, `chain.substructure_b`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..physics.contact import BARREL, CLOSED, LEAST_GAP, LINK_R_PIN, NEAR, Q_PIN, ROD, SPRING, bearing, limited, remember
+from ..physics.integrators import A, V
+from ..physics.jit import inner
+
+ALLOWED = 1e-3  # of the clearance, or of the least one in K: error of a sub-step in an offset
+SIXTH = 1.0 / 6.0
+
+
+@inner
+def offset_of(t, z, owner, place):
+    """Offset (m) of the journal in the pin `place` of a joint or cylinder; zero for an ideal pin."""
+    for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
+        row = t.clearances[k]
+        if row.place == place:
+            return z[row.z], z[row.z + 1]
+    return 0.0, 0.0
+
+
+@inner
+def set_turn(t, work, owner, place, angle):
+    """Note the journal's angle in the bush (rad) of the pin `place`, if it has friction."""
+    for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
+        row = t.clearances[k]
+        if row.place == place and row.friction > 0.0:
+            work.position[row.turn] = angle
+
+
+@inner
+def load_pins(t, state, work, motion):
+    """Force, tangent and torque of every pin with clearance into `work.hold`."""
+    before = state.history[V]
+    for k in range(t.clearances.shape[0]):
+        row, hold = t.clearances[k], work.hold[k]
+        x, y, turning = state.z[row.z], state.z[row.z + 1], 0.0
+        vx, vy = motion.rate * x + motion.offset[row.z], motion.rate * y + motion.offset[row.z + 1]
+        if row.friction > 0.0:
+            turning = motion.rate * work.position[row.turn] + motion.offset[row.turn]
+        ax, ay = axis_of(t, state, row)
+        hold[0], hold[1], hold[2], hold[3], hold[4], hold[5], hold[6], hold[7], hold[8] = bearing(
+            row, state.contacts[k], x, y, vx, vy, before[row.z], before[row.z + 1], turning, ax, ay, motion.rate
+        )
+
+
+@inner
+def axis_of(t, state, row):
+    """First axis of what a linearised pin is fixed to: the cylinder, or the body with the bush."""
+    turns = state.turns[row.owner]
+    if row.place >= ROD:
+        pins = state.pins[row.owner]
+        dx, dy = pins[2] - pins[0], pins[3] - pins[1]
+        length = math.hypot(dx, dy)
+        return dx / length, dy / length
+    if row.place == LINK_R_PIN:
+        return turns[2], turns[3]
+    if row.place == Q_PIN:
+        return turns[4], turns[5]
+    if row.owner == 0:
+        return 1.0, 0.0
+    return turns[0], turns[1]
+
+
+@inner
+def add_turning(hold, h, at, journal, bush):
+    """Tangent of friction's torque between two bodies, whose angles stand at `journal` and `bush`, the offset at `at`."""
+    low, high = min(journal, bush), max(journal, bush)
+    h[journal, journal] += hold[8]
+    h[bush, bush] += hold[8]
+    h[high, low] -= hold[8]
+    for i in range(2):
+        h[at + i, journal] += hold[6 + i]
+        h[at + i, bush] -= hold[6 + i]
+
+
+@inner
+def torque_of(t, work, owner, place):
+    """Torque (N m) with which friction holds the journal of the pin `place`; zero without."""
+    for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
+        if t.clearances[k].place == place:
+            return work.hold[k, 5]
+    return 0.0
+
+
+@inner
+def end_of(row):
+    """First place of an end's coordinates among (C, R, N)."""
+    return 0 if row.place == BARREL else 2
+
+
+@inner
+def condense_ends(t, state, work, cylinder, g, h):
+    """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h)."""
+    torque = 0.0
+    for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
+        torque += work.hold[k, 5]
+    if torque != 0.0:
+        _turn_back(g, h, torque / work.position[cylinder.history])
+    for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
+        at, hold, block, gains, free = end_of(t.clearances[k]), work.hold[k], work.ends[k], work.end_gains[k], work.end_free[k]
+        block[0, 0], block[0, 1] = h[at, at] + hold[2], h[at, at + 1] + hold[3]
+        block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[4]
+        share = 1.0 / (block[0, 0] * block[1, 1] - block[0, 1] * block[0, 1])
+        xx, xy, yy = share * block[1, 1], -share * block[0, 1], share * block[0, 0]
+        gx, gy = g[at] + hold[0], g[at + 1] + hold[1]
+        free[0], free[1] = xx * gx + xy * gy, xy * gx + yy * gy
+        for j in range(5):
+            gains[0, j], gains[1, j] = xx * h[at, j] + xy * h[at + 1, j], xy * h[at, j] + yy * h[at + 1, j]
+        for i in range(5):
+            to_x, to_y = h[i, at], h[i, at + 1]
+            g[i] -= to_x * free[0] + to_y * free[1]
+            for j in range(5):
+                h[i, j] -= to_x * gains[0, j] + to_y * gains[1, j]
+
+
+@inner
+def _turn_back(g, h, force):
+    """Friction's torque on a cylinder, as a couple of forces (N) on its ends; the derivative of its law by R has its axis."""
+    share = force / math.hypot(h[4, 2], h[4, 3])
+    ex, ey = share * h[4, 2], share * h[4, 3]
+    g[0] += ey
+    g[1] -= ex
+    g[2] -= ey
+    g[3] += ex
+
+
+@inner
+def move_ends(t, work, cylinder, cx, cy, rx, ry, force):
+    """Increments of the offsets of a cylinder's ends from those of its pins C and R and of its force."""
+    for k in range(cylinder.first_clearance + cylinder.clearances - 1, cylinder.first_clearance - 1, -1):
+        row, gains, free = t.clearances[k], work.end_gains[k], work.end_free[k]
+        dx = -free[0] - gains[0, 0] * cx - gains[0, 1] * cy - gains[0, 2] * rx - gains[0, 3] * ry - gains[0, 4] * force
+        dy = -free[1] - gains[1, 0] * cx - gains[1, 1] * cy - gains[1, 2] * rx - gains[1, 3] * ry - gains[1, 4] * force
+        work.dz[row.z], work.dz[row.z + 1] = dx, dy
+        if row.place == BARREL:
+            cx, cy = cx + dx, cy + dy
+        else:
+            rx, ry = rx + dx, ry + dy
+
+
+@inner
+def shorten(t, state, work):
+    """Limit the increments of all offsets, see `physics.contact.limited`."""
+    for k in range(t.clearances.shape[0]):
+        row = t.clearances[k]
+        i, j = row.z, row.z + 1
+        if state.contacts[k, SPRING] == 0.0:
+            work.dz[i], work.dz[j] = limited(row, state.z[i], state.z[j], work.dz[i], work.dz[j])
+
+
+@inner
+def note_contacts(t, state, work):
+    """Let all pins remember the step that ends; before the histories are written."""
+    before = state.history[V]
+    for k in range(t.clearances.shape[0]):
+        row, hold = t.clearances[k], work.hold[k]
+        x, y = state.z[row.z], state.z[row.z + 1]
+        remember(row, state.contacts[k], x, y, before[row.z], before[row.z + 1], hold[0], hold[1])
+
+
+@inner
+def coarseness(t, state, work, scheme):
+    """Largest error of a sub-step in the offset of a pin that touches, over what is allowed.
+
+    |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991), against `ALLOWED` of the clearance. A journal without inertia has no
+    motion of its own to resolve.
+    """
+    worst, before = 0.0, state.history[A]
+    size = abs(1.0 / (scheme.gain * scheme.reach * scheme.reach) - SIXTH) * scheme.reach * scheme.reach
+    for k in range(t.clearances.shape[0]):
+        row, memory = t.clearances[k], state.contacts[k]
+        i, j = row.z, row.z + 1
+        if row.heavy == 0 or memory[SPRING] > 0.0:
+            continue
+        touching = math.hypot(state.z[i], state.z[j]) > row.gap - NEAR
+        if touching or memory[CLOSED] > 0.0:
+            ax = scheme.gain * (state.z[i] - work.hat[i]) - before[i]
+            ay = scheme.gain * (state.z[j] - work.hat[j]) - before[j]
+            worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * max(row.gap, LEAST_GAP)))
+    return worst

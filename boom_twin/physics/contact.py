@@ -1,0 +1,175 @@
+"""A journal in a bush with clearance: the force between pin and hole, as contact or as its linearisation.
+
+The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^2 + s^2), n = delta/r, s = `SMOOTH`,
+
+    gap g = r - c,    penetration d = [g + sqrt(g^2 + s^2)]/2,    g' = n.delta',
+    F = K d^e [1 + chi g'/v]   but not below zero,        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
+
+c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
+radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
+K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.notation`); the laws differ
+in chi, a function of the coefficient of restitution each. With g' in the bracket the rebound does not depend on how d is
+smoothed. The elastic part is convex in delta: at rest a pin has one place.
+
+Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2),
+with F of the step before, which leaves the tangent symmetric.
+
+Linearised at a preload F_0 with penetration d_0, the pin is a spring k = e F_0/d_0 and a damper chi F_0/v about the place from
+which F_0 stretches it to c + d_0. That place is fixed to the cylinder, or to the body that holds the bush of a pivot or link
+pin: it turns with the force of a cylinder, and stays on its side when the force reverses.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import inner
+
+SMOOTH = 1e-6  # m, over which contact sets in
+NEAR = 4.0 * SMOOTH  # m, width of the gap at which journal and bush count as touching
+LEAST_GAP = 3e-5  # m, least difference of radii in K
+SLOWEST = 1e-3  # m/s, least speed of approach
+SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
+
+PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD, BARREL = range(6)
+
+CLEARANCE = np.dtype(
+    [
+        ("z", np.int64),  # place of delta among the unknowns
+        ("owner", np.int64),  # row of its joint and cylinder ..
+        ("place", np.int64),  # .. and which pin of them it is
+        ("turn", np.int64),  # place of the journal's angle in the bush among the histories, if there is friction
+        ("heavy", np.int64),  # 1 if the journal has inertia of its own
+        ("linear", np.int64),  # 1: linearised at the preload of the first equilibrium
+        ("gap", float),  # radial clearance c, m
+        ("stiffness", float),  # K, N/m^e
+        ("exponent", float),  # e
+        ("loss", float),  # chi
+        ("friction", float),  # mu
+        ("radius", float),  # R_i, m
+    ]
+)
+
+# What a pin remembers: whether it touches, speed of approach (m/s), normal force (N); spring (N/m; 0: contact), damper
+# (N s/m) and place (m, in the axes it is fixed to) of the linearisation; how often contact was lost.
+CLOSED, APPROACH, FORCE, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(9)
+
+
+def hertz(restitution: float) -> float:
+    """Elastic contact, without loss: 0 (Hertz 1882)."""
+    return 0.0
+
+
+def lankarani_nikravesh(restitution: float) -> float:
+    """Nearly elastic contact: 3 (1 - e^2)/4 (Lankarani and Nikravesh 1990)."""
+    return 0.75 * (1.0 - restitution**2)
+
+
+def flores(restitution: float) -> float:
+    """Elastic to plastic contact: 8 (1 - e)/(5 e) (Flores, Machado, Silva and Martins 2011)."""
+    return 1.6 * (1.0 - restitution) / restitution
+
+
+def hunt_crossley(restitution: float) -> float:
+    """Hard contact at low speed: 3 (1 - e)/2 (Hunt and Crossley 1975)."""
+    return 1.5 * (1.0 - restitution)
+
+
+LAWS = {"hertz": hertz, "lankarani-nikravesh": lankarani_nikravesh, "flores": flores, "hunt-crossley": hunt_crossley}
+
+
+def contact_stiffness(radius: float, gap: float, softness: float) -> float:
+    """K (N/m^1.5) of a pin of `radius` in a hole wider by `gap` (m); softness = s_i + s_j (1/Pa)."""
+    apart = max(gap, LEAST_GAP)
+    return 4.0 / (3.0 * softness) * math.sqrt(radius * (radius + apart) / apart)
+
+
+@inner
+def penetration(row, x, y):
+    """Direction n, distance r, penetration d and dd/dg of a journal at (x, y)."""
+    r = math.sqrt(x * x + y * y + SMOOTH * SMOOTH)
+    gap = r - row.gap
+    root = math.sqrt(gap * gap + SMOOTH * SMOOTH)
+    d = 0.5 * (gap + root) if gap > 0.0 else 0.5 * SMOOTH * SMOOTH / (root - gap)
+    return x / r, y / r, r, d, d / root
+
+
+@inner
+def approach(memory, nx, ny, vx, vy):
+    """Speed of approach (m/s): the one remembered, else that of the velocity (vx, vy) at the start of the step."""
+    if memory[CLOSED] > 0.0:
+        return memory[APPROACH]
+    return max(SLOWEST, nx * vx + ny * vy)
+
+
+@inner
+def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis_y, rate):
+    """Force and tangent of a pin whose journal is at (x, y) with velocity (vx, vy).
+
+    before_x, before_y : velocity at the start of the step, m/s. turning : of the journal in the bush, rad/s.
+    axis_x, axis_y : first axis of what the linearisation is fixed to. rate : C of the integrator, dv/dx.
+
+    Returns
+    -------
+    fx, fy, kxx, kxy, kyy, torque, kx, ky, turn
+        What holds the journal back (N), its tangent (N/m), what holds its turning back (N m) with its derivatives by x and y
+        (N) and by the turning (N m).
+    """
+    if memory[SPRING] > 0.0:
+        k, c = memory[SPRING], memory[DAMPER]
+        fx = k * (x - axis_x * memory[SEAT_X] + axis_y * memory[SEAT_Y]) + c * vx
+        fy = k * (y - axis_y * memory[SEAT_X] - axis_x * memory[SEAT_Y]) + c * vy
+        return fx, fy, k + rate * c, 0.0, k + rate * c, 0.0, 0.0, 0.0, 0.0
+    nx, ny, r, d, slope = penetration(row, x, y)
+    speed = approach(memory, nx, ny, before_x, before_y)
+    elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
+    lead = row.loss / speed
+    share = 1.0 + lead * (nx * vx + ny * vy)
+    force, radial = 0.0, 0.0
+    if share > 0.0:
+        force = elastic * share
+        radial = row.exponent * elastic / d * slope * share + elastic * lead * rate
+    across = force / r
+    drag, drag_rate = 0.0, 0.0
+    if row.friction > 0.0:
+        slip = nx * vy - ny * vx + row.radius * turning
+        width = math.sqrt(slip * slip + SLIP * SLIP)
+        most = row.friction * memory[FORCE]
+        drag, drag_rate = most * slip / width, 0.5 * most / width * (1.0 + (SLIP / width) ** 2) * rate
+    along, rest, turn = across + drag_rate, across * (1.0 - nx * nx - ny * ny), row.radius * drag_rate
+    kxx = radial * nx * nx + along * ny * ny + rest
+    kyy = radial * ny * ny + along * nx * nx + rest
+    kxy = (radial - along) * nx * ny
+    fx, fy = force * nx - drag * ny, force * ny + drag * nx
+    return fx, fy, kxx, kxy, kyy, row.radius * drag, -turn * ny, turn * nx, row.radius * turn
+
+
+@inner
+def limited(row, x, y, dx, dy):
+    """Increments of delta, shortened so that the penetration does not much more than double in a pass.
+
+    A pass from inside the gap knows no contact; this is the active set's limit on what it may claim.
+    """
+    _, _, _, d, _ = penetration(row, x, y)
+    far = math.sqrt((x + dx) * (x + dx) + (y + dy) * (y + dy))
+    most = row.gap + 2.0 * d + 5.0 * SMOOTH
+    if far <= most:
+        return dx, dy
+    share = most / far
+    return share * (x + dx) - x, share * (y + dy) - y
+
+
+@inner
+def remember(row, memory, x, y, before_x, before_y, fx, fy):
+    """Note contact that began or ended in a step that is accepted, and the force."""
+    nx, ny, r, _, _ = penetration(row, x, y)
+    closed = r - row.gap > -NEAR
+    if closed and memory[CLOSED] == 0.0:
+        memory[APPROACH] = approach(memory, nx, ny, before_x, before_y)
+        memory[CLOSED] = 1.0
+    elif not closed and memory[CLOSED] > 0.0:
+        memory[CLOSED] = 0.0
+        memory[LOST] += 1.0
+    memory[FORCE] = max(0.0, nx * fx + ny * fy)

@@ -1,0 +1,54 @@
+"""Pins with clearance: that they are there, named once, and of a size that can be."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from .draft import Draft
+from .finding import Finding, odd, wrong
+from .parts import Joint
+
+PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
+WIDE = 0.1  # of the pin's radius; contact of a journal in a bush is meant for much less
+
+
+def pins(draft: Draft) -> Iterator[Finding]:
+    """Every pin of the block names a pin of the boom, and its clearance fits its radius."""
+    if draft.clearance is None:
+        return
+    seen: dict[str, int] = {}
+    for i, pin in enumerate(draft.clearance.pins):
+        place = ("clearance", "pins", i)
+        there = [name for k, joint in enumerate(draft.joints) if joint is not None for name in names_of(k, joint)]
+        if pin.at not in there and None not in draft.joints:
+            yield wrong(draft, (*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
+        if pin.at in seen:
+            bound = f"clearance.pins[{seen[pin.at]}] is this pin already"
+            yield wrong(draft, (*place, "at"), pin.at, bound, "Give every pin once.")
+        seen.setdefault(pin.at, i)
+        share = pin.radial_clearance / pin.pin_radius
+        if share >= 1.0:
+            bound = f"it must be less than pin_radius = {pin.pin_radius:g} m"
+            yield wrong(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give it in metres.")
+        elif share > WIDE:
+            bound = f"it is more than a tenth of pin_radius = {pin.pin_radius:g} m, for which the contact law is not meant"
+            yield odd(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
+
+
+def names_of(index: int, joint: Joint) -> list[str]:
+    """All pins of joint `index` (0-based) and of its cylinder that can have clearance."""
+    own = PLACES["joint"][:1] if joint.kind == "A" else PLACES["joint"]
+    number = index + 1
+    return [f"cylinder_{number}.{place}" for place in PLACES["cylinder"]] + [f"joint_{number}.{place}" for place in own]
+
+
+def _unknown(at: str, joints: tuple[Joint | None, ...], there: list[str]) -> tuple[str, str]:
+    """Why there is no such pin, and what there is."""
+    form = re.fullmatch(r"(cylinder|joint)_(\d+)\.(\w+)", at)
+    if form is None or form[3] not in PLACES[form[1]]:
+        return "not the name of a pin", "Write cylinder_i. with rod or barrel, or joint_i. with pivot, link_L, link_R or Q."
+    number = int(form[2])
+    if not 1 <= number <= len(joints):
+        return f"the boom has joints and cylinders 1 to {len(joints)}", f"Give one of {', '.join(there)}."
+    return f"joint {number} is of kind A and has no links", f"Give one of {', '.join(names_of(0, joints[0]))}."  # type: ignore[arg-type]

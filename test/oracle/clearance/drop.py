@@ -1,0 +1,46 @@
+"""A ball dropped on a plane: the restitution that a contact law really gives, by integration and in closed form.
+
+With u the speed over that of the approach, m v_in^2 u du = -K d^n (1 + chi u) dd. Both sides integrate, and over a whole
+impact the depth drops out, whatever n is:
+
+    G(-e) = G(1) ,      G(u) = integral of s / (1 + chi s) from 0 to u = u / chi - log(1 + chi u) / chi^2 .
+"""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .impacts import follow
+
+APPROACH = 100.0  # smoothing lengths, from where a smoothed contact is out of reach
+
+
+def rebound(contact, mass, speed, tolerance=1e-10):
+    """Speed after over speed before an impact of a ball (kg, m/s), without weight; by integration."""
+    height = max(APPROACH * contact.smoothing, 1e-9)
+    deepest = (mass * speed**2 / contact.stiffness) ** (1.0 / (contact.exponent + 1.0))
+    lasting = 20.0 * (deepest + height) / speed
+
+    def rates(time, state, entry):
+        return [state[1], -contact.normal(state[0], state[1], entry) / mass]
+
+    found = follow(
+        rates, lambda time, state: state, [-height, speed], np.array([0.0, lasting]), tolerance,
+        np.array([tolerance * deepest, tolerance * speed]), method="DOP853",
+    )  # fmt: skip
+    return -found.states[-1, 1] / speed
+
+
+def restitution(hysteresis):
+    """The same in closed form, for any stiffness, exponent, mass and speed."""
+    if hysteresis == 0.0:
+        return 1.0
+
+    def work(u):
+        return u / hysteresis - log(1.0 + hysteresis * u) / hysteresis**2
+
+    most = min(1.0, (1.0 - 1e-15) / hysteresis)
+    return brentq(lambda e: work(-e) - work(1.0), 1e-12, most, xtol=1e-14)

@@ -1,0 +1,40 @@
+"""What play in a cylinder's rod pin does to the resting tip, in closed form: lever x (clearance + penetration)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .geometry import levers, pins
+
+
+def lengthening(contact, force, axis):
+    """How much longer (m) a cylinder along `axis` (complex, from the barrel pin) acts than one with an ideal pin.
+
+    `force` (N, complex) is the bush's on the rod's pin: along the axis in a pulled cylinder, which acts longer; against it
+    in a pushed one, which acts shorter. Across the axis the pin carries the cylinder's own weight alone.
+    """
+    return -(contact.resting_offset(-force) * np.conj(axis)).real / abs(axis)
+
+
+def tip_shift(document, headings, index, contact, force):
+    """Complex, m: the resting tip with play in cylinder `index` (0-based) minus the one with an ideal pin.
+
+    Parameters
+    ----------
+    headings : sequence of float
+        rad, of the sections where the boom rests with an ideal pin, sag included: levers change with it.
+    force : complex
+        N, of the bush on the rod's pin, there.
+    """
+    barrel, rod = pins(document, headings, index)
+    return levers(document, headings)[index] * lengthening(contact, force, rod - barrel)
+
+
+def loaded_lever(ideal, drive, phi, step=1e-5):
+    """How the resting tip moves per metre of the drive (complex), of a `PinnedBoom` with an ideal pin.
+
+    Play acts as a longer drive does. The geometric lever is this one's limit for a stiff oil spring: the loads' own
+    stiffness, T l'' + V'' against k l'^2, makes up the difference.
+    """
+    tips = [ideal.rest(drive + side, phi).tip for side in (-step, step)]
+    return (tips[1] - tips[0]) / (2.0 * step)

@@ -1,0 +1,137 @@
+"""A part of a boom on a massive cylinder whose rod pin has play: Lagrange's equations by hand in three coordinates.
+
+phi, the part's heading; l and psi, length and heading of the cylinder from its barrel pin B to its rod's pin r. The rod's
+pin lies at offset = r - P(phi) from the bush, and is pushed by F (contact). With u = e^(i psi), <a, b> = Re(conj(a) b):
+
+    J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
+    m_r l''   - m_r (l - a_r) psi'^2        =  <F, u>  + m_r <g, u> - k (l - l_ref) - d (l' - l_ref')
+    I psi''   + 2 m_r (l - a_r) l' psi'     =  <F, i l u> + (m_b a_b + m_r (l - a_r)) <g, i u> .
+
+J(phi) and P(phi) are the part's (`parts`), I(l) the cylinder's. The mass matrix is diagonal, and nothing but F joins the two.
+"""
+
+from __future__ import annotations
+
+from cmath import exp
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contact import Contact
+from .cylinder import Cylinder
+from .equilibrium import equilibrium
+from .impacts import Episode, follow
+from .moving import dot
+
+LONGEST = 1e-2  # s, step
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A motion in m rows: tip, offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
+
+    `phi`, `tension` (N, of the oil) and `energy` (J, oil, weight and motion, without that of the contact): (m,).
+    """
+
+    times: np.ndarray
+    tip: np.ndarray
+    offset: np.ndarray
+    force: np.ndarray
+    phi: np.ndarray
+    tension: np.ndarray
+    energy: np.ndarray
+    episodes: list[Episode]
+
+
+@dataclass(frozen=True)
+class PinnedBoom:
+    """`part`: a `Lever` or `SixBar`; `contact` None: an ideal pin, for `rest` only; gravity complex, m/s^2."""
+
+    part: object
+    cylinder: Cylinder
+    contact: Contact | None
+    gravity: complex
+
+    def rest(self, drive, phi):
+        """See `equilibrium`."""
+        return equilibrium(self, drive, phi)
+
+    def follow(self, drive, rest, times, breaks=(), tolerance=1e-8, method="LSODA", rate=0.0):
+        """Motion from an equilibrium, as `Followed`.
+
+        Parameters
+        ----------
+        drive : callable
+            Time (s) -> length (m) and rate (m/s) of the drive.
+        rest : Rest
+        times : ndarray, shape (m,)
+            s, ascending, of the rows.
+        breaks : sequence of float
+            Times at which the drive is not smooth.
+        rate : float
+            Rate of phi at the start, rad/s.
+        """
+        # states are deviations from the rest, so that a relative tolerance means something
+        zero = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
+        found = follow(
+            lambda time, state, entry: self.rates(drive(time), zero + state, entry),
+            lambda time, state: self.gap(zero + state),
+            [0.0, 0.0, 0.0, rate, 0.0, 0.0], times, tolerance, tolerance * np.repeat([1e-5, 1e-2], 3),
+            breaks, LONGEST, method,
+        )  # fmt: skip
+        return self._rows(drive, found, zero + found.states)
+
+    def rates(self, drive, state, entry):
+        """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
+        phi, length, psi, turn, speed, swing = (float(value) for value in state)
+        c, g, u, placed = self.cylinder, self.gravity, exp(1j * psi), self.part.at(phi)
+        force = self.contact.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
+        arm = length - c.rod_com
+        moment = dot(g, placed.moments) - dot(force, placed.pin.first) - 0.5 * placed.slope * turn**2
+        pull = dot(force, u) - c.tension(length, speed, drive)
+        tilt = dot(force, 1j * length * u) + c.moment(length) * dot(g, 1j * u) - 2.0 * c.rod_mass * arm * speed * swing
+        bends = moment / placed.inertia, pull / c.rod_mass + dot(g, u) + arm * swing**2, tilt / c.inertia(length)
+        return [turn, speed, swing, *bends]
+
+    def gap(self, state):
+        """Gap (m, positive in contact) and its rate (m/s)."""
+        offset, rate = self.pin(state)
+        distance = abs(offset)
+        return self.contact.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
+
+    def pin(self, state):
+        """Offset (m) of the pin in the bush and its rate (m/s), complex."""
+        phi, length, psi, turn, speed, swing = (float(value) for value in state)
+        return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
+
+    def energy(self, drive, state):
+        """Of motion, weight and oil, J; not of the contact."""
+        phi, length, psi, turn, speed, swing = state
+        placed = self.part.at(phi)
+        own = 0.5 * placed.inertia * turn**2 - dot(self.gravity, placed.height)
+        return own + self.cylinder.energy(length, psi, speed, swing, drive, self.gravity)
+
+    def _pin(self, length, u, turn, speed, swing, bush):
+        rate = (speed + 1j * length * swing) * u - bush.first * turn
+        return self.cylinder.pin + length * u - bush.value, rate
+
+    def _rows(self, drive, found, states):
+        pins = [self.pin(state) for state in states]
+        entries = [None if np.isnan(entry) else entry for entry in found.entries]
+        drives = [drive(time) for time in found.times]
+        both = list(zip(states, drives, strict=True))
+        return Followed(
+            found.times,
+            _pairs([self.part.tip_at(state[0]) for state in states]),
+            _pairs([offset for offset, _ in pins]),
+            _pairs([self.contact.force(*pin, entry) for pin, entry in zip(pins, entries, strict=True)]),
+            states[:, 0],
+            np.array([self.cylinder.tension(state[1], state[4], at) for state, at in both]),
+            np.array([self.energy(at[0], state) for state, at in both]),
+            found.episodes,
+        )
+
+
+def _pairs(values):
+    values = np.array(values)
+    return np.column_stack([values.real, values.imag])

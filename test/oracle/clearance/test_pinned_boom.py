@@ -1,0 +1,81 @@
+"""Motion of a boom part on a cylinder with play: limits, energy, solvers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import booms, lagrange
+from oracle.clearance import geometry, rigid
+from oracle.clearance.booms import freed
+from oracle.clearance.contact import HYSTERESIS, Contact, stiffness
+
+STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
+HEADINGS = np.array([0.5, -0.3])
+
+
+def pin(law="lankarani-nikravesh", restitution=0.9, smoothing=0.0):
+    return Contact(STEEL, HYSTERESIS[law](restitution), 1e-4, smoothing=smoothing)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_stiff_pin_without_play_moves_as_lagrange_has_it(count):
+    """Linear contact of 2e10 N/m, no clearance: what differs from an ideal pin falls with its compliance."""
+    index, headings = count - 1, HEADINGS[:count]
+    document = rigid.document(count, index)
+    lengths = np.array([geometry.cylinder_length(document, headings, i) for i in range(count)])
+    times, own = np.linspace(0.0, 0.1, 11), rigid.move(lengths[index], 0.01, 0.08)
+    chosen = np.arange(count) == index
+
+    def drives(time):
+        length, rate, bend = own(time)
+        return np.where(chosen, length, lengths), np.where(chosen, rate, 0.0), np.where(chosen, bend, 0.0)
+
+    rows = lagrange.Lagrange(booms.scene_of(document), drives).solve(times, np.diff(headings, prepend=0.0), 1e-9)
+    differences = []
+    for k in (1e10, 2e10):
+        boom = freed(document, headings, index, Contact(k, 0.0, 0.0, exponent=1.0))
+        rest = boom.rest(lengths[index], headings[index])
+        found = boom.follow(own_pair(own), rest, times, [0.08])
+        differences.append(found.tip - rows[:, 2 * count : 2 * count + 2])
+    assert np.abs(differences[1]).max() < 1e-3 * np.ptp(rows[:, 2 * count + 1])
+    assert np.abs(2.0 * differences[1] - differences[0]).max() < 0.02 * np.abs(differences[0]).max()
+
+
+@pytest.mark.parametrize("law, loses", [("hertz", False), ("lankarani-nikravesh", True), ("flores", True)])
+def test_energy(law, loses):
+    """Thrown up out of rest, undamped oil, sharp contact: Hertz keeps the energy, the others never gain any."""
+    document = rigid.document(1, 0)
+    del document["joints"][0]["cylinder"]["d"]
+    boom = freed(document, HEADINGS[:1], 0, pin(law, 0.8))
+    drive = geometry.cylinder_length(document, HEADINGS[:1], 0)
+    found = boom.follow(lambda time: (drive, 0.0), boom.rest(drive, 0.5), np.linspace(0.0, 0.06, 2001), rate=0.3)
+    distance = np.hypot(*found.offset.T)
+    total = found.energy + [boom.contact.stored(d - boom.contact.clearance) for d in distance]
+    moving = 0.5 * boom.part.at(0.5).inertia * 0.3**2
+    assert len(found.episodes) >= 2
+    if loses:
+        assert np.diff(total).max() < 1e-5 * moving
+        assert total[0] - total[-1] > 1e-3 * moving
+    else:
+        assert np.ptp(total) < 1e-4 * moving
+
+
+def test_a_stop_lifts_the_pin_off_and_solvers_agree():
+    document = rigid.document(1, 0)
+    boom = freed(document, HEADINGS[:1], 0, pin(smoothing=1e-6))
+    start = geometry.cylinder_length(document, HEADINGS[:1], 0)
+    drive, times = own_pair(rigid.move(start, 0.03, 0.2)), np.linspace(0.0, 0.21, 211)
+    rest = boom.rest(start, 0.5)
+    runs = [boom.follow(drive, rest, times, [0.2], *solver) for solver in ((1e-8, "LSODA"), (1e-7, "Radau"))]
+    assert len(runs[0].episodes) > 3 and len(runs[0].episodes) == len(runs[1].episodes)
+    starts = [[episode.start for episode in run.episodes] for run in runs]
+    assert starts[0] == pytest.approx(starts[1], abs=1e-5)
+    assert runs[0].tip == pytest.approx(runs[1].tip, abs=1e-7)
+    assert runs[0].offset == pytest.approx(runs[1].offset, abs=1e-6)
+    flying = np.hypot(*runs[0].offset.T) < 0.9e-4
+    assert flying.any() and np.hypot(*runs[0].force[flying].T).max() < 5.0
+
+
+def own_pair(move):
+    """Length and rate alone."""
+    return lambda time: move(time)[:2]
