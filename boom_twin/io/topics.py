@@ -110,6 +110,7 @@ def load_topics() -> Topics:
     return Topics.model_validate(default_document())
 
 
+@cache
 def default_document() -> Any:
-    """What the package's own file says."""
+    """What the package's own file says; not to be changed."""
     return read_plain(DEFAULT_FILE, UsageError, "Install the package anew.")
