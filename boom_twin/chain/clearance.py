@@ -171,11 +171,13 @@ def note_contacts(t, state, work):
 def coarseness(t, state, work, scheme):
     """Largest error of a sub-step in the offset of a pin that touches, over what is allowed.
 
-    |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991), against `ALLOWED` of the clearance. A journal without inertia has no
-    motion of its own to resolve.
+    |1/A - h^2/6| |a' - a| (Zienkiewicz and Xie 1991, with 1/A = beta h^2 for Newmark's family), against `ALLOWED` of the
+    clearance. A journal without inertia has no motion of its own to resolve.
     """
     worst, before = 0.0, state.history[A]
-    size = abs(1.0 / (scheme.gain * scheme.reach * scheme.reach) - SIXTH) * scheme.reach * scheme.reach
+    if scheme.gain == 0.0:
+        return worst
+    size = abs(1.0 / scheme.gain - SIXTH * scheme.reach * scheme.reach)
     for k in range(t.clearances.shape[0]):
         row, memory = t.clearances[k], state.contacts[k]
         i, j = row.z, row.z + 1

@@ -8,8 +8,9 @@ from typing import Any
 
 from ..errors import Fault
 from ..scene import Scene
-from ..scene.explain import Account, JointAccount, SectionAccount, explain
+from ..scene.explain import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..scene.load import DEFAULT_NAME, examine
+from ..scene.parts import Clearance
 from ..scene.splits import LEAST
 from . import need
 from .common import add_json, add_scene, open_scene, print_json
@@ -64,6 +65,7 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "split_at_m": [[split.x for split in section.splits] for section in sections],
         "section_unknowns": [section.unknowns for section in sections],
         "joint_unknowns": [joint.unknowns for joint in joints],
+        "clearance_pins": [pin.at for pin in account.pins],
         "unknowns": account.unknowns,
         "stroke_low_m": [joint.stroke_low for joint in joints],
         "stroke_high_m": [joint.stroke_high for joint in joints],
@@ -82,6 +84,8 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
     lines += ["", "Sections", *_indent(_sections(account))]
     lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
+    if scene.clearance is not None and account.pins:
+        lines += ["", _clearance_title(scene.clearance), *_indent(_pins(account))]
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
     lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
     lines += ["", f"Warnings: {len(oddities) or 'none'}", *(f"  {oddity}" for oddity in oddities)]
@@ -138,6 +142,19 @@ def _oil(joint: JointAccount) -> str:
     return f"k = {joint.k / 1e6:.4g} kN/mm, {damping}"
 
 
+def _clearance_title(clearance: Clearance) -> str:
+    law = clearance.contact
+    words = f"{law.law} contact, restitution {law.restitution:g}, friction {law.friction:g}"
+    linear = ", linearised at the preload" if clearance.treatment == "spring-damper" else ""
+    return f"Pins with clearance ({words}{linear})"
+
+
+def _pins(account: Account) -> list[str]:
+    rows = [["", "pin radius mm", "radial clearance mm"]]
+    rows += [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
+    return _table(rows)
+
+
 def _left_out(account: Account) -> list[str]:
     return _table([[item.key, item.meaning] for item in account.left_out], left=2)
 
@@ -150,6 +167,10 @@ def _unknowns(account: Account) -> list[str]:
             parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
             words = f"{parts} x ({section.bending} bending + {section.axial} axial)"
             rows.append([f"section {section.number}", str(section.unknowns), words])
+    if account.pins:
+        count = len(account.pins)
+        words = f"offset of the journal, {count} pin{'s' * (count > 1)} x 2"
+        rows.append(["clearance", str(UNKNOWNS_PIN * count), words])
     rows.append(["total", str(account.unknowns), ""])
     width = max(len(row[1]) for row in rows)
     return _table([[name, number.rjust(width), words] for name, number, words in rows], left=3)

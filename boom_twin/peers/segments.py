@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..records import Array
+from ..scene.ideal import refuse_clearance
 from ..scene.parts import Cylinder, Joint, Scene
 from .jets import Jet, angle, constant, coordinates, cos, inverse, root, sin
 from .pieces import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
@@ -44,9 +45,16 @@ class Boom:
 
 
 class Segments:
-    """A scene with about 4 `fineness` springs in every flexible section; 0 makes all sections rigid."""
+    """A scene with about 4 `fineness` springs in every flexible section; 0 makes all sections rigid.
+
+    Raises
+    ------
+    UsageError
+        The scene has pins with clearance.
+    """
 
     def __init__(self, scene: Scene, fineness: int) -> None:
+        refuse_clearance(scene, "the finite-segment boom")
         self.scene, self.fineness = scene, fineness
         self.gravity = gravity_in_base(scene)
 

@@ -11,6 +11,7 @@ J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything tha
 from __future__ import annotations
 
 from ..records import Array
+from ..scene.ideal import refuse_clearance
 from ..scene.parts import Scene
 from .assembly import gravity_in_base, section_frames
 from .joints import add_joint, add_pivot
@@ -30,7 +31,13 @@ def build(scene: Scene, strokes: Array, elements: int = 16, shear_over_axial: fl
         Finite elements per flexible section, at least one per part between cylinder brackets.
     shear_over_axial : float
         GA over EA of all beams.
+
+    Raises
+    ------
+    UsageError
+        The scene has pins with clearance.
     """
+    refuse_clearance(scene, "the virtual rig")
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))

@@ -8,10 +8,10 @@ import numpy as np
 
 from .kinematics import stroke_curve
 from .left_out import LeftOut, left_out
-from .parts import Scene
+from .parts import Pin, Scene
 from .splits import Split, flexible_parts, splits
 
-UNKNOWNS_A, UNKNOWNS_B = 2, 6
+UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN = 2, 6, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +71,14 @@ class JointAccount:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Everything about a scene's model. ``length`` is the sum of all sections (m), ``payload`` in kg."""
+    """Everything about a scene's model. ``length`` is the sum of all sections (m), ``payload`` in kg.
+
+    ``pins`` are those with clearance; each has two unknowns, the offset of its journal.
+    """
 
     sections: tuple[SectionAccount, ...]
     joints: tuple[JointAccount, ...]
+    pins: tuple[Pin, ...]
     payload: float
     left_out: tuple[LeftOut, ...]
 
@@ -91,7 +95,8 @@ class Account:
     @property
     def unknowns(self) -> int:
         """Unknowns of one step."""
-        return sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
+        own = sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
+        return own + UNKNOWNS_PIN * len(self.pins)
 
 
 def explain(scene: Scene) -> Account:
@@ -101,6 +106,7 @@ def explain(scene: Scene) -> Account:
     return Account(
         sections=tuple(_section(scene, i) for i in numbers),
         joints=tuple(_joint(scene, i) for i in numbers),
+        pins=tuple(pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}")),
         payload=payload or 0.0,
         left_out=left_out(scene),
     )

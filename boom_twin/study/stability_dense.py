@@ -66,8 +66,8 @@ class Kinematics:
         self.moved = np.zeros((len(self.plan.masses), size), dtype=Long)
         t = self.plan.tables
         frame = Frame(Long(0), Long(0), Long(0), np.zeros((3, size), dtype=Long))
-        base = self.plan.state().pins[0, :2]
-        self.pins[0, 0] = np.asarray(base, dtype=Long), np.zeros((2, size), dtype=Long)
+        base = [Long(t.joints[0].x) + Long(t.linkages[0].cx), Long(t.joints[0].y) + Long(t.linkages[0].cy)]
+        self.pins[0, 0] = np.array(base), np.zeros((2, size), dtype=Long)
         for operation in t.operations:
             frame = self._operate(int(operation.kind), int(operation.row), frame)
         self.tip = frame.rows

@@ -40,7 +40,7 @@ PARTS[1] = (cylinder.ROD, 4, 0.4, 14.0, 0.6)
 
 def cylinder_row(compliance, lag):
     rows = np.zeros(1, cylinder.CYLINDER).view(np.recarray)
-    rows[0] = (0, 0, 0, 2, 1.0, compliance, lag)
+    rows[0] = (0, 0, 0, 2, 0, 0, 1.0, compliance, lag)
     return rows[0]
 
 

@@ -95,8 +95,8 @@ UNKNOWN_KEYS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (("zzz",), 1, "zzz", ("nearest known key", "All of them: description, gravity")),
     (("base", "inclinaton"), 0.1, "base.inclinaton", ("`inclination`",)),
     (s(0, "86"), None, "sections[0].86", ("number stands where a key", "not a comma")),
-    (("clearance",), {"cylinder_2.rod": 1e-4}, "clearance", ("clearance is not built yet", "Remove", "ideal pins")),
-    (("clearance",), {}, "clearance", ("clearance is not built yet",)),
+    (("clearance",), {"pin": []}, "clearance.pin", ("`pins`",)),
+    (("clearance",), {"law": "hertz"}, "clearance.law", ("`law` is a key of clearance.contact",)),
 ]
 
 CONTRADICTIONS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
@@ -205,14 +205,14 @@ def test_all_faults_are_reported_at_once(bench: Any) -> None:
         put(values, j(2, "cylinder", "k"), GONE)
         put(values, j(3, "kind"), "B9")
         put(values, ("postures", "low"), [45, 0])
-        put(values, ("clearance",), {"joint_1": 1e-4})
+        put(values, ("clearance",), {"joints": []})
 
     path = bench.edited(edit)
     with pytest.raises(SceneError, match="9 faults") as caught:
         load_scene(path)
     assert {fault.path for fault in caught.value.faults} == {
         "material.E", "sections[0].root.mass", "sections[1].rho_a", "sections[2].I", "joints[1].range_deg",
-        "joints[2].cylinder.d", "joints[3].kind", "postures.low", "clearance",
+        "joints[2].cylinder.d", "joints[3].kind", "postures.low", "clearance.joints",
     }  # fmt: skip
     assert caught.value.source == str(path)
 
