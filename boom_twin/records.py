@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     import numpy as np
@@ -13,6 +13,10 @@ if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     Array = NDArray[np.float64]
 else:
     Array = Any
+
+
+Mount = Literal["root", "head"]
+"""Where on its section an inclinometer sits; between the two lies the bending of the section."""
 
 
 class Stream(Enum):
@@ -33,7 +37,8 @@ class Sample:
     stamp : int
         Nanoseconds, `header.stamp` of the message.
     values : ndarray
-        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad. ``IMU``: (2,) m/s^2, specific force along x and z of the tip.
+        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific
+        force along x and z of the tip.
         NaN where the message had no value.
     """
 
@@ -141,7 +146,7 @@ class Report:
     stamp : int
         Of the sample, nanoseconds.
     accepted : bool
-        False when the sample was not used; `events` says why.
+        False when the sample was not used; `events` says why. A sample with the event ``leap`` is a witness of time only.
     prediction : Prediction or None
         Set for every stroke sample that the model was stepped to.
     residuals : tuple of Residuals

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from .errors import UsageError
+from .plain import read_plain
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
@@ -43,6 +42,7 @@ class Settings(BaseModel):
     gap: Limit = Field(default=0.1, description="longer pauses between strokes are flagged, s")
     restart_gap: Limit = Field(default=5.0, description="longer pauses start again from rest, s")
     jump_back: Limit = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
+    leap: Limit = Field(default=3600.0, description="a stamp further from its stream must be confirmed by the next, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
@@ -97,16 +97,14 @@ def settings_from(values: dict[str, Any], source: str) -> Settings:
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``autostart``) are passed over.
+    Parameters of the node alone (``scene``, ``mapping``, ``autostart``) are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
+    content = read_plain(source, UsageError, "Give a ROS parameter file.")
     try:
-        content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
         values = dict(next(iter(content.values()))["ros__parameters"])
-    except OSError as error:
-        raise UsageError(f"{source}: {error.strerror}. Give a parameter file.") from None
-    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
+    except (AttributeError, KeyError, TypeError, StopIteration, ValueError):
         raise UsageError(f"{source}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
-    for name in ("scene", "autostart"):
+    for name in ("scene", "mapping", "autostart"):
         values.pop(name, None)
     return settings_from(values, str(source))

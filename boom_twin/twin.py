@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,14 +15,16 @@ from .errors import BoomTwinError, UsageError
 from .estimate.follower import Tuning, follow, new_track
 from .load import loaded
 from .memory import Expected, Memory
+from .mounting import Mounting
 from .physics.linkage import cylinder_length
 from .plan.compile import compile_scene
 from .recent import Recent
-from .records import Array, Change, Prediction, Report, Residuals, Sample, Stream
+from .records import Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream
 from .requests import Requests
 from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
+from .stray import Strays
 from .undeflected import Undeflected
 from .zeros import Zeros, channels_of
 
@@ -33,6 +36,7 @@ EVENTS = {
     "waiting": "not all strokes known yet; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge; started again from rest",
+    "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
     "jump back": "time was set back; everything started again",
     "model": "the model failed; it starts again with the next full sample",
     "reset": "asked for; the model started again from rest",
@@ -72,6 +76,9 @@ class Twin:
         The boom.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
+    mounts : sequence of Mount or None, optional
+        Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
+        `boom_twin.mounting.Mounting`.
 
     Attributes
     ----------
@@ -87,16 +94,18 @@ class Twin:
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
-    def __init__(self, scene: Scene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
         self.scene, self.settings = scene, settings or Settings()
         self.counts: Counter[str] = Counter()
         tuned = self.settings
         self._tuning = Tuning(
             tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
         )
+        self._mounts = mounts
         self._build()
         self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
         self._channels = channels_of(self.plan.joints)
+        self._strays = Strays(self.settings)
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
         self._pending: deque[Sample] = deque()
@@ -105,6 +114,7 @@ class Twin:
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
+        self._strays = Strays(self.settings)
         self._newest_measured = {}
         self._pending = deque()
 
@@ -140,6 +150,7 @@ class Twin:
         self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
         self._undeflected = Undeflected(self.scene, self.plan)
         self._track = new_track(self.plan, lengths)
+        self._mounting = Mounting(self.plan, self.scene.base.inclination, self._mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -148,6 +159,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
+            self._strays = Strays(self.settings)
         if asked.zeros != self._zeros.values:
             events.append("zero")
             from_rest |= self._zeros.put(stamp, asked.zeros)
@@ -186,6 +198,8 @@ class Twin:
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         events: list[str] = []
+        if self._strays.hold(sample, None if self._run is None else self._run.newest):
+            return self._hold(sample)
         if self._run is not None:
             span = (sample.stamp - self._run.newest) * NANO
             if -self.settings.jump_back <= span <= 0.0:
@@ -280,14 +294,18 @@ class Twin:
         """Keep what residuals need."""
         n, interval = self.plan.joints, run.interval or self.settings.step
         variances = self._row[3 * n + 9 : 4 * n + 9]
-        sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        angles = self._mounting.expected(prediction.joints, self._live)
+        angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
         force = specific_force(prediction, self.plan.tables.gravity)
-        run.memory.add(Expected(prediction.stamp, prediction.joints, force, *sigmas))
+        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
     def _take_measured(self, sample: Sample, complete: bool) -> Report:
         newest = self._newest_measured.get(sample.stream)
+        if self._strays.hold(sample, newest):
+            return self._hold(sample)
         if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
             return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
         self._newest_measured[sample.stream] = sample.stamp
@@ -319,7 +337,7 @@ class Twin:
         if expected is None:
             return None
         if sample.stream is Stream.ANGLES:
-            values, sigmas = sample.values - expected.joints, expected.joint_sigmas
+            values, sigmas = self._mounting.residuals(sample.values, expected.angles), expected.angle_sigmas
         else:
             values, sigmas = sample.values - expected.force, expected.force_sigmas
         self._recent.add(sample.stamp, sample.stream, values)
@@ -327,6 +345,11 @@ class Twin:
         if zeros is not None:
             values = values - zeros
         return Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+
+    def _hold(self, sample: Sample) -> Report:
+        """Taken as a witness of time alone."""
+        self.counts["leap"] += 1
+        return Report(sample.stamp, True, events=("leap",))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

@@ -15,7 +15,7 @@ from ..scene.parts import Scene
 from ..settings import Settings
 from .outlet import Outlet
 from .pipe import Pipe, say_ready
-from .topics import Output, Topic, load_topics
+from .topics import Output, Topic, Topics
 from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
@@ -84,6 +84,8 @@ class Behind:
         Of the bag; must be new or empty.
     notes : mapping of str to str
         Kept in the bag.
+    topics : Topics
+        How its topics are named.
     scene : Scene
         What the reports are about.
     settings : Settings
@@ -95,10 +97,12 @@ class Behind:
         From any method: the bag could not be written; says why.
     """
 
-    def __init__(self, directory: Path, notes: Mapping[str, str], scene: Scene, settings: Settings) -> None:
+    def __init__(
+        self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings
+    ) -> None:
         self._batch: list[Packed] = []
         self._pipe = Pipe(__name__, str(directory))
-        self._pipe.send((dict(notes), scene, settings))
+        self._pipe.send((dict(notes), topics.outputs, scene, settings))
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
@@ -126,9 +130,9 @@ class Behind:
 def main(directory: Path) -> int:
     """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
     stream = sys.stdin.buffer
-    outputs: dict[str, Topic] = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
     try:
-        notes, scene, settings = pickle.load(stream)
+        notes, topics, scene, settings = pickle.load(stream)
+        outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
         outlet = Outlet(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()

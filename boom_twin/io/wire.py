@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from ..records import Stream
 from .cdr import names_in, stamp_in
+from .topics import TYPES
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
 _LITTLE = b"\x00\x01"
@@ -60,14 +61,14 @@ class Wire:
 
     Parameters
     ----------
-    stream : Stream
-        What comes by it.
+    type_name : str
+        ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
     decode : callable
         Decodes a message that is laid out in another way than the one before.
     """
 
-    def __init__(self, stream: Stream, decode: Callable[[bytes], Any]) -> None:
-        self._learn = _force_layout if stream is Stream.IMU else _joints_layout
+    def __init__(self, type_name: str, decode: Callable[[bytes], Any]) -> None:
+        self._learn = _force_layout if type_name == TYPES[Stream.IMU] else _joints_layout
         self._decode = decode
         self._layout: _Layout | None = None
 

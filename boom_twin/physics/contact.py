@@ -33,7 +33,8 @@ LEAST_GAP = 3e-5  # m, least difference of radii in K
 SLOWEST = 1e-3  # m/s, least speed of approach
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
-PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD, BARREL = range(6)
+# Places of pins; typed, because numba compiles once more for every literal.
+PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD, BARREL = map(np.int64, range(6))
 
 CLEARANCE = np.dtype(
     [

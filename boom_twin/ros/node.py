@@ -13,14 +13,15 @@ from rclpy.subscription import Subscription
 
 from ..errors import BoomTwinError
 from ..io.intake import Intake
+from ..io.mapping import load_mapping
 from ..io.outlet import Outlet
-from ..io.topics import NODE, Output, load_topics
+from ..io.topics import NODE, Output
 from ..io.wire import Wire
 from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, guard, scene_path, settings_of
+from .parameters import declare, guard, mapping_path, scene_path, settings_of
 from .qos import qos_profile
 from .services import Services
 from .started import Started
@@ -45,10 +46,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
-        self._topics = load_topics()
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
+        self._topics = load_mapping(mapping_path(self))
         guard(self, lambda: self._twin is not None, self._tune)
         self._diagnostics = Diagnostics(self, self._topics)
 
@@ -87,11 +88,12 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         gc.collect()
         gc.freeze()  # what lives from here on as long as the node is not searched again
         outcome = super().on_activate(state)
-        for stream, topic in self._topics.inputs.items():
+        for name, streams in self._topics.heard.items():
+            topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            wire = Wire(stream, partial(deserialize_message, message_type=kind))
-            receive = partial(self._receive, stream, wire)
-            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos, raw=True))
+            wire = Wire(topic.type, partial(deserialize_message, message_type=kind))
+            receive = partial(self._receive, streams, wire)
+            self._subscriptions_in.append(self.create_subscription(kind, name, receive, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
         return outcome
@@ -130,12 +132,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         scene, oddities = examine(path)
         for oddity in oddities:
             self.get_logger().warning(str(oddity))
-        settings = settings_of(self)
-        twin = Twin(scene, settings)
+        settings, joints = settings_of(self), len(scene.joints)
+        topics = load_mapping(mapping_path(self), joints)
+        twin = Twin(scene, settings, topics.mounts(joints))
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
-        self._twin, self._intake = twin, Intake(twin.plan.joints)
+        self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
         self._asked = Services(self, twin, lambda: bool(self._subscriptions_in))
         self._started = Started(self.get_logger())
@@ -163,12 +166,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, stream: Stream, wire: Wire, data: bytes) -> None:
+    def _receive(self, streams: list[Stream], wire: Wire, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
-        try:
-            self._take(stream, *wire.read(data))
-        except Exception as error:  # the last resort, such as a message that is not whole
-            self._diagnostics.broken(stream, error)
+        for stream in streams:
+            try:
+                self._take(stream, *wire.read(data))
+            except Exception as error:  # the last resort, such as a message that is not whole
+                self._diagnostics.broken(stream, error)
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None

@@ -42,6 +42,7 @@ def _row(name: str, field: FieldInfo) -> Row:
 
 TABLE = (
     Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
+    Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     Row("autostart", True, "the node configures and activates itself", AT_START),
     *(_row(name, field) for name, field in Settings.model_fields.items()),
 )
@@ -91,6 +92,12 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
 def scene_path(node: Node) -> Path | None:
     """The scene to load; None = the package's own."""
     text: str = node.get_parameter("scene").value
+    return Path(text) if text else None
+
+
+def mapping_path(node: Node) -> Path | None:
+    """The mapping to load; None = the package's own."""
+    text: str = node.get_parameter("mapping").value
     return Path(text) if text else None
 
 

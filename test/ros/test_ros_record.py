@@ -91,6 +91,7 @@ def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], tmp_path:
     here = Path(__file__).parents[2] / "msg_config"
     assert sheet["scene"] == (here / "scene.yaml").read_text()
     assert sheet["parameters"] == (here / "twin.yaml").read_text()
+    assert sheet["mapping"] == (here / "topics.yaml").read_text()
     assert sheet["topics"] == {"/cylinder_strokes": JOINT_STATE, "/odd": None, "/never": "std_msgs/msg/String"}
 
 
