@@ -59,6 +59,7 @@ class BagWriter:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
         self._files: list[bagmeta.FileInformation] = []
+        self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         claim(directory)
         self._open()
@@ -100,7 +101,12 @@ class BagWriter:
     @property
     def size(self) -> int:
         """Bytes of the open file on the disk, without what is in memory."""
-        return self._raw.tell()
+        return 0 if self._raw.closed else self._raw.tell()
+
+    @property
+    def written(self) -> int:
+        """Bytes of all files on the disk."""
+        return self._completed + self.size
 
     @property
     def first(self) -> int | None:
@@ -149,6 +155,7 @@ class BagWriter:
         """Complete the open file, down to the disk."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         self.flush()
+        self._completed += self.size
         self._raw.close()
         first, last, count = self._span or (0, 0, 0)
         self._files.append(file_information(file_name(len(self._files)), first, last, count))

@@ -5,10 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from queue import Empty, SimpleQueue
+from shutil import disk_usage
 from threading import Thread
 
 from ..errors import BagError
+from ..watch.recording import DiskState
 from .bagwriter import BagWriter
 from .recorded import Recorded
 
@@ -55,8 +58,9 @@ class Storage:
     def __init__(self, bag: BagWriter, split: Split, tell: Callable[[str], None]) -> None:
         self._bag, self._split, self._tell = bag, split, tell
         self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
-        self._put = self._taken = 0  # bytes; each is changed by one thread only
-        self._alive = time.monotonic()
+        self._put = self._taken = self._safe = 0  # bytes; each is changed by one thread only
+        self._began = self._alive = self._flushed = time.monotonic()
+        self._free = self._written = 0
         self._is_late = False
         self._error: BaseException | None = None
         self._topics = 0
@@ -93,6 +97,18 @@ class Storage:
         if self._put - self._taken > MOST:
             raise self._stalled(f"{MOST // 2**20} MiB of messages wait in memory")
 
+    def state(self) -> DiskState:
+        """What is on the disk."""
+        now = time.monotonic()
+        pace = self._written / (now - self._began)
+        return DiskState(
+            lag=now - self._flushed if self._put > self._safe else 0.0,
+            waiting=self._put - self._taken,
+            written=self._written,
+            free=self._free,
+            left=self._free / pace if pace else inf,
+        )
+
     def close(self) -> list[int]:
         """Complete the bag; gives the messages written by key.
 
@@ -120,17 +136,19 @@ class Storage:
         try:
             self._serve()
             self._bag.close()
+            self._note(time.monotonic())
         except Exception as error:  # told where it can be told: by `check` and `close`
             self._error = error
             self._bag.abandon()
 
     def _serve(self) -> None:
         """Write until the end, flushing now and then."""
-        due = time.monotonic() + FLUSH
+        due = time.monotonic()
         while True:
             self._alive = time.monotonic()
             if self._alive >= due:
                 self._bag.flush()
+                self._note(self._alive)
                 due = time.monotonic() + FLUSH
             try:
                 item = self._queue.get(timeout=max(due - time.monotonic(), 0.0))
@@ -142,6 +160,11 @@ class Storage:
                 self._bag.add(item)
             else:
                 self._write(item)
+
+    def _note(self, now: float) -> None:
+        """All that was taken until `now` is on the disk; its room is asked here, because a stalled disk holds up that too."""
+        self._safe, self._flushed, self._written = self._taken, now, self._bag.written
+        self._free = disk_usage(self._bag.directory).free
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -19,9 +20,10 @@ from ..io.topics import NODE, Output
 from ..io.wire import Wire
 from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
+from ..settings import Settings
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, guard, mapping_path, scene_path, settings_of
+from .parameters import declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
 from .services import Services
 from .started import Started
@@ -50,8 +52,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
         self._topics = load_mapping(mapping_path(self))
-        guard(self, lambda: self._twin is not None, self._tune)
         self._diagnostics = Diagnostics(self, self._topics)
+        self._diagnostics.tune(thresholds_of(self))
+        guard(self, lambda: self._twin is not None, self._tune)
 
     @property
     def autostart(self) -> bool:
@@ -147,8 +150,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _tune(self, live: dict[str, float]) -> None:
         """Live parameters were set."""
-        assert self._twin is not None
-        self._twin.requests.tune(live)
+        self._diagnostics.tune(thresholds_of(self))
+        asked = {name: value for name, value in live.items() if name in Settings.live_names()}
+        if asked and self._twin is not None:
+            self._twin.requests.tune(asked)
 
     def _go_quiet(self) -> None:
         self._diagnostics.stop()
@@ -180,8 +185,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         sample = self._intake.put(stream, stamp, msg)
         if sample is None:
             return
+        began = perf_counter()
         report = self._twin.update(sample)
-        self._diagnostics.reported(report)
+        self._diagnostics.took(sample, report, perf_counter() - began)
         if report.change is not None:
             self._started.tell(report, report.change)
         for key, encoded in self._outlet.fill(report):

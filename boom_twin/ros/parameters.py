@@ -1,4 +1,4 @@
-"""The node's parameters, from one table: its own here, those of the twin in `boom_twin.settings.Settings`."""
+"""The node's parameters, from one table: its own here, those of others in `Settings` and `Thresholds`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, ParameterException
@@ -16,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from ..errors import UsageError
 from ..settings import Settings, settings_from
+from ..thresholds import Thresholds, thresholds_from
 from .context import one_line
 
 SOURCE = "parameters of the node"
@@ -34,17 +36,18 @@ class Row:
     bounds: dict[str, float] | None = None
 
 
-def _row(name: str, field: FieldInfo) -> Row:
+def _row(name: str, field: FieldInfo, is_live: bool) -> Row:
     keys = ("gt", "ge", "lt", "le")
     bounds = {key: float(getattr(rule, key)) for rule in field.metadata for key in keys if hasattr(rule, key)}
-    return Row(name, float(field.default), field.description or "", LIVE if name in Settings.live_names() else FIXED, bounds)
+    return Row(name, float(field.default), field.description or "", LIVE if is_live else FIXED, bounds)
 
 
 TABLE = (
     Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
     Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     Row("autostart", True, "the node configures and activates itself", AT_START),
-    *(_row(name, field) for name, field in Settings.model_fields.items()),
+    *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
+    *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
 )
 
 
@@ -66,7 +69,7 @@ def declare(node: Node) -> None:
 
 
 def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[str, float]], None]) -> None:
-    """Refuse what cannot be set, with the reason; give live values that were set to `tune` while the node is configured."""
+    """Refuse what cannot be set, with the reason; give live values that were set to `tune`."""
     fixed = {row.name for row in TABLE if row.when == FIXED}
 
     def check(parameters: list[Parameter[Any]]) -> SetParametersResult:
@@ -75,18 +78,23 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
             reason = f"{', '.join(refused)}: {FIXED}. Deactivate and clean it up first."
             return SetParametersResult(successful=False, reason=reason)
         try:
-            settings_from({name: value for name, value in values.items() if name in Settings.model_fields}, SOURCE)
+            settings_from(_only(Settings, values), SOURCE)
+            thresholds_from(_only(Thresholds, values), SOURCE)
         except UsageError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def apply(parameters: list[Parameter[Any]]) -> None:
-        live = {each.name: each.value for each in parameters if each.name in Settings.live_names()}
-        if live and is_configured():
-            tune(live)
+        live = {row.name for row in TABLE if row.when == LIVE}
+        if changed := {each.name: each.value for each in parameters if each.name in live}:
+            tune(changed)
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(apply)
+
+
+def _only(table: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name in table.model_fields}
 
 
 def scene_path(node: Node) -> Path | None:
@@ -104,6 +112,11 @@ def mapping_path(node: Node) -> Path | None:
 def settings_of(node: Node) -> Settings:
     """The settings as the parameters stand; UsageError if a value is out of bounds."""
     return settings_from({name: node.get_parameter(name).value for name in Settings.model_fields}, SOURCE)
+
+
+def thresholds_of(node: Node) -> Thresholds:
+    """The thresholds of ``/diagnostics`` as the parameters stand."""
+    return thresholds_from({name: node.get_parameter(name).value for name in Thresholds.model_fields}, SOURCE)
 
 
 def _descriptor(row: Row) -> ParameterDescriptor:

@@ -191,7 +191,6 @@ def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, 
     return {
         "rate": len(sent) / told["seconds"],
         "lost": len(set(sent) - set(stamps)),
-        "first lost": min((k for k, stamp in enumerate(sent) if stamp not in set(stamps)), default=-1),
         "twice": len(stamps) - len(set(stamps)),
         "residuals lost": len(sent) - len(heard["residuals"]),
         "p50": float(np.quantile(delays, 0.5)),
