@@ -23,6 +23,7 @@ from boom_twin import load_scene, replay
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.reader import read_both, scan
 from boom_twin.io.topics import NODE, TYPES, Output
+from boom_twin.ros.recorder import COMPLETE
 
 MAPPING = """
 inputs:
@@ -68,6 +69,7 @@ def test_live_and_replayed_alike(
     while publisher.get_subscription_count() < 2 or rig.count_subscribers("/boom_twin/residuals") < 1:
         assert time.monotonic() < end
         rclpy.spin_once(rig, timeout_sec=0.05)
+    recorder.wait_for(COMPLETE)
     for row in range(ROWS):
         angles = motion["joints"][row] if row % 4 == 0 else None
         publisher.publish(message(int(motion["stamps_ns"][row]), motion["strokes"][row], angles))
