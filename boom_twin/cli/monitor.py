@@ -28,6 +28,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
     add_scene(parser, option=True)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
     parser.add_argument("--port", type=int, default=PORT, help=f"({PORT}; 0: any that is free)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     parser.add_argument(
@@ -67,16 +68,17 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         from ..settings import load_settings
 
         print("reading the session (compiles for up to a minute the first time) ..", file=sys.stderr)
-        yield bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), _progress)
+        yield bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), _progress, args.mapping)
         return
     from ..ros.require import require_rclpy
 
     require_rclpy()
+    from ..io.mapping import load_mapping
     from ..ros.context import ros
     from ..ros.monitor import TopicFeed
 
     with ros([]):
-        feed = TopicFeed(open_scene(args.scene) if args.scene else None)
+        feed = TopicFeed(load_mapping(args.mapping), open_scene(args.scene) if args.scene else None)
         try:
             yield feed
         finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..io.topics import Topics
 from ..scene import load_scene
 from ..scene.load import DEFAULT_NAME
 from ..scene.parts import Scene
@@ -21,15 +22,17 @@ class Feed:
     title : str
         What is shown, in words.
     store : Store
+    topics : Topics
+        Their names, and how sensors are read.
     scene : Scene, optional
         By default the one that the node names, if it can be read here.
     end : float, optional
         Length of a recorded session, s; None if it is live.
     """
 
-    def __init__(self, title: str, store: Store, scene: Scene | None = None, end: float | None = None) -> None:
+    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
-        self.catch = Catch(store)
+        self.catch = Catch(store, topics)
         self._scene = scene
 
     def poll(self) -> None:

@@ -65,11 +65,11 @@ class Store:
         return max((table.newest for table in self.tables.values()), default=0.0)
 
     def light(self, time: float, board: Board) -> None:
-        """The lamps from `time` (s) on."""
+        """The lamps from `time` (s, as they count it) on."""
         if not self._keeps_boards:
             self._boards.clear()
         self._boards.append((time, board))
-        self.alarms.follow(time, board)
+        self.alarms.follow(self.newest, board)
 
     def board(self, time: float) -> Board:
         """The lamps as they were last told at `time` (s)."""
