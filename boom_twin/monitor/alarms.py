@@ -63,8 +63,7 @@ class Alarms:
 
     def add(self, name: str, level: Level, reason: str, begin: float, end: float) -> None:
         """An alarm that is over, such as a gap."""
-        self._number += 1
-        self.all.append(Alarm(self._number, name, level, reason, begin, end))
+        self._keep(Alarm(self._next(), name, level, reason, begin, end))
 
     def acknowledge(self, number: int) -> Alarm | None:
         """Note that somebody has seen it; None if there is none of that number."""
@@ -76,8 +75,14 @@ class Alarms:
     def _raise(self, key: str, name: str, level: Level, reason: str, time: float) -> None:
         alarm = self._open.get(key)
         if alarm is None:
-            self._number += 1
-            alarm = self._open[key] = Alarm(self._number, name, level, reason, time)
-            self.all = [*self.all[-MOST + 1 :], alarm]
+            self._open[key] = self._keep(Alarm(self._next(), name, level, reason, time))
         elif level > alarm.level:
             alarm.level, alarm.reason, alarm.is_acknowledged = level, reason, False
+
+    def _next(self) -> int:
+        self._number += 1
+        return self._number
+
+    def _keep(self, alarm: Alarm) -> Alarm:
+        self.all = [*self.all[-MOST + 1 :], alarm]
+        return alarm

@@ -14,7 +14,7 @@ offset  type                   meaning
 ======  =====================  ==========================================================================
 
 A spectrum has one column for each column of the table that its number names. All else is JSON in text messages, with a key
-``kind``: ``hello``, ``layout``, ``reset``, ``skipped``, ``state``, ``lines``, ``answer``.
+``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``answer``.
 """
 
 from __future__ import annotations

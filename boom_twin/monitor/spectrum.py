@@ -51,7 +51,7 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     if len(times) < 32 or times[-1] - times[0] < SEGMENT:
         return None
     rate = 1.0 / float(np.median(np.diff(times)))
-    even = np.arange(times[0], times[-1], 1.0 / rate)
+    even = times[0] + np.arange(round((times[-1] - times[0]) * rate) + 1) / rate
     values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
     length = min(round(SEGMENT * rate), len(even))
     frequencies, densities = welch(values, rate, "hann", length, detrend="constant", axis=0)

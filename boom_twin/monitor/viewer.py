@@ -118,21 +118,21 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """All rows that are owed, in messages of bounded size."""
+        """All rows that are owed now, in messages of bounded size; what comes meanwhile waits, so that lamps are not held up."""
         tables = list(self._feed.store.tables.values())[: self._tables]
-        while True:
-            blocks, is_done = [], True
-            for number, table in enumerate(tables):
-                first, end = self._owed(table, position)
+        owed = {number: self._owed(table, position) for number, table in enumerate(tables)}
+        while owed:
+            blocks = []
+            for number, (first, end) in list(owed.items()):
                 last = min(end, first + CHUNK)
-                is_done = is_done and last == end
-                self._sent[table.name] = last
                 if last > first:
-                    blocks.append(pack(ROWS, number, *table.rows(first, last)))
+                    blocks.append(pack(ROWS, number, *tables[number].rows(first, last)))
+                self._sent[tables[number].name] = last
+                owed[number] = (last, end)
+                if last == end:
+                    del owed[number]
             if blocks:
                 await self._socket.send_bytes(b"".join(blocks))
-            if is_done:
-                return
 
     def _owed(self, table: Table, position: float) -> tuple[int, int]:
         """Numbers of the first row to send and of the one after the last."""

@@ -4,7 +4,7 @@ import uPlot from "/page/uplot.js";
 import { line, paint } from "./colours.js";
 import { show } from "./sheet.js";
 
-const LEGEND = 20; // px
+const LEGEND = 24; // px
 
 export class Chart {
   // series: [{ label, colour: number or name, dash, width, show }], bands: [[high, low, colour]] by place in series
@@ -19,7 +19,7 @@ export class Chart {
       scales: { x: { time: false, auto: false }, ...scales },
       axes: [{ ...axis, size: 22, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(show), ...axes[1] }],
       series: [{ label: title, value: (_, v) => v == null ? "" : v.toFixed(3) }, ...series.map(s => ({
-        stroke: colour(s.colour), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? "", dash: s.dash, label: s.label,
+        stroke: colour(s.colour), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? null, dash: s.dash, label: s.label,
         value: (_, v) => v == null ? "–" : v.toPrecision(4),
       }))],
       bands: bands.map(([high, low, c]) => ({ series: [high, low], fill: colour(c) + "38" })),
