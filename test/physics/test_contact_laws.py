@@ -10,12 +10,24 @@ from oracle.clearance.scenes import RODS, with_pins
 from scipy.integrate import solve_ivp
 
 from boom_twin.physics.contact import (
-    APPROACH, CLOSED, COLUMNS, FORCE, LAWS, LEAST_GAP, SMOOTH, approach, bearing, contact_stiffness, limited,
+    APPROACH,
+    CLOSED,
+    COLUMNS,
+    FORCE,
+    LAWS,
+    LEAST_GAP,
+    SMOOTH,
+    approach,
+    bearing,
+    contact_stiffness,
+    limited,
 )  # fmt: skip
 from boom_twin.plan.compile import compile_scene
 
-PUBLISHED = [("lankarani-nikravesh", e, kept) for e, kept in [(0.95, 0.954), (0.9, 0.913), (0.8, 0.847), (0.5, 0.725), (0.3, 0.684)]]
-PUBLISHED += [("flores", e, kept) for e, kept in [(0.9, 0.894), (0.8, 0.789), (0.5, 0.470)]]
+PUBLISHED = [
+    *(("lankarani-nikravesh", e, kept) for e, kept in ((0.95, 0.954), (0.9, 0.913), (0.8, 0.847), (0.5, 0.725), (0.3, 0.684))),
+    *(("flores", e, kept) for e, kept in ((0.9, 0.894), (0.8, 0.789), (0.5, 0.470))),
+]
 MASS = 20.0  # kg
 
 
