@@ -90,13 +90,16 @@ class BagWriter:
         try:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
-            raise self._fault(error) from error
+            raise self.fault(error) from error
 
-    def flush(self) -> None:
-        """Put all messages so far on the disk, to survive the loss of the process and of power."""
+    def flush(self) -> int:
+        """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
+
+        They survive the loss of power once ``os.fsync`` has put that file on the disk.
+        """
         with self._told():
             self._writer.flush()  # type: ignore[no-untyped-call]
-            os.fsync(self._raw.fileno())
+        return self._raw.fileno()
 
     @property
     def size(self) -> int:
@@ -154,7 +157,7 @@ class BagWriter:
     def _finish(self) -> None:
         """Complete the open file, down to the disk."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self.flush()
+        os.fsync(self.flush())
         self._completed += self.size
         self._raw.close()
         first, last, count = self._span or (0, 0, 0)
@@ -165,9 +168,10 @@ class BagWriter:
         try:
             yield
         except OSError as error:
-            raise self._fault(error) from error
+            raise self.fault(error) from error
 
-    def _fault(self, error: OSError) -> BagError:
+    def fault(self, error: OSError) -> BagError:
+        """What is told of a disk that is full or fails."""
         return BagError(
             f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
             f"`boom_twin recover {self.directory} --out DIR` saves what was written before."
