@@ -16,8 +16,8 @@ from .program import JOINT_A, JOINT_B, Motion
 from .status import NOT_CONVERGED, NOT_FINITE, OK
 from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-TICKS = np.int64(1024)  # of a step, the grid of its sub-steps
-SHORTEST = 1e-5  # s, of a sub-step; steps below twice that are not divided
+TICKS = np.int64(32)  # of a step: its shortest sub-step, so that it cannot take longer than 32
+SHORTEST = 1e-5  # s, of a sub-step likewise
 EASY = 0.1  # of the error allowed: the next sub-step is twice as long
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
 
@@ -48,31 +48,47 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     status, passes, last increment (rad)
         On failure the histories stay as they were, or as the last sub-step left them.
     """
-    done, total, size = 0, 0, 0.0
+    history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
     part, least = first_part(t, state, scheme), least_part(t, scheme)
     now = scheme
-    while True:
+    while done < TICKS:
         if part < TICKS:
             now = prepare(scheme.family, scheme.parameter, scheme.reach * part / TICKS, work.finer)
         lead(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
-        status, count, size = converge(t, state, work, now, tolerance, passes, longest, product)
-        total += count
-        if part > least and (status != OK or coarseness(t, state, work, now) > 1.0):
+        start_step(now, history, work.hat, work.offset)
+        predict(t, state, now.reach)
+        motion, status, left = Motion(now.gain, now.rate, work.hat, work.offset), NOT_CONVERGED, passes
+        place(t, state, work)
+        while status == NOT_CONVERGED and left > 0:
+            load_pins(t, state, work, motion)
+            if product is None:
+                clear_cut(work, FREE)
+                solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+                if solved == OK:
+                    sweep_out(t, state, work, ROOT, operations, FREE)
+            else:
+                solved = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
+            if solved == OK:
+                shorten(t, state, work)
+                size = add_increments(t, state, work, longest)
+                place(t, state, work)
+            status = verdict(work, solved, size, tolerance, passes)
+            left -= 1
+        total += passes - left
+        error = coarseness(t, state, work, now)
+        if part > least and (status != OK or error > 1.0):
             part //= 2
             for i in range(state.z.shape[0]):
-                state.z[i] = state.history[X, i]
+                state.z[i] = history[X, i]
             continue
         if status != OK:
             return status, total, size
-        easy = coarseness(t, state, work, now) < EASY
         note_contacts(t, state, work)
-        finish_step(now, work.position, work.hat, work.offset, state.history)
+        finish_step(now, work.position, work.hat, work.offset, history)
         done += part
-        state.pace[0] = part
-        if easy and part < TICKS and done % (2 * part) == 0:
+        if error < EASY and part < TICKS and done % (2 * part) == 0:
             part *= 2
-        if done == TICKS:
-            break
+    state.pace[0] = part
     for i in range(drive.shape[0]):
         state.drives[0, i], state.drives[1, i] = drive[i], drive_rate[i]
     return OK, total, size
@@ -111,37 +127,6 @@ def lead(state, work, drive, drive_rate, span, share):
 
 
 @inner
-def converge(t, state, work, scheme, tolerance, passes, longest, product):
-    """Newton passes to the instant that `scheme` solves for, with the drive in `work`; the histories are not written.
-
-    Returns status, passes, last increment (rad).
-    """
-    start_step(scheme, state.history, work.hat, work.offset)
-    predict(t, state, scheme.reach)
-    motion, operations, size = Motion(scheme.gain, scheme.rate, work.hat, work.offset), t.operations.shape[0], 0.0
-    place(t, state, work)
-    for k in range(passes):
-        load_pins(t, state, work, motion)
-        if product is None:
-            clear_cut(work, FREE)
-            status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
-            if status == OK:
-                sweep_out(t, state, work, ROOT, operations, FREE)
-        else:
-            status = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
-        if status != OK:
-            return reason(work, status), k + 1, size
-        shorten(t, state, work)
-        size = add_increments(t, state, work, longest)
-        if not math.isfinite(size):
-            return NOT_FINITE, k + 1, size
-        place(t, state, work)
-        if size < tolerance or passes == 1:
-            return OK, k + 1, size
-    return NOT_CONVERGED, passes, size
-
-
-@inner
 def predict(t, state, reach):
     """First guess of the unknowns `reach` s ahead: x + h v + h^2 a/2 for coordinates, forces as they were."""
     x, v, a = state.history[X], state.history[V], state.history[A]
@@ -151,12 +136,16 @@ def predict(t, state, reach):
 
 
 @inner
-def reason(work, status):
-    """NOT_FINITE in place of `status` if the force at the cut where a sweep stopped is not finite."""
-    for i in range(3):
-        if not math.isfinite(work.p[i]):
-            return NOT_FINITE
-    return status
+def verdict(work, solved, size, tolerance, passes):
+    """Status after a pass that ended with `solved` and an increment of `size` (rad): go on with NOT_CONVERGED."""
+    if solved != OK:
+        for i in range(3):
+            if not math.isfinite(work.p[i]):
+                return NOT_FINITE
+        return solved
+    if not math.isfinite(size):
+        return NOT_FINITE
+    return OK if size < tolerance or passes == 1 else NOT_CONVERGED
 
 
 @inner

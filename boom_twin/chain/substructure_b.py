@@ -193,7 +193,7 @@ def _free_pins(t, state, work, joint, g, h):
     for k in range(joint.clearances):
         row = joint.first_clearance + k
         place, hold, at = t.clearances[row].place, work.hold[row], SIZE + 2 * k
-        sign = 1.0 if place == LINK_L_PIN or place == Q_PIN else -1.0
+        sign = 1.0 if place in (LINK_L_PIN, Q_PIN) else -1.0
         g[at] += sign * lx
         g[at + 1] += sign * ly
         dx, dy = state.z[t.clearances[row].z], state.z[t.clearances[row].z + 1]

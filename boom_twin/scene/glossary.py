@@ -5,7 +5,18 @@ from __future__ import annotations
 from pydantic import BaseModel
 
 from .parts import (
-    Base, Clearance, ContactLaw, Cylinder, CylinderPart, Joint, Material, Pin, RigidPart, Scene, Section, Tip
+    Base,
+    Clearance,
+    ContactLaw,
+    Cylinder,
+    CylinderPart,
+    Joint,
+    Material,
+    Pin,
+    RigidPart,
+    Scene,
+    Section,
+    Tip,
 )  # fmt: skip
 
 MEANING: dict[type[BaseModel], dict[str, str]] = {

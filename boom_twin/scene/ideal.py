@@ -11,4 +11,4 @@ def refuse_clearance(scene: Scene, model: str) -> None:
     pins = () if scene.clearance is None else scene.clearance.pins
     if pins:
         names = ", ".join(pin.at for pin in pins)
-        raise UsageError(f"clearance.pins = {names}: {model} knows ideal pins only. Take a scene without the block `clearance`.")
+        raise UsageError(f"clearance.pins = {names}: {model} knows ideal pins only. Leave out the block `clearance`.")
