@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BufferedWriter
 from pathlib import Path
@@ -58,6 +58,7 @@ class BagWriter:
         self._channels: list[int] = []
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
+        self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
         self._files: list[bagmeta.FileInformation] = []
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
@@ -155,9 +156,9 @@ class BagWriter:
             self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
 
     def _finish(self) -> None:
-        """Complete the open file, down to the disk."""
+        """Complete the open file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-        os.fsync(self.flush())
+        self.sync(self.flush())
         self._completed += self.size
         self._raw.close()
         first, last, count = self._span or (0, 0, 0)

@@ -16,7 +16,7 @@ from .bagwriter import BagWriter
 from .recorded import Recorded
 from .syncer import Syncer
 
-FLUSH = 0.5
+FLUSH = 0.25
 """Seconds after which what was recorded is out of this process, and asked onto the disk: a kill costs at most this."""
 STALL = 5.0
 """Seconds without an answer from the disk after which that is told."""
@@ -62,6 +62,7 @@ class Storage:
         self._put = self._taken = 0  # bytes; each is changed by one thread only
         self._began = self._alive = time.monotonic()
         self._syncer = Syncer()
+        bag.sync = lambda file: self._syncer.put(file, self._taken)
         self._free = self._written = 0
         self._is_late = False
         self._error: BaseException | None = None
@@ -138,6 +139,8 @@ class Storage:
         try:
             self._serve()
             self._bag.close()
+            self._syncer.drain()
+            self._check_disk()
         except Exception as error:  # told where it can be told: by `check` and `close`
             self._error = error
             self._bag.abandon()
@@ -164,9 +167,12 @@ class Storage:
     def _flush(self) -> None:
         """Ask onto the disk what was taken; its room is asked for here, because a stalled disk holds up that too."""
         self._syncer.ask(self._bag.flush(), self._taken)
+        self._check_disk()
+        self._written, self._free = self._bag.written, disk_usage(self._bag.directory).free
+
+    def _check_disk(self) -> None:
         if self._syncer.error is not None:
             raise self._bag.fault(self._syncer.error)
-        self._written, self._free = self._bag.written, disk_usage(self._bag.directory).free
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message
