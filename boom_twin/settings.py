@@ -6,11 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
-from .errors import UsageError
+from .parameter_file import checked, read_parameters
+from .thresholds import Thresholds
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
@@ -52,27 +51,14 @@ class Settings(BaseModel):
 
 def settings_from(values: dict[str, Any], source: str) -> Settings:
     """Settings from names and values; UsageError names every value that is out of bounds."""
-    try:
-        return Settings(**values)
-    except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
-        known = ", ".join(Settings.model_fields)
-        raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+    return checked(Settings, values, source)
 
 
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``autostart``) are passed over.
+    Parameters of the node alone (``scene``, ``autostart``) and of ``/diagnostics`` are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    try:
-        content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
-        values = dict(next(iter(content.values()))["ros__parameters"])
-    except OSError as error:
-        raise UsageError(f"{source}: {error.strerror}. Give a parameter file.") from None
-    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
-        raise UsageError(f"{source}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
-    for name in ("scene", "autostart"):
-        values.pop(name, None)
-    return settings_from(values, str(source))
+    others = {"scene", "autostart", *Thresholds.model_fields}
+    return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))

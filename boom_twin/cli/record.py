@@ -6,6 +6,8 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,7 @@ from .play import positive
 if TYPE_CHECKING:
     from ..ros.recorder import Count
     from ..ros.wanted import Wanted
+    from ..thresholds import Thresholds
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -55,19 +58,38 @@ def run(args: Namespace) -> int:
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    wanted, scene, parameters = _wanted(args), _scene_text(args.scene), _parameters_text(args.params)
+    wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
-    Sheet(__version__, scene, parameters, types, args.note, args.origin).write(args.out)
+    sheet = Sheet(__version__, scene, parameters, types, args.note, args.origin)
+    sheet.write(args.out)
+
+    def meet(twin: Mapping[str, object]) -> None:
+        nonlocal sheet
+        sheet = replace(sheet, twin=twin)
+        sheet.write(args.out)
+        _compare(str(twin.get("scene", "")), scene)
+
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, lambda: bool(signals) or time.monotonic() >= end, _say)
+        counts = record(storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
     _tell(counts)
+    sheet.write(args.out, [asdict(count) for count in counts])
     if not any(count.received for count in counts):
         raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
     return 0
+
+
+def _compare(path: str, scene: str) -> None:
+    """Say if the twin's scene is not the one in session.yaml."""
+    try:
+        is_same = _scene_text(path or None) == scene
+    except BoomTwinError:
+        is_same = False
+    if not is_same:
+        _say(f"warning: the twin's scene is {path or 'the default one'}, session.yaml holds another. Give it with --scene.")
 
 
 def _say(text: str) -> None:
@@ -103,12 +125,14 @@ def _scene_text(source: str | None) -> str:
     return default_text() if source is None else Path(source).read_text(encoding="utf-8")
 
 
-def _parameters_text(path: Path | None) -> str:
-    """Text of the parameter file, which must be valid."""
+def _parameters(path: Path | None) -> tuple[Thresholds, str]:
+    """The recorder's part of the parameter file, which must be valid, and all its text."""
     from ..settings import DEFAULT_FILE, load_settings
+    from ..thresholds import load_thresholds
 
     load_settings(path)
-    return (path or DEFAULT_FILE).read_text(encoding="utf-8")
+    file = path or DEFAULT_FILE
+    return load_thresholds(file), file.read_text(encoding="utf-8")
 
 
 def size(text: str) -> int:

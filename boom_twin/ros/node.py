@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -18,7 +19,7 @@ from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, refuse_while, scene_path, settings_of
+from .parameters import declare, on_thresholds, refuse_while, scene_path, settings_of
 from .qos import qos_profile
 from .types import RclpyTypes, message_class
 
@@ -47,6 +48,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         declare(self)
         refuse_while(self, frozen=lambda: self._twin is not None)
         self._diagnostics = Diagnostics(self, self._topics)
+        on_thresholds(self, self._diagnostics.tune)
 
     @property
     def autostart(self) -> bool:
@@ -158,7 +160,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         sample = self._intake.put(stream, stamp, msg)
         if sample is None:
             return
+        began = perf_counter()
         report = self._twin.update(sample)
-        self._diagnostics.reported(report)
+        self._diagnostics.took(sample, report, perf_counter() - began)
         for key, filled in self._outlet.fill(report):
             self._outputs[key].publish(filled)

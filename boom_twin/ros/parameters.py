@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter
 
 from ..errors import UsageError
 from ..settings import Settings, settings_from
+from ..thresholds import Thresholds, thresholds_from
 from .context import one_line
 
 SOURCE = "parameters of the node"
@@ -22,7 +23,7 @@ _LARGEST = sys.float_info.max
 
 
 def declare(node: Node) -> None:
-    """Declare ``scene``, ``autostart`` and all settings.
+    """Declare ``scene``, ``autostart``, all settings and thresholds.
 
     Raises
     ------
@@ -32,7 +33,7 @@ def declare(node: Node) -> None:
     try:
         node.declare_parameter("scene", "", _text("path of the scene file; empty = the scene of the package"))
         node.declare_parameter("autostart", True, _switch("the node configures and activates itself"))
-        for name, field in Settings.model_fields.items():
+        for name, field in {**Settings.model_fields, **Thresholds.model_fields}.items():
             node.declare_parameter(name, float(field.default), _number(name, field))
     except InvalidParameterTypeException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
@@ -50,13 +51,30 @@ def refuse_while(node: Node, frozen: Callable[[], bool]) -> None:
             reason = f"{', '.join(changed)}: fixed while the node is configured. Deactivate and clean it up first."
             return SetParametersResult(successful=False, reason=reason)
         changed.pop("scene", None)
+        live = {parameter.name: parameter.value for parameter in parameters if parameter.name in Thresholds.model_fields}
         try:
             settings_from(changed, SOURCE)
+            thresholds_from(live, SOURCE)
         except UsageError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(check)
+
+
+def on_thresholds(node: Node, tune: Callable[[Thresholds], None]) -> None:
+    """Call `tune` with the thresholds as they stand, now and after every change of one."""
+
+    def apply(parameters: list[Parameter[Any]]) -> None:
+        if any(parameter.name in Thresholds.model_fields for parameter in parameters):
+            tune(_thresholds_of(node))
+
+    tune(_thresholds_of(node))
+    node.add_post_set_parameters_callback(apply)
+
+
+def _thresholds_of(node: Node) -> Thresholds:
+    return thresholds_from({name: node.get_parameter(name).value for name in Thresholds.model_fields}, SOURCE)
 
 
 def scene_path(node: Node) -> Path | None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin.io.intake import stamp_of
 from boom_twin.io.session import write_session
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -33,6 +34,10 @@ class Process:
         self._child = subprocess.Popen(
             command, stdin=stdin, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True
         )
+
+    @property
+    def pid(self) -> int:
+        return self._child.pid
 
     def said(self) -> str:
         return self._log.read_text()
@@ -122,3 +127,56 @@ def bag(motion: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Pat
     path = tmp_path_factory.mktemp("session") / "bag"
     write_session(path, **motion, description={"origin": "synthetic, made for a test"})
     return path
+
+
+class Bench:
+    """Sends to a node and listens to it."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PointStamped
+        from sensor_msgs.msg import Imu, JointState
+
+        self.node = rclpy.create_node("bench")
+        self.strokes = self.node.create_publisher(JointState, "cylinder_strokes", 100)
+        self.imu = self.node.create_publisher(Imu, "tip_imu", 100)
+        self.answers: list[int] = []
+        self.diagnostics: list[Any] = []
+        self.node.create_subscription(
+            PointStamped, "/boom_twin/tip/position", lambda msg: self.answers.append(stamp_of(msg)), 100
+        )
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 10)
+
+    def until(self, condition: Callable[[], bool], patience: float = 60.0) -> None:
+        """Listen until it holds."""
+        import rclpy
+
+        end = time.monotonic() + patience
+        while not condition():
+            assert time.monotonic() < end, self.statuses()
+            rclpy.spin_once(self.node, timeout_sec=0.05)
+
+    def statuses(self) -> dict[str, Any]:
+        """The newest diagnostics by name."""
+        return {status.name: status for status in self.diagnostics[-1].status} if self.diagnostics else {}
+
+    def values(self, name: str) -> dict[str, str]:
+        status = self.statuses().get(name)
+        return {} if status is None else {pair.key: pair.value for pair in status.values}
+
+
+@pytest.fixture
+def bench(domain: None) -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.node.destroy_node()
+
+
+@pytest.fixture
+def node(spawn_node: Callable[..., Any]) -> Iterator[Any]:
+    """An active node, gone after the test."""
+    made = spawn_node()
+    made.wait_for("active;")
+    yield made
+    made.close()
