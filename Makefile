@@ -17,7 +17,7 @@ help:
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
-	@echo "make soak        a hold of 24 simulated hours"
+	@echo "make soak        10 minutes of the live node, a hold of 24 simulated hours"
 	@echo "make session     make the bundled session anew on the virtual rig"
 	@echo "make figures     make the pictures of the documentation anew"
 
@@ -54,6 +54,7 @@ study: warm
 	mkdir -p docs/study && cp out/study/*.md out/study/*.png docs/study/
 
 soak: warm
+	$(BIN)/python test/bench/soak.py
 	$(BIN)/boom_twin study stability --soak --out out/soak
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.

@@ -6,22 +6,19 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from .errors import UsageError
+from .plain import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
     """Names and values of a ROS parameter file (``/**: ros__parameters:``); UsageError if it is none."""
+    content = read_plain(path, UsageError, "Give a ROS parameter file.")
     try:
-        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
         return dict(next(iter(content.values()))["ros__parameters"])
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}. Give a parameter file.") from None
-    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
+    except (AttributeError, KeyError, TypeError, StopIteration, ValueError):
         raise UsageError(f"{path}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..io.topics import Topic, load_topics
+from ..io.mapping import load_mapping
+from ..io.topics import DEFAULT_FILE, Topic
 from ..ros.require import require_rclpy
 from .common import open_scene
 from .play import positive
@@ -43,6 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--split-duration", type=positive, metavar="S", help="begin a new file after so many seconds")
     parser.add_argument("--scene", metavar="SCENE", help="scene of the rig, copied into session.yaml (the default one)")
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
     parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
 
@@ -53,16 +55,18 @@ def run(args: Namespace) -> int:
     from ..io.bagwriter import BagWriter
     from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
-    from ..ros.context import on_stop_signal, ros
+    from ..ros.context import ros
     from ..ros.recorder import record
+    from ..ros.stop import on_stop_signal
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
     wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
+    mapping = (args.mapping or DEFAULT_FILE).read_text(encoding="utf-8")
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
-    sheet = Sheet(__version__, scene, parameters, types, args.note, args.origin)
+    sheet = Sheet(__version__, scene, parameters, mapping, types, args.note, args.origin)
     sheet.write(args.out)
 
     def meet(twin: Mapping[str, object]) -> None:
@@ -108,7 +112,7 @@ def _wanted(args: Namespace) -> list[Wanted]:
     """The topics of the command line, or the chosen ones of ``topics.yaml``."""
     from ..ros.wanted import Wanted, wanted_of
 
-    known = load_topics()
+    known = load_mapping(args.mapping)
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
     outputs = {topic.absolute: topic for topic in known.outputs.values()}
     if args.topics:

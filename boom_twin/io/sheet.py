@@ -25,8 +25,8 @@ class Sheet:
     ----------
     version : str
         Of this package.
-    scene, parameters : str
-        Text of the scene file and of the ROS parameter file.
+    scene, parameters, mapping : str
+        Text of the scene file, of the ROS parameter file, and of the file that names topics and sensors.
     topics : dict of str to str or None
         Type by topic that is to be recorded; None where it was not known at the start.
     note, origin : str or None
@@ -39,6 +39,7 @@ class Sheet:
     version: str
     scene: str
     parameters: str
+    mapping: str
     topics: Mapping[str, str | None]
     note: str | None = None
     origin: str | None = None
@@ -71,6 +72,7 @@ class Sheet:
             "scene_sha256": hashlib.sha256(self.scene.encode()).hexdigest(),
             "scene": LiteralScalarString(self.scene),
             "parameters": LiteralScalarString(self.parameters),
+            "mapping": LiteralScalarString(self.mapping),
         }
         draft = directory / f".{FILE_NAME}.draft"
         try:

@@ -11,7 +11,7 @@ from ..io.intake import Intake
 from ..io.topics import Output, Topics
 from ..records import Report, Sample, Stream
 from ..thresholds import Thresholds
-from ..twin import EVENTS, Twin
+from ..twin import EVENTS, TOLD_AT_ONCE, Twin
 from ..watch.sensors import sensors_of
 from ..watch.twin import TwinWatch
 from .board import Board
@@ -96,7 +96,7 @@ class Diagnostics:
 
     def _tell_oddities(self) -> None:
         """Log the first sample of every kind that is out of the ordinary; all of them are counted."""
-        for name in sorted({name for found in self._counts.values() for name in found}):
+        for name in sorted({name for found in self._counts.values() for name in found} - TOLD_AT_ONCE):
             self._tell(name, f"{name}: {EVENTS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
 
     def _tell_clock(self, clock: float) -> None:

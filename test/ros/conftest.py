@@ -101,6 +101,56 @@ def spawn_node(spawn: Callable[..., Process]) -> Callable[..., Process]:
     return start
 
 
+class Remote:
+    """A node's services, called from here."""
+
+    def __init__(self, name: str = "/boom_twin") -> None:
+        import rclpy
+
+        self.node, self.name = rclpy.create_node("remote"), name
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        import rclpy
+
+        client = self.node.create_client(kind, f"{self.name}/{name}")
+        assert client.wait_for_service(30.0)
+        future = client.call_async(request)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=240.0)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def trigger(self, name: str) -> Any:
+        from std_srvs.srv import Trigger
+
+        return self.call(Trigger, name, Trigger.Request())
+
+    def change(self, transition: int) -> bool:
+        from lifecycle_msgs.msg import Transition
+        from lifecycle_msgs.srv import ChangeState
+
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return bool(self.call(ChangeState, "change_state", request).success)
+
+    def state(self) -> str:
+        from lifecycle_msgs.srv import GetState
+
+        return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def set(self, name: str, value: Any) -> Any:
+        from rcl_interfaces.srv import SetParameters
+        from rclpy.parameter import Parameter
+
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        return self.call(SetParameters, "set_parameters", request).results[0]
+
+
+@pytest.fixture(scope="module")
+def remote(domain: None) -> Iterator[Remote]:
+    caller = Remote()
+    yield caller
+    caller.node.destroy_node()
+
+
 @pytest.fixture(scope="session")
 def motion() -> dict[str, Any]:
     """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""

@@ -38,6 +38,7 @@ def test_garbage_is_counted_and_survived(node: Any, bench: Any, motion: dict[str
         _strokes((-5, 0), NAMES, start),
         Imu(linear_acceleration_covariance=[-1.0, *[0.0] * 8]),
     ]
+    garbage[-1].header.stamp.sec = 10
     for msg in garbage:
         (bench.imu if isinstance(msg, Imu) else bench.strokes).publish(msg)
     bench.strokes.publish(b"\x00\x01\x00\x00" + b"\xff" * 40)

@@ -112,6 +112,7 @@ def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], tmp_path:
     here = Path(__file__).parents[2] / "msg_config"
     assert sheet["scene"] == (here / "scene.yaml").read_text()
     assert sheet["parameters"] == (here / "twin.yaml").read_text()
+    assert sheet["mapping"] == (here / "topics.yaml").read_text()
     found = {count["topic"]: (count["received"], count["written"], count["missed"]) for count in sheet["counts"]}
     assert found == {name: (count, count, 0) for name, count in counts.items()} | {"/never": (0, 0, None)}
     assert sheet["started"] < sheet["ended"]

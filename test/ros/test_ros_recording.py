@@ -163,7 +163,8 @@ def _published(path: Path, key: Output) -> list[tuple[int, bytes]]:
 @pytest.mark.parametrize("key", [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)])
 def test_a_replay_gives_what_the_node_published(recorded: Path, again: Path, key: Output) -> None:
     live = _published(recorded, key)
-    assert live and live == _published(again, key)
+    assert len(live) > (0 if key is Output.CHANGES else 30)
+    assert live == _published(again, key)
 
 
 def test_a_replay_gives_the_residuals_that_the_node_published(recorded: Path, again: Path) -> None:
