@@ -171,8 +171,9 @@ def note_contacts(t, state, work):
 def coarseness(t, state, work, scheme):
     """Largest error of a sub-step in the offset of a pin that touches, over what is allowed.
 
-    |1/A - h^2/6| |a' - a| (Zienkiewicz and Xie 1991, with 1/A = beta h^2 for Newmark's family), against `ALLOWED` of the
-    clearance. A journal without inertia has no motion of its own to resolve.
+    (1/A - h^2/6) (a' - a) (Zienkiewicz and Xie 1991, with 1/A = beta h^2 for Newmark's family), against `ALLOWED` of the
+    clearance. Stiff contact leaves of it what the journal's inertia M A is to the whole tangent, (M A + K)^-1 M A (Hairer and
+    Wanner, Solving Ordinary Differential Equations II, 1996, eq. IV.8.19). A journal without inertia has no motion of its own.
     """
     worst, before = 0.0, state.history[A]
     if scheme.gain == 0.0:
@@ -187,5 +188,21 @@ def coarseness(t, state, work, scheme):
         if touching or memory[CLOSED] > 0.0:
             ax = scheme.gain * (state.z[i] - work.hat[i]) - before[i]
             ay = scheme.gain * (state.z[j] - work.hat[j]) - before[j]
+            ax, ay = unstiffened(t, work, k, ax, ay)
             worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * max(row.gap, LEAST_GAP)))
     return worst
+
+
+@inner
+def unstiffened(t, work, k, ax, ay):
+    """(M A + K)^-1 M A times (ax, ay), with the tangents of the last pass for pin `k`."""
+    row, hold = t.clearances[k], work.hold[k]
+    if row.place >= ROD:
+        xx, xy, yy = work.ends[k, 0, 0], work.ends[k, 0, 1], work.ends[k, 1, 1]
+    else:
+        block, at = work.blocks[row.owner], row.z - t.joints[row.owner].z
+        xx, xy, yy = block[at, at], block[at + 1, at], block[at + 1, at + 1]
+    fx = (xx - hold[2]) * ax + (xy - hold[3]) * ay
+    fy = (xy - hold[3]) * ax + (yy - hold[4]) * ay
+    share = 1.0 / (xx * yy - xy * xy)
+    return share * (yy * fx - xy * fy), share * (xx * fy - xy * fx)

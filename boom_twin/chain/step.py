@@ -16,8 +16,8 @@ from .program import JOINT_A, JOINT_B, Motion
 from .status import NOT_CONVERGED, NOT_FINITE, OK
 from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-TICKS = np.int64(1024)  # of a step, the grid of its sub-steps
-SHORTEST = 1e-5  # s, of a sub-step; steps below twice that are not divided
+TICKS = np.int64(32)  # of a step: its shortest sub-step, so that it cannot take longer than 32
+SHORTEST = 1e-5  # s, of a sub-step likewise
 EASY = 0.1  # of the error allowed: the next sub-step is twice as long
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
 

@@ -3,12 +3,13 @@
 The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^2 + s^2), n = delta/r, s = `SMOOTH`,
 
     gap g = r - c,    penetration d = [g + sqrt(g^2 + s^2)]/2,    g' = n.delta',
-    F = K d^e [1 + chi g'/v]   but not below zero,        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
+    F = K d^e [1 + chi g'/v],        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
 
 c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
 radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
 K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.notation`); the laws differ
-in chi, a function of the coefficient of restitution each. With g' in the bracket the rebound does not depend on how d is
+in chi, a function of the coefficient of restitution each. The bracket is kept above `LEAST_SHARE`: nothing pulls, and a journal
+without mass, which leaves as fast as it likes, is still held somewhere. With g' in the bracket the rebound does not depend on how d is
 smoothed. The elastic part is convex in delta: at rest a pin has one place.
 
 Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2),
@@ -31,6 +32,7 @@ SMOOTH = 1e-6  # m, over which contact sets in
 NEAR = 4.0 * SMOOTH  # m, width of the gap at which journal and bush count as touching
 LEAST_GAP = 3e-5  # m, least difference of radii in K
 SLOWEST = 1e-3  # m/s, least speed of approach
+LEAST_SHARE = 0.01  # of the elastic force, however fast the journal leaves
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
 # Places of pins; typed, because numba compiles once more for every literal.
@@ -128,10 +130,10 @@ def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis
     elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
     lead = row.loss / speed
     share = 1.0 + lead * (nx * vx + ny * vy)
-    force, radial = 0.0, 0.0
-    if share > 0.0:
-        force = elastic * share
-        radial = row.exponent * elastic / d * slope * share + elastic * lead * rate
+    if share < LEAST_SHARE:
+        share, lead = LEAST_SHARE, 0.0
+    force = elastic * share
+    radial = row.exponent * elastic / d * slope * share + elastic * lead * rate
     across = force / r
     drag, drag_rate = 0.0, 0.0
     if row.friction > 0.0:
