@@ -157,6 +157,8 @@ class Report:
         ``ok``, or one sentence on a failure of the model.
     change : Change or None
         Set where the model began from rest, or something that was asked for took effect.
+    passes : int
+        Newton passes that the prediction took, with those of what was stepped for good.
     """
 
     stamp: int
@@ -166,3 +168,4 @@ class Report:
     events: tuple[str, ...] = ()
     status: str = "ok"
     change: Change | None = None
+    passes: int = 0

@@ -29,7 +29,7 @@ class Rig:
         self.now, self.random = 100.0, np.random.default_rng(5)
         for name in ("twin", "stream"):
             monkeypatch.setattr(f"boom_twin.watch.{name}.time.monotonic", lambda: self.now)
-        sensors = sensors_of(load_scene(), Settings(), REQUIRED)
+        sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
         self.watch = TwinWatch(sensors, NAMES, Thresholds())
         self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
         self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
