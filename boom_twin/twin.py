@@ -137,7 +137,8 @@ class Twin:
         """
         kind, _, number = sensor.rpartition("_")
         if kind == "cylinder" and self.mounts[int(number) - 1] is not None:
-            raise UsageError(f"{sensor}: joint_{number} has an inclinometer, which feels every joint inboard. Zero the stroke by hand.")
+            told = f"{sensor}: joint_{number} has an inclinometer, which feels every joint inboard"
+            raise UsageError(f"{told}. Set the zero of {sensor} in the mapping.")
         if self._run is None:
             raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
         found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._slope)

@@ -70,8 +70,8 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     n = plan.joints
     return Track(
         nodes=np.zeros(1, np.int64), passes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES),
-        x=np.zeros((NODES, n, 3)), c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n), drive=np.zeros(n), rate=np.zeros(n),
-        closed=plan.closed_lengths, lengths=lengths,
+        x=np.zeros((NODES, n, 3)), c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n),
+        drive=np.zeros(n), rate=np.zeros(n), closed=plan.closed_lengths, lengths=lengths,
     )  # fmt: skip
 
 
