@@ -62,7 +62,7 @@ class Prediction:
     joints, strokes, cylinder_forces : ndarray, shape (n,)
         rad; m (as estimated); N (positive in tension).
     shape : ndarray, shape (k, 2), or None
-        Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 50 ms.
+        Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 100 ms.
     undeflected : ndarray, shape (k, 2), or None
         The same points of rigid sections on incompressible cylinders at the same strokes, m; when `shape` is there.
     pins : ndarray, shape (n, 4), or None
@@ -157,6 +157,8 @@ class Report:
         ``ok``, or one sentence on a failure of the model.
     change : Change or None
         Set where the model began from rest, or something that was asked for took effect.
+    passes : int
+        Newton passes that the prediction took, with those of what was stepped for good.
     """
 
     stamp: int
@@ -166,3 +168,4 @@ class Report:
     events: tuple[str, ...] = ()
     status: str = "ok"
     change: Change | None = None
+    passes: int = 0

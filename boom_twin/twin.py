@@ -82,6 +82,8 @@ class Twin:
 
     Attributes
     ----------
+    mounts : tuple of Mount or None
+        As given, one for every joint.
     counts : Counter
         How often each of `EVENTS` happened.
     requests : Requests
@@ -101,7 +103,7 @@ class Twin:
         self._tuning = Tuning(
             tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
         )
-        self._mounts = mounts
+        self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
         self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
         self._channels = channels_of(self.plan.joints)
@@ -133,6 +135,10 @@ class Twin:
         UsageError
             Too few residuals within the last second.
         """
+        kind, _, number = sensor.rpartition("_")
+        if kind == "cylinder" and self.mounts[int(number) - 1] is not None:
+            told = f"{sensor}: joint_{number} has an inclinometer, which feels every joint inboard"
+            raise UsageError(f"{told}. Set the zero of {sensor} in the mapping.")
         if self._run is None:
             raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
         found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._slope)
@@ -150,7 +156,7 @@ class Twin:
         self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
         self._undeflected = Undeflected(self.scene, self.plan)
         self._track = new_track(self.plan, lengths)
-        self._mounting = Mounting(self.plan, self.scene.base.inclination, self._mounts)
+        self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -255,7 +261,8 @@ class Twin:
         prediction = self._prediction(run, sample.stamp)
         self._remember(run, prediction)
         self.counts.update(events)
-        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events))
+        passes = int(self._track.passes[0])
+        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=passes)
 
     def _prediction(self, run: _Run, stamp: int) -> Prediction:
         n, row = self.plan.joints, self._row.copy()

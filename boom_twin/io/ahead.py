@@ -79,7 +79,7 @@ def main() -> int:
     batch: list[Packed] = []
     try:
         session = scan(path)
-        changes = recorded_changes(session)
+        changes = recorded_changes(session, topics)
         for name, log, message in read(session, {name: topics.inputs[heard[name][0]].type for name in wanted}):
             stamp = stamp_of(message)
             if Stream.STROKES in heard[name]:

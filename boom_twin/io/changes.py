@@ -13,12 +13,15 @@ from .factory import RosbagsTypes
 from .intake import stamp_of
 from .places import fill_header
 from .reader import Session, read
-from .topics import TYPES, Output, load_topics
+from .topics import TYPES, Output, Topics
 from .typestore import jazzy
 
 FROM_REST = "from_rest"
 NEAR = 2_000_000_000
-"""Nanoseconds of log time within which a change and its stroke sample are looked for: a looped session repeats stamps."""
+"""Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
+
+A looped session repeats stamps; a stray stamp is far from its stream.
+"""
 
 
 def encode(change: Change) -> bytes:
@@ -74,18 +77,18 @@ class Changes:
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
         if abs(log - logged) > NEAR:
             return log > logged
-        return stamp == change.stamp or self._before < change.stamp < stamp
+        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + NEAR
 
 
-def recorded_changes(session: Session) -> Changes:
-    """What was changed while the session was recorded.
+def recorded_changes(session: Session, topics: Topics) -> Changes:
+    """What was changed while the session was recorded, its topics named by `topics`.
 
     Raises
     ------
     BagError
         The session cannot be read, or holds what is no change.
     """
-    topic = load_topics().outputs[Output.CHANGES]
+    topic = topics.outputs[Output.CHANGES]
     info = session.find(topic.absolute)
     if info is None or info.count == 0:
         return Changes([])

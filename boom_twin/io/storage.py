@@ -14,9 +14,10 @@ from ..errors import BagError
 from ..watch.recording import DiskState
 from .bagwriter import BagWriter
 from .recorded import Recorded
+from .syncer import Syncer
 
-FLUSH = 0.5
-"""Seconds after which what was recorded is on the disk: a kill costs at most this and one write."""
+FLUSH = 0.25
+"""Seconds after which what was recorded is out of this process, and asked onto the disk: a kill costs at most this."""
 STALL = 5.0
 """Seconds without an answer from the disk after which that is told."""
 PATIENCE = 30.0
@@ -44,7 +45,7 @@ class Split:
 
 
 class Storage:
-    """Takes messages at any pace; they are on the disk `FLUSH` later.
+    """Takes messages at any pace; `FLUSH` later they survive this process, and the loss of power as soon as the disk has them.
 
     Parameters
     ----------
@@ -58,8 +59,10 @@ class Storage:
     def __init__(self, bag: BagWriter, split: Split, tell: Callable[[str], None]) -> None:
         self._bag, self._split, self._tell = bag, split, tell
         self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
-        self._put = self._taken = self._safe = 0  # bytes; each is changed by one thread only
-        self._began = self._alive = self._flushed = time.monotonic()
+        self._put = self._taken = 0  # bytes; each is changed by one thread only
+        self._began = self._alive = time.monotonic()
+        self._syncer = Syncer()
+        bag.sync = lambda file: self._syncer.put(file, self._taken)
         self._free = self._written = 0
         self._is_late = False
         self._error: BaseException | None = None
@@ -88,7 +91,7 @@ class Storage:
         """
         if self._error is not None:
             raise self._error
-        silent = time.monotonic() - self._alive
+        silent = max(time.monotonic() - self._alive, self._syncer.waits)
         if silent > STALL and not self._is_late:
             self._tell(f"{self._bag.directory}: the disk has not answered for {silent:.0f} s; messages wait in memory")
         elif silent < STALL and self._is_late:
@@ -102,7 +105,7 @@ class Storage:
         now = time.monotonic()
         pace = self._written / (now - self._began)
         return DiskState(
-            lag=now - self._flushed if self._put > self._safe else 0.0,
+            lag=now - self._syncer.time if self._put > self._syncer.done else 0.0,
             waiting=self._put - self._taken,
             written=self._written,
             free=self._free,
@@ -136,7 +139,8 @@ class Storage:
         try:
             self._serve()
             self._bag.close()
-            self._note(time.monotonic())
+            self._syncer.drain()
+            self._check_disk()
         except Exception as error:  # told where it can be told: by `check` and `close`
             self._error = error
             self._bag.abandon()
@@ -147,8 +151,7 @@ class Storage:
         while True:
             self._alive = time.monotonic()
             if self._alive >= due:
-                self._bag.flush()
-                self._note(self._alive)
+                self._flush()
                 due = time.monotonic() + FLUSH
             try:
                 item = self._queue.get(timeout=max(due - time.monotonic(), 0.0))
@@ -161,10 +164,15 @@ class Storage:
             else:
                 self._write(item)
 
-    def _note(self, now: float) -> None:
-        """All that was taken until `now` is on the disk; its room is asked here, because a stalled disk holds up that too."""
-        self._safe, self._flushed, self._written = self._taken, now, self._bag.written
-        self._free = disk_usage(self._bag.directory).free
+    def _flush(self) -> None:
+        """Ask onto the disk what was taken; its room is asked for here, because a stalled disk holds up that too."""
+        self._syncer.ask(self._bag.flush(), self._taken)
+        self._check_disk()
+        self._written, self._free = self._bag.written, disk_usage(self._bag.directory).free
+
+    def _check_disk(self) -> None:
+        if self._syncer.error is not None:
+            raise self._bag.fault(self._syncer.error)
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message

@@ -128,9 +128,11 @@ class _Twin:
 
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings) -> None:
         self._feed, self._time = feed, 0.0
-        self._twin, self._outlet = Twin(scene, settings, topics.mounts(len(scene.joints))), Outlet(scene, settings)
+        mounts = topics.mounts(len(scene.joints))
+        self._twin, self._outlet = Twin(scene, settings, mounts), Outlet(scene, settings)
         self._takers = {key: feed.catch.takers[topic.absolute] for key, topic in topics.outputs.items() if key in SHOWN}
-        sensors = sensors_of(scene, settings, {stream: topic.required for stream, topic in topics.inputs.items()})
+        required = {stream: topic.required for stream, topic in topics.inputs.items()}
+        sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}

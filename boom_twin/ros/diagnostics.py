@@ -46,7 +46,7 @@ class Diagnostics:
 
     def watch(self, twin: Twin, intake: Intake, scene: str) -> None:
         """The node is configured with these."""
-        sensors = sensors_of(twin.scene, twin.settings, self._required)
+        sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
         self._counts = {"samples": twin.counts, "messages": intake.oddities}
         self._scene = scene

@@ -33,13 +33,14 @@ class ModelWatch:
         self.predictions = self.failures = self.broken = 0
         self._failure, self._failed_at, self._new = "", -HOLD, False
         self._looked, self._steps = now, 0
-        self._busy = self._longest = 0.0
+        self._passes, self._busy, self._longest = 0, 0.0, 0.0
 
     def took(self, report: Report, duration: float) -> None:
         """The twin made `report` of a sample in so many seconds."""
         self._busy += duration
         if report.prediction is not None:
             self._steps += 1
+            self._passes += report.passes
             if duration > self._longest:
                 self._longest = duration
         elif report.status != "ok":
@@ -98,8 +99,9 @@ class ModelWatch:
         self.predictions += steps
         load = self._busy / span if span > 0.0 else nan
         judge.note("step_mean_s", self._busy / steps if steps else nan)
+        judge.note("passes_mean", self._passes / steps if steps else nan)
         judge.note("step_longest_s", self._longest if steps else nan)
         judge.note("step_budget_s", span / steps if steps else nan)
         told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
-        self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
+        self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0

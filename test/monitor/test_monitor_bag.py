@@ -59,7 +59,8 @@ def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replaye
 def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -> None:
     published = bag_feed(replayed / "bag", load_scene(), Settings())
     for name in ("displacement", "position", "acceleration", "shape", "joints"):
-        for ours, theirs in zip(feed.store.tables[name].rows(0, 10**6), published.store.tables[name].rows(0, 10**6), strict=True):
+        rows = [each.store.tables[name].rows(0, 10**6) for each in (feed, published)]
+        for ours, theirs in zip(*rows, strict=True):
             assert ours == pytest.approx(theirs), name
     assert published.strokes(20.0) == pytest.approx(feed.strokes(20.0)) and len(published.strokes(20.0)) == 4
     level, reason = overall(published.store.board(20.0).groups(20.0))

@@ -132,10 +132,10 @@ def test_one_that_does_not_read_loses_rows_but_never_a_lamp() -> None:
     serve(feed, talk)
 
 
-@pytest.mark.parametrize(
-    "garbage",
-    ["", "{", "[]", "null", '{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}', "x" * 5000, b"\0", "[" * 4000],
-)
+REQUESTS = ['{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}']
+
+
+@pytest.mark.parametrize("garbage", ["", "{", "[]", "null", *REQUESTS, "x" * 5000, b"\0", "[" * 4000])
 def test_garbage_is_shown_out_and_the_others_stay(garbage: str | bytes) -> None:
     async def talk(session: ClientSession, url: str) -> None:
         async with connect(session, url) as good, connect(session, url) as bad:

@@ -95,7 +95,7 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     twin = Twin(scene, settings)
     intake, outlet = Intake(twin.plan.joints), Outlet(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
-    changes = recorded_changes(scan(recorded))
+    changes = recorded_changes(scan(recorded), load_topics())
     for name, log, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):
         stream, stamp = inputs[name], stamp_of(msg)
         if stream is Stream.STROKES:

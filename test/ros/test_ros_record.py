@@ -162,8 +162,9 @@ def kill_once(spawn: Callable[..., Any], tmp_path: Path, delay: float, *options:
     outcome = recover(bag, tmp_path / "out")
     saved = numbers(tmp_path / "out", "cylinder_strokes")
     assert saved == list(range(saved[0], saved[0] + len(saved)))
-    lost = [at for at in source.times[saved[-1] :] if at < killed]
-    assert killed - source.times[saved[-1] - 1] < 1_200_000_000 and len(lost) < 240
+    lost = killed - source.times[saved[-1] - 1]
+    print(f"killed after {delay:.3f} s, lost {lost * 1e-9:.3f} s")
+    assert lost < 1_200_000_000
     assert outcome.saved.total() == len(saved)
     assert outcome.lost is None or not any(outcome.lost.values())
 
@@ -176,9 +177,7 @@ def test_a_killed_recorder_loses_little(spawn: Callable[..., Any], tmp_path: Pat
 @pytest.mark.parametrize("number", range(20))
 def test_a_recorder_killed_many_times(spawn: Callable[..., Any], tmp_path: Path, number: int) -> None:
     """At a moment drawn anew in each run; every other one while its files are split."""
-    delay = random.SystemRandom().uniform(1.3, 4.0)
-    print(f"killed after {delay:.4f} s")
-    kill_once(spawn, tmp_path, delay, *(["--split-duration", "0.4"] if number % 2 else []))
+    kill_once(spawn, tmp_path, random.uniform(1.3, 4.0), *(["--split-duration", "0.4"] if number % 2 else []))
 
 
 @pytest.mark.parametrize(

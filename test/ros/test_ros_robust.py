@@ -127,8 +127,9 @@ def lines_of(node: Any, before: str) -> list[str]:
 
 
 def told(node: Any, before: str) -> list[str]:
-    """What was logged since then, without times."""
-    return [re.sub(r"^.*: at \d+\.\d+: ", "", line) for line in lines_of(node, before)]
+    """What was logged of changes since then, without times."""
+    found = [re.search(r": at \d+\.\d+: (.*)", line) for line in lines_of(node, before)]
+    return [match[1] for match in found if match]
 
 
 def starts(node: Any, before: str) -> list[str]:

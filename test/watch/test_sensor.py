@@ -136,7 +136,7 @@ def test_an_optional_sensor_may_be_absent() -> None:
 
 def test_sensors_of_the_default_scene() -> None:
     scene, settings = load_scene(), Settings()
-    sensors = sensors_of(scene, settings, ALL)
+    sensors = sensors_of(scene, settings, ALL, [None] * 4)
     assert [sensor.name for sensor in sensors[Stream.STROKES]] == [f"cylinder_{i}" for i in (1, 2, 3, 4)]
     assert sensors[Stream.STROKES][0].high == pytest.approx(scene.joints[0].cylinder.max_stroke, abs=2e-4)
     assert np.degrees(sensors[Stream.ANGLES][1].low) == pytest.approx(scene.joints[1].range_deg[0], abs=0.1)

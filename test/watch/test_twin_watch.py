@@ -27,7 +27,7 @@ class Rig:
 
     def __init__(self) -> None:
         self.now, self.random = 100.0, np.random.default_rng(5)
-        sensors = sensors_of(load_scene(), Settings(), REQUIRED)
+        sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
         self.watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: self.now)
         self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
         self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
