@@ -10,10 +10,11 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo test lint test-extra ament client study soak session figures clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
+	@echo "make demo-live   the same in a browser: node, recorder and monitor, until Ctrl-C"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
@@ -36,6 +37,9 @@ warm: $(READY)
 
 demo: warm
 	$(BIN)/python -m boom_twin.ros.demo --out out/demo
+
+demo-live: warm
+	$(BIN)/python -m boom_twin.ros.demo_live --out out/demo_live
 
 test: lint
 	$(BIN)/python -m pytest -m "not slow"

@@ -118,7 +118,7 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """All rows that are owed now, in messages of bounded size; what comes meanwhile waits, so that lamps are not held up."""
+        """All rows that are owed now, in messages of bounded size; what comes meanwhile waits for the lamps' next turn."""
         tables = list(self._feed.store.tables.values())[: self._tables]
         owed = {number: self._owed(table, position) for number, table in enumerate(tables)}
         while owed:

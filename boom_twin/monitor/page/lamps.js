@@ -68,7 +68,7 @@ export class Lamps {
   }
 }
 
-const RANKS = ["OFF", "OK", "WARN", "STALE", "ERROR"];
+export const RANKS = ["OFF", "OK", "WARN", "STALE", "ERROR"];
 const worst = group => group.lamps.reduce((found, lamp) => !found || RANKS.indexOf(lamp.level) > RANKS.indexOf(found.level) ? lamp : found, null);
 
 function detail(lamp) {

@@ -10,7 +10,7 @@ export function thin(table, columns, from, to, slots) {
   let before = NaN;
   // slots are cut at fixed row numbers, so that a scrolling line does not flicker
   for (let row = first; row < end;) {
-    const stop = Math.min(end, row - row % step + step);
+    const stop = beforeGap(table, row, Math.min(end, row - row % step + step));
     if (table.time(row) - before > GAP) { times.push(table.time(row)); values.forEach(each => each.push(null)); }
     if (step < 3) for (let i = row; i < stop; i++) push(table, columns, i, times, values);
     else pushOutline(table, columns, row, stop, times, values);
@@ -20,12 +20,13 @@ export function thin(table, columns, from, to, slots) {
   return [times, ...values];
 }
 
+// The end of the rows from one on that follow each other without a gap.
+function beforeGap(table, row, end) {
+  for (let i = row + 1; i < end; i++) if (table.time(i) - table.time(i - 1) > GAP) return i;
+  return end;
+}
+
 function push(table, columns, row, times, values) {
-  const before = times.at(-1);
-  if (before !== undefined && table.time(row) - before > GAP && values[0].at(-1) !== null) {
-    times.push(table.time(row));
-    values.forEach(each => each.push(null));
-  }
   times.push(table.time(row));
   columns.forEach((column, i) => { const value = table.at(column, row); values[i].push(Number.isFinite(value) ? value : null); });
 }

@@ -1,5 +1,7 @@
 // Where one is in a recorded session: scrubber, speed, marks.
 
+import { RANKS } from "./lamps.js";
+
 export class Timeline {
   constructor(link) {
     this.link = link;
@@ -37,7 +39,7 @@ export class Timeline {
   mark(alarms) {
     if (!this.isReplay) return;
     this.times = [...new Set(alarms.map(alarm => alarm.begin))].sort((a, b) => a - b);
-    document.getElementById("marks").replaceChildren(...alarms.map(alarm => {
+    document.getElementById("marks").replaceChildren(...alarms.toSorted((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level)).map(alarm => {
       const mark = document.createElement("i"), end = alarm.end ?? this.end;
       mark.dataset.level = alarm.level;
       mark.title = `${alarm.name}: ${alarm.reason}, ${alarm.begin.toFixed(2)} s`;

@@ -4,6 +4,7 @@ import { Chart } from "./chart.js";
 import { figures, thin } from "./thin.js";
 
 const BAND = 2; // deviations that are shaded
+const TELL = 500; // ms between two looks at the figures
 const NAMES = { x: "forward", z: "up" };
 
 // Every chart: table, columns (a function of the table), their labels, a factor of the unit.
@@ -21,7 +22,7 @@ export class Traces {
     this.view = view;
     this.sheet = sheet;
     this.charts = new Map();
-    this.told = 0;
+    setInterval(() => this.tell(), TELL);
     for (const { name } of CHARTS) {
       const element = document.createElement("div");
       element.className = "chart";
@@ -46,7 +47,6 @@ export class Traces {
       const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth));
       chart.draw([times, ...(kind.isBanded ? banded(values) : kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor)))], from, to);
     }
-    if (performance.now() - this.told > 500) this.tell(from, to);
   }
 
   build(kind, table) {
@@ -71,8 +71,10 @@ export class Traces {
   }
 
   // The table of figures of what is shown.
-  tell(from, to) {
-    this.told = performance.now();
+  tell() {
+    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown}`;
+    if (told === this.told || !Number.isFinite(to) || !this.sheet.element.offsetParent) return;
+    this.told = told;
     const rows = [];
     for (const [name, unit, factor, label] of [["displacement", "mm", 1000, "displ."], ["acceleration", "m/s²", 1, "accel."], ["force", "m/s²", 1, "IMU"], ["joints", "mrad", 1000, ""]]) {
       const table = this.link.table(name);
