@@ -66,7 +66,8 @@ class Recording:
 
     def lost_contacts(self) -> NDArray[np.int64]:
         """How often each pin with clearance touched at one prediction and not at the next, shape (k,)."""
-        return np.sum(np.diff(self.clearances()[:, :, 3], axis=0) < 0.0, axis=0)
+        parted = np.diff(self.clearances()[:, :, 3], axis=0) < 0.0
+        return np.asarray(parted.sum(axis=0))
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,8 @@ def replay_pictures(
     -------
     list of Path
         ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same arrays give the same bytes.
+        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same
+        arrays give the same bytes.
     """
     if len(history.stamps_s) == 0:
         return []

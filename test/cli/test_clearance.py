@@ -32,7 +32,8 @@ def drive(tmp_path: Path) -> Path:
 
 def test_the_printed_scene_is_whole(scene_file: Path) -> None:
     scene = load_scene(scene_file)
-    assert scene.clearance is not None and [pin.at for pin in scene.clearance.pins] == [f"cylinder_{i}.rod" for i in range(1, 5)]
+    assert scene.clearance is not None
+    assert [pin.at for pin in scene.clearance.pins] == [f"cylinder_{i}.rod" for i in range(1, 5)]
     assert scene.model_copy(update={"clearance": None}) == load_scene()
     assert scene_file.read_text() == default_text() + "\n" + clearance_text()
 
