@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..analysis.march import Drive, march
-from ..records import Array
+import numpy as np
+
+from ..analysis.march import march
 from ..scene.parts import Scene
 from .clearance_scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
-from .halt import halt
+from .halt import Halt, halt
 from .motion import motion_of
 
 STEP = 1e-3  # s
 GENTLE, QUICK_GENTLE = 2.0, 0.2  # s
-BRAKE = 0.01  # s, of a violent stop
-BURST = 0.2  # s from the stop on
+RAMP, STOP, BRAKE, VIOLENT = 0.05, 0.1, 0.01, 0.3  # s: full speed, stop, its length, end
 REPEATS, QUICK_REPEATS = 7, 1
 TREATMENTS: tuple[Treatment, ...] = ("contact", "spring-damper")
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Time (s) of a step of 1 ms: in the gentle move, and in the first `BURST` after the violent stop."""
+    """Time (s) of a step of 1 ms: in the gentle move, and in the violent start and stop."""
 
     pins: int
     treatment: str
@@ -38,11 +38,16 @@ class Cost:
 def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
     """No pin, the first rod's, all rods', and those of all joints too; least of several runs that lie apart."""
     cases = list(_cases(scene))
-    found = [(float("inf"), float("inf"))] * len(cases)
+    gentle, least = QUICK_GENTLE if quick else GENTLE, np.full((len(cases), 2), np.inf)
     for _ in range(QUICK_REPEATS if quick else REPEATS):
-        now = [_times(one, posture, QUICK_GENTLE if quick else GENTLE) for _, _, one in cases]
-        found = [(min(a, c), min(b, d)) for (a, b), (c, d) in zip(found, now, strict=True)]
-    return [Cost(count, name, *times) for (count, name, _), times in zip(cases, found, strict=True)]
+        least = np.minimum(least, [_seconds(one, posture, gentle) for _, _, one in cases])
+    rows = zip(cases, (least * STEP / (gentle, VIOLENT)).tolist(), strict=True)
+    return [Cost(count, name, *times) for (count, name, _), times in rows]
+
+
+def violent(scene: Scene, posture: str | None) -> Halt:
+    """To full speed and to a stop as no operator would."""
+    return replace(halt(scene, posture, BRAKE), ramp=RAMP, stop=STOP)
 
 
 def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
@@ -54,11 +59,8 @@ def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
             yield count, treatment, treated(with_pins(scene, own), treatment)
 
 
-def _times(scene: Scene, posture: str | None, gentle: float) -> tuple[float, float]:
-    move, stop = motion_of(scene, posture), halt(scene, posture, BRAKE)
-    before, after = (_seconds(scene, stop, stop.angles, duration) for duration in (stop.stop, stop.stop + BURST))
-    return _seconds(scene, move, move.angles, gentle) / round(gentle / STEP), (after - before) / round(BURST / STEP)
-
-
-def _seconds(scene: Scene, drive: Drive, angles: Array, duration: float) -> float:
-    return march(scene, drive, duration, STEP, round(duration / STEP), angles=angles).seconds
+def _seconds(scene: Scene, posture: str | None, gentle: float) -> list[float]:
+    """Run times (s) of both motions."""
+    move = motion_of(scene, posture)
+    runs = ((move, gentle), (violent(scene, posture), VIOLENT))
+    return [march(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]

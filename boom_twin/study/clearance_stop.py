@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,10 @@ from .clearance_scenes import ideal, treated
 from .halt import Halt, halt
 
 STEP = 1e-3  # s
-HOLD, QUICK_HOLD = 4.0, 0.9  # s after the stop
+HOLD, QUICK_HOLD = 15.0, 0.9  # s after the stop
 BRAKE = 0.1  # s
-SETTLED = 0.1  # of the largest swing after the stop
+SETTLED = 0.5  # of the largest swing after the stop
+UNSEEN = 1.0  # s before the end: a swing then may be followed by another
 FINEST = 0.01  # Hz, of a spectrum
 MODELS = ("ideal", "contact", "spring-damper")
 
@@ -36,7 +38,7 @@ class Swing:
     top, effective : float
         Vertical acceleration after the stop: largest, root mean square, m/s^2.
     settling : float
-        After it the tip stays within `SETTLED` of `peak`, s.
+        After it the tip stays within `SETTLED` of `peak`, s; infinite if that is not seen.
     frequency : float
         Of the largest line in the spectrum of the height, Hz.
     doubt : str
@@ -86,11 +88,12 @@ def _swing(posture: str, model: str, moved: March, drive: Halt, rest: float, ref
     off = height[after] - (rest if model != "spring-damper" else float(np.mean(height[after])))
     peak = float(np.abs(off).max())
     wide = np.flatnonzero(np.abs(off) > SETTLED * peak)
+    settling = float(times[after][wide[-1]]) if times[-1] - times[after][wide[-1]] > UNSEEN else math.inf
     lost = int(np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0)) if moved.pins.shape[1] else 0
     return Swing(
         posture, model, times, height, acceleration, rest, peak, float(np.sqrt(np.mean(off**2))),
         float(np.abs(acceleration[after]).max()), float(np.sqrt(np.mean(acceleration[after] ** 2))),
-        float(times[after][wide[-1]]), main_frequency(off, STEP), moved.doubt or moved.status.replace("ok", ""), lost,
+        settling, main_frequency(off, STEP), moved.doubt or moved.status.replace("ok", ""), lost,
     )  # fmt: skip
 
 

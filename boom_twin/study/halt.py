@@ -41,7 +41,7 @@ class Halt:
     @property
     def last(self) -> Array:
         """Strokes (m) in the end, shape (n,)."""
-        return self(np.array([self.still]))[0][0]
+        return np.asarray(self(np.array([self.still]))[0][0])
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
@@ -51,13 +51,13 @@ class Halt:
         return self.first + np.outer(gone, self.speed), np.outer(_rise(x) - _rise(y), self.speed)
 
 
-def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None, share: float = 1.0) -> Halt:
-    """`share` of full speed in the directions of the study's motion and no farther than it goes; of one cylinder (from 0)."""
+def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> Halt:
+    """Full speed in the directions of the study's motion, no farther than it goes; or up to half of it, of `only` one (from 0)."""
     own = motion_of(scene, posture)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     travel = np.where(np.arange(len(full)) == only, 0.5 * full, 0.0) if only is not None else own.travel
     lasting = STOP - 0.5 * RAMP + 0.5 * brake
-    speed = share * np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
+    speed = np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
     return Halt(own.angles, own.first, speed, brake)
 
 
