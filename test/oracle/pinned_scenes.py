@@ -1,0 +1,49 @@
+"""Scenes with pins that have clearance, and such a boom at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from oracle import booms
+
+from boom_twin.analysis.rows import first_row, taken_apart
+from boom_twin.analysis.statics import settle
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+
+RADII = (0.030, 0.025, 0.025, 0.020)
+CYLINDER_PINS = tuple(f"cylinder_{i}.{end}" for i in range(1, 5) for end in ("rod", "barrel"))
+LINK_PINS = tuple(f"joint_{i}.{place}" for i in range(2, 5) for place in ("pivot", "link_L", "link_R", "Q"))
+ALL_PINS = (*CYLINDER_PINS, "joint_1.pivot", *LINK_PINS)
+RODS = CYLINDER_PINS[::2]
+
+
+def with_clearance(document, pins, clearance=1e-4, treatment="contact", **contact):
+    """Scene of a document whose `pins` have a radial clearance (m)."""
+    block = [{"at": at, "pin_radius": RADII[int(at.split("_")[1][0]) - 1], "radial_clearance": clearance} for at in pins]
+    return booms.scene_of(document | {"clearance": {"treatment": treatment, "contact": contact, "pins": block}})
+
+
+@dataclass(frozen=True)
+class Resting:
+    """tip (complex, m), joints (n,) rad, tension (n,) N, offsets and forces on the bush of all pins (k,), complex, m and N."""
+
+    tip: complex
+    joints: np.ndarray
+    tension: np.ndarray
+    offsets: np.ndarray
+    forces: np.ndarray
+
+
+def resting(scene, posture, longer=0.0):
+    """`Resting` of a scene at a posture's strokes, all cylinders' drives `longer` (m, scalar or (n,))."""
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
+    found = taken_apart(plan, first_row(plan, state)[None])
+    offsets = found.pins[0, :, 0] + 1j * found.pins[0, :, 1]
+    sizes = found.pins[0, :, 2]
+    return Resting(
+        complex(*found.tip[0, 0, :2]), found.joints[0], found.cylinder_forces[0], offsets, sizes * offsets / np.abs(offsets)
+    )
