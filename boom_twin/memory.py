@@ -11,12 +11,12 @@ SPAN = 2_000_000_000  # ns
 
 
 class Expected(NamedTuple):
-    """What sensors should read at a stamp (ns): joint angles (n,) rad, specific force (2,) m/s^2, and their deviations."""
+    """What sensors should read at a stamp (ns): angles (n,) rad, specific force (2,) m/s^2, and their deviations."""
 
     stamp: int
-    joints: Array
+    angles: Array
     force: Array
-    joint_sigmas: Array
+    angle_sigmas: Array
     force_sigmas: Array
 
 
@@ -46,5 +46,5 @@ class Memory:
 
 def _between(old: Expected, new: Expected, stamp: int) -> Expected:
     share = (stamp - old.stamp) / (new.stamp - old.stamp)
-    joints = old.joints + share * (new.joints - old.joints)
-    return Expected(stamp, joints, old.force + share * (new.force - old.force), new.joint_sigmas, new.force_sigmas)
+    angles = old.angles + share * (new.angles - old.angles)
+    return Expected(stamp, angles, old.force + share * (new.force - old.force), new.angle_sigmas, new.force_sigmas)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     import numpy as np
@@ -13,6 +13,10 @@ if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     Array = NDArray[np.float64]
 else:
     Array = Any
+
+
+Mount = Literal["root", "head"]
+"""Where on its section an inclinometer sits; between the two lies the bending of the section."""
 
 
 class Stream(Enum):
@@ -33,7 +37,8 @@ class Sample:
     stamp : int
         Nanoseconds, `header.stamp` of the message.
     values : ndarray
-        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad. ``IMU``: (2,) m/s^2, specific force along x and z of the tip.
+        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific
+        force along x and z of the tip.
         NaN where the message had no value.
     """
 
@@ -57,7 +62,7 @@ class Prediction:
     joints, strokes, cylinder_forces : ndarray, shape (n,)
         rad; m (as estimated); N (positive in tension).
     shape : ndarray, shape (k, 2), or None
-        Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 50 ms.
+        Points of the deflected centre line from the base pivot to the tip, m; at the first stamp of every 100 ms.
     undeflected : ndarray, shape (k, 2), or None
         The same points of rigid sections on incompressible cylinders at the same strokes, m; when `shape` is there.
     pins : ndarray, shape (n, 4), or None
@@ -111,6 +116,28 @@ class Residuals:
 
 
 @dataclass(frozen=True, slots=True)
+class Change:
+    """What holds from one stroke sample on; with it a replay repeats what was done to a running twin.
+
+    Attributes
+    ----------
+    stamp : int
+        Of that sample, nanoseconds.
+    from_rest : bool
+        Whether the model began with it, at rest.
+    settings : dict of str to float
+        All that can change while the twin runs, see `boom_twin.settings.Settings`.
+    zeros : dict of str to float
+        What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2); 0 if not named.
+    """
+
+    stamp: int
+    from_rest: bool
+    settings: dict[str, float]
+    zeros: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """What one sample caused.
 
@@ -119,7 +146,7 @@ class Report:
     stamp : int
         Of the sample, nanoseconds.
     accepted : bool
-        False when the sample was not used; `events` says why.
+        False when the sample was not used; `events` says why. A sample with the event ``leap`` is a witness of time only.
     prediction : Prediction or None
         Set for every stroke sample that the model was stepped to.
     residuals : tuple of Residuals
@@ -128,6 +155,10 @@ class Report:
         What was out of the ordinary, by the names in `boom_twin.twin.EVENTS`.
     status : str
         ``ok``, or one sentence on a failure of the model.
+    change : Change or None
+        Set where the model began from rest, or something that was asked for took effect.
+    passes : int
+        Newton passes that the prediction took, with those of what was stepped for good.
     """
 
     stamp: int
@@ -136,3 +167,5 @@ class Report:
     residuals: tuple[Residuals, ...] = ()
     events: tuple[str, ...] = ()
     status: str = "ok"
+    change: Change | None = None
+    passes: int = 0

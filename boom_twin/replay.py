@@ -21,10 +21,11 @@ import numpy as np
 from .errors import BagError
 from .io.ahead import Ahead
 from .io.behind import Behind
+from .io.mapping import mapping_of
 from .io.reader import Session, scan
-from .io.topics import load_topics
+from .io.topics import Topics
 from .io.writer import FILE_NAME
-from .records import Array, Prediction, Report, Residuals, Sample, Stream
+from .records import Array, Change, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .truth import TipTruth, load_truth
@@ -46,7 +47,7 @@ class Recording:
 
     def add(self, report: Report) -> None:
         """Keep what one sample caused."""
-        if not report.accepted:
+        if not report.accepted or "leap" in report.events:
             self.refused += 1
         if report.prediction is not None:
             if "gap" in report.events or "restart" in report.events:
@@ -75,6 +76,8 @@ def replay(
     out: str | Path,
     settings: Settings | None = None,
     progress: Progress | None = None,
+    mapping: str | Path | None = None,
+    changes: bool = True,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -88,27 +91,39 @@ def replay(
         Sensors' noise and tuning; the package's own by default.
     progress : callable, optional
         Wraps the iterator over messages, of which it is told the number.
+    mapping : path, optional
+        How topics and sensors are named and read, a file like ``msg_config/topics.yaml``; by default the one that the
+        session was recorded with, else the package's own.
+    changes : bool
+        Repeat what was changed while the session was recorded (load, limits, zeros, starts from rest), at the same stamps.
 
     Raises
     ------
+    UsageError
+        The mapping or a setting cannot be used.
     BagError
         The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written.
     """
     session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
-    wanted = _wanted(session)
+    mapped = mapping_of(session.path, Path(mapping) if mapping else None, len(scene.joints))
+    topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     _clear(out)
     recording = Recording()
-    with _unhurried_collector(), _ends(session, wanted, scene, settings, out / "bag") as (ahead, behind):
-        twin = _ready_twin(scene, settings)
+    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, out / "bag") as (ahead, behind):
+        twin = _ready_twin(scene, settings, topics)
         ahead.wait_ready()
         behind.wait_ready()
-        samples: Iterator[Sample | None] = iter(ahead)
+        samples: Iterator[Sample | Change | None] = iter(ahead)
         if progress is not None:
             samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
         began = time.perf_counter()
         for sample in samples:
             if sample is None:
                 recording.refused += 1
+                continue
+            if isinstance(sample, Change):
+                if changes:
+                    twin.requests.repeat(sample)
                 continue
             report = twin.update(sample)
             recording.add(report)
@@ -119,25 +134,21 @@ def replay(
     if not recording.predictions:
         raise BagError(
             f"{session.path}: no stroke sample could be used ({_told(twin)}). "
-            f"It needs names cylinder_1..{twin.plan.joints}, values in m within the cylinders' travel, and stamps."
+            f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
+            "and stamps."
         )
     truth = load_truth(session.path)
-    summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME)
+    summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {"mapping": mapped.source}
     if truth is not None:
         summary |= truth.errors(recording.predictions)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return Replay(summary, recording, session, truth)
 
 
-def _wanted(session: Session) -> dict[str, Stream]:
-    """The session's topics by stream: strokes, and what else of the inputs has messages."""
-    inputs = load_topics().inputs
-    wanted = {inputs[Stream.STROKES].name: Stream.STROKES}
-    for stream in (Stream.ANGLES, Stream.IMU):
-        topic = session.find(inputs[stream].name)
-        if topic is not None and topic.count:
-            wanted[inputs[stream].name] = stream
-    return wanted
+def _wanted(session: Session, topics: Topics) -> list[str]:
+    """The topics to be read: that of the strokes, and what else of the inputs has messages."""
+    found = {name: session.find(name) for name in topics.heard}
+    return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
 
 
 def _clear(out: Path) -> None:
@@ -152,11 +163,11 @@ def _clear(out: Path) -> None:
 
 @contextmanager
 def _ends(
-    session: Session, wanted: dict[str, Stream], scene: Scene, settings: Settings, bag: Path
+    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, bag: Path
 ) -> Iterator[tuple[Ahead, Behind]]:
     """The processes that read and write, as they start."""
-    ahead = Ahead(session.path, wanted, len(scene.joints))
-    behind = Behind(bag, session.notes, scene, settings)
+    ahead = Ahead(session.path, topics, wanted, len(scene.joints))
+    behind = Behind(bag, session.notes, topics, scene, settings)
     try:
         yield ahead, behind
     finally:
@@ -164,11 +175,11 @@ def _ends(
         behind.stop()
 
 
-def _ready_twin(scene: Scene, settings: Settings) -> Twin:
+def _ready_twin(scene: Scene, settings: Settings, topics: Topics) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from .twin import Twin
 
-    twin = Twin(scene, settings)
+    twin = Twin(scene, settings, topics.mounts(len(scene.joints)))
     twin.warm_up()
     return twin
 

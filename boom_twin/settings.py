@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
 from .errors import UsageError
+from .parameter_file import checked, read_parameters
+from .thresholds import Thresholds
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+LIVE = "live"
+"""Marks what can change while the twin runs."""
+Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
+Limit = Annotated[Positive, LIVE]
 
 
 class Settings(BaseModel):
@@ -33,11 +38,41 @@ class Settings(BaseModel):
     step: Positive = Field(default=0.005, description="longest step of the remembered boom, s")
     look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s")
     rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")
-    gap: Positive = Field(default=0.1, description="longer pauses between strokes are flagged, s")
-    restart_gap: Positive = Field(default=5.0, description="longer pauses start again from rest, s")
-    jump_back: Positive = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
+    payload: Load = Field(default=-1.0, description="mass at the tip, kg; below 0: that of the scene")
+    line_fill: Load = Field(default=-1.0, description="concrete in the pipe line, kg/m; below 0: that of the scene")
+    gap: Limit = Field(default=0.1, description="longer pauses between strokes are flagged, s")
+    restart_gap: Limit = Field(default=5.0, description="longer pauses start again from rest, s")
+    jump_back: Limit = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
+    leap: Limit = Field(default=3600.0, description="a stamp further from its stream must be confirmed by the next, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
+
+    @classmethod
+    def live_names(cls) -> tuple[str, ...]:
+        """What can change while the twin runs."""
+        return tuple(name for name, field in cls.model_fields.items() if LIVE in field.metadata)
+
+    @property
+    def live(self) -> dict[str, float]:
+        """The values of `live_names`."""
+        return {name: getattr(self, name) for name in self.live_names()}
+
+    @property
+    def load(self) -> tuple[float, float]:
+        """Payload and line fill."""
+        return self.payload, self.line_fill
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The live values without the load."""
+        return {name: value for name, value in self.live.items() if name not in ("payload", "line_fill")}
+
+    def tuned(self, live: Mapping[str, float]) -> Settings:
+        """These settings with other live values; UsageError if one is out of bounds, or not live."""
+        if fixed := sorted(set(live) - set(self.live_names())):
+            known = ", ".join(self.live_names())
+            raise UsageError(f"{', '.join(fixed)}: fixed while the twin runs. What can change: {known}.")
+        return settings_from({**self.model_dump(), **live}, "change of settings")
 
     @property
     def stroke_variance(self) -> float:
@@ -52,27 +87,14 @@ class Settings(BaseModel):
 
 def settings_from(values: dict[str, Any], source: str) -> Settings:
     """Settings from names and values; UsageError names every value that is out of bounds."""
-    try:
-        return Settings(**values)
-    except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
-        known = ", ".join(Settings.model_fields)
-        raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+    return checked(Settings, values, source)
 
 
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``autostart``) are passed over.
+    Parameters of the node alone (``scene``, ``mapping``, ``autostart``) and of ``/diagnostics`` are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    try:
-        content = YAML(typ="safe", pure=True).load(source.read_text(encoding="utf-8"))
-        values = dict(next(iter(content.values()))["ros__parameters"])
-    except OSError as error:
-        raise UsageError(f"{source}: {error.strerror}. Give a parameter file.") from None
-    except (YAMLError, AttributeError, KeyError, TypeError, StopIteration, UnicodeDecodeError):
-        raise UsageError(f"{source}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
-    for name in ("scene", "autostart"):
-        values.pop(name, None)
-    return settings_from(values, str(source))
+    others = {"scene", "mapping", "autostart", *Thresholds.model_fields}
+    return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,8 @@ from .errors import BagError
 from .records import Array, Prediction
 
 FILE_NAME = "truth.csv.gz"
+LARGEST = 64 * 2**20
+"""Bytes of an unpacked file that are read: about an hour at 200 Hz."""
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
 
 
@@ -54,7 +58,11 @@ def load_truth(folder: Path) -> TipTruth | None:
     if not path.is_file():
         return None
     try:
-        table = np.genfromtxt(path, delimiter=",", names=True)
+        with gzip.open(path) as file:
+            text = file.read(LARGEST + 1)
+        if len(text) > LARGEST:
+            raise ValueError(f"more than {LARGEST} bytes unpacked")
+        table = np.genfromtxt(BytesIO(text), delimiter=",", names=True)
         values = {name: table[name] for name in COLUMNS}
     except (OSError, ValueError, EOFError) as error:
         raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .analysis.statics import outline, settle
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
-from .errors import BoomTwinError
+from .errors import BoomTwinError, UsageError
 from .estimate.follower import Tuning, follow, new_track
+from .load import loaded
 from .memory import Expected, Memory
+from .mounting import Mounting
+from .physics.linkage import cylinder_length
 from .plan.compile import compile_scene
-from .records import Array, Prediction, Report, Residuals, Sample, Stream
+from .recent import Recent
+from .records import Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream
+from .requests import Requests
 from .scene.kinematics import joint_angles_of_strokes, stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
+from .stray import Strays
 from .undeflected import Undeflected
+from .zeros import Zeros, channels_of
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -28,10 +36,18 @@ EVENTS = {
     "waiting": "not all strokes known yet; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge; started again from rest",
+    "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
     "jump back": "time was set back; everything started again",
     "model": "the model failed; it starts again with the next full sample",
+    "reset": "asked for; the model started again from rest",
+    "load": "payload or line fill changed; the model started again from rest",
+    "limits": "other settings changed while the twin ran",
+    "zero": "the zero of a sensor was set anew",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
+
+TOLD_AT_ONCE = frozenset({"restart", "jump back", "reset", "load", "limits", "zero"})
+"""Events that `Report.change` goes with."""
 
 NANO = 1e-9
 SMOOTHING = 0.05  # weight of the newest interval in the running mean
@@ -60,11 +76,19 @@ class Twin:
         The boom.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
+    mounts : sequence of Mount or None, optional
+        Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
+        `boom_twin.mounting.Mounting`.
 
     Attributes
     ----------
+    mounts : tuple of Mount or None
+        As given, one for every joint.
     counts : Counter
         How often each of `EVENTS` happened.
+    requests : Requests
+        What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
+        stroke sample, which `Report.change` tells.
 
     Notes
     -----
@@ -72,29 +96,91 @@ class Twin:
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
-    def __init__(self, scene: Scene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
         self.scene, self.settings = scene, settings or Settings()
-        self.plan = compile_scene(scene)
         self.counts: Counter[str] = Counter()
         tuned = self.settings
         self._tuning = Tuning(
             tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
         )
-        lengths = np.array([section.length for section in scene.sections])
-        self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
-        self._undeflected = Undeflected(scene, self.plan)
-        self._track = new_track(self.plan, lengths)
+        self.mounts = tuple(mounts) or (None,) * len(scene.joints)
+        self._build()
         self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
-        self._names = tuple(f"joint_{i + 1}" for i in range(self.plan.joints))
+        self._channels = channels_of(self.plan.joints)
+        self._strays = Strays(self.settings)
         self._run: _Run | None = None
         self._newest_measured: dict[Stream, int] = {}
         self._pending: deque[Sample] = deque()
+        self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent(self._channels)
 
     def reset(self) -> None:
-        """Forget everything but the counts; the next full stroke sample starts from static equilibrium."""
-        self._run = None
+        """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
+        self._begin_anew()
+        self._strays = Strays(self.settings)
         self._newest_measured = {}
         self._pending = deque()
+
+    def rezero(self, sensor: str) -> dict[str, float]:
+        """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
+
+        Parameters
+        ----------
+        sensor : str
+            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m). A stroke has no residual of its own:
+            its zero becomes the one that explains the residual of ``joint_i``, which must read right for that; and the
+            model, which the strokes drive, starts again from rest.
+
+        Raises
+        ------
+        UsageError
+            Too few residuals within the last second.
+        """
+        kind, _, number = sensor.rpartition("_")
+        if kind == "cylinder" and self.mounts[int(number) - 1] is not None:
+            told = f"{sensor}: joint_{number} has an inclinometer, which feels every joint inboard"
+            raise UsageError(f"{told}. Set the zero of {sensor} in the mapping.")
+        if self._run is None:
+            raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
+        found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._slope)
+        self.requests.zero(found)
+        return found
+
+    def _slope(self, joint: int) -> float:
+        """Stroke over angle, m/rad, by rigid geometry at the newest strokes."""
+        return float(cylinder_length(self.plan.tables.linkages[joint], self._track.angles[joint])[1])
+
+    def _build(self) -> None:
+        """The model under the present load."""
+        self.plan = compile_scene(loaded(self.scene, *self.settings.load))
+        lengths = np.array([section.length for section in self.scene.sections])
+        self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
+        self._undeflected = Undeflected(self.scene, self.plan)
+        self._track = new_track(self.plan, lengths)
+        self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
+
+    def _take_over(self, stamp: int) -> list[str]:
+        """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
+        asked, before = self.requests, self.settings
+        from_rest, self.settings = asked.take(), asked.settings
+        events = ["load"] if before.load != self.settings.load else []
+        if before.limits != self.settings.limits:
+            events.append("limits")
+            self._strays = Strays(self.settings)
+        if asked.zeros != self._zeros.values:
+            events.append("zero")
+            from_rest |= self._zeros.put(stamp, asked.zeros)
+        if (from_rest or "load" in events) and self._run is not None:
+            events += [] if events else ["reset"]
+            self._begin_anew()
+            self._pending = deque(sample for sample in self._pending if sample.stamp >= stamp)
+        if "load" in events:
+            self._build()
+        return events
+
+    def _begin_anew(self) -> None:
+        self._run = None
+        self._zeros.forget_past()
+        self._recent.clear()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -118,6 +204,8 @@ class Twin:
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         events: list[str] = []
+        if self._strays.hold(sample, None if self._run is None else self._run.newest):
+            return self._hold(sample)
         if self._run is not None:
             span = (sample.stamp - self._run.newest) * NANO
             if -self.settings.jump_back <= span <= 0.0:
@@ -129,9 +217,21 @@ class Twin:
                 events.append("gap")
         if not complete:
             events.append("partial")
+        asked = complete and self.requests.due
+        if asked:
+            events += self._take_over(sample.stamp)
+        zeros = self._zeros.of(Stream.STROKES, sample.stamp)
+        if zeros is not None:
+            sample = replace(sample, values=sample.values - zeros)
         if self._run is not None:
-            return self._step(self._run, sample, events)
-        return self._start(sample, events) if complete else self._refuse(sample, "waiting", *events)
+            report, from_rest = self._step(self._run, sample, events), False
+        elif complete:
+            report, from_rest = self._start(sample, events), True
+        else:
+            return self._refuse(sample, "waiting", *events)
+        if asked or (from_rest and report.accepted):
+            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
+        return report
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
@@ -161,7 +261,8 @@ class Twin:
         prediction = self._prediction(run, sample.stamp)
         self._remember(run, prediction)
         self.counts.update(events)
-        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events))
+        passes = int(self._track.passes[0])
+        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=passes)
 
     def _prediction(self, run: _Run, stamp: int) -> Prediction:
         n, row = self.plan.joints, self._row.copy()
@@ -200,14 +301,18 @@ class Twin:
         """Keep what residuals need."""
         n, interval = self.plan.joints, run.interval or self.settings.step
         variances = self._row[3 * n + 9 : 4 * n + 9]
-        sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
+        angles = self._mounting.expected(prediction.joints, self._live)
+        angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
         force = specific_force(prediction, self.plan.tables.gravity)
-        run.memory.add(Expected(prediction.stamp, prediction.joints, force, *sigmas))
+        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
     def _take_measured(self, sample: Sample, complete: bool) -> Report:
         newest = self._newest_measured.get(sample.stream)
+        if self._strays.hold(sample, newest):
+            return self._hold(sample)
         if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
             return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
         self._newest_measured[sample.stream] = sample.stamp
@@ -239,11 +344,19 @@ class Twin:
         if expected is None:
             return None
         if sample.stream is Stream.ANGLES:
-            values, sigmas, names = sample.values - expected.joints, expected.joint_sigmas, self._names
+            values, sigmas = self._mounting.residuals(sample.values, expected.angles), expected.angle_sigmas
         else:
             values, sigmas = sample.values - expected.force, expected.force_sigmas
-            names = ("tip_imu_x", "tip_imu_z")
-        return Residuals(sample.stream, sample.stamp, names, values, sigmas)
+        self._recent.add(sample.stamp, sample.stream, values)
+        zeros = self._zeros.of(sample.stream, sample.stamp)
+        if zeros is not None:
+            values = values - zeros
+        return Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+
+    def _hold(self, sample: Sample) -> Report:
+        """Taken as a witness of time alone."""
+        self.counts["leap"] += 1
+        return Report(sample.stamp, True, events=("leap",))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

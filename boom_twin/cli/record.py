@@ -6,12 +6,15 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..io.topics import Topic, load_topics
+from ..io.mapping import load_mapping
+from ..io.topics import DEFAULT_FILE, Topic
 from ..ros.require import require_rclpy
 from .common import open_scene
 from .play import positive
@@ -19,6 +22,7 @@ from .play import positive
 if TYPE_CHECKING:
     from ..ros.recorder import Count
     from ..ros.wanted import Wanted
+    from ..thresholds import Thresholds
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -40,6 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--split-duration", type=positive, metavar="S", help="begin a new file after so many seconds")
     parser.add_argument("--scene", metavar="SCENE", help="scene of the rig, copied into session.yaml (the default one)")
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
     parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
 
@@ -50,24 +55,45 @@ def run(args: Namespace) -> int:
     from ..io.bagwriter import BagWriter
     from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
-    from ..ros.context import on_stop_signal, ros
+    from ..ros.context import ros
     from ..ros.recorder import record
+    from ..ros.stop import on_stop_signal
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    wanted, scene, parameters = _wanted(args), _scene_text(args.scene), _parameters_text(args.params)
+    wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
+    mapping = (args.mapping or DEFAULT_FILE).read_text(encoding="utf-8")
     given = {"origin": args.origin, "note": args.note}
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
-    Sheet(__version__, scene, parameters, types, args.note, args.origin).write(args.out)
+    sheet = Sheet(__version__, scene, parameters, mapping, types, args.note, args.origin)
+    sheet.write(args.out)
+
+    def meet(twin: Mapping[str, object]) -> None:
+        nonlocal sheet
+        sheet = replace(sheet, twin=twin)
+        sheet.write(args.out)
+        _compare(str(twin.get("scene", "")), scene)
+
     storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
     with ros([]):
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, lambda: bool(signals) or time.monotonic() >= end, _say)
+        counts = record(storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
     _tell(counts)
+    sheet.write(args.out, [asdict(count) for count in counts])
     if not any(count.received for count in counts):
         raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
     return 0
+
+
+def _compare(path: str, scene: str) -> None:
+    """Say if the twin's scene is not the one in session.yaml."""
+    try:
+        is_same = _scene_text(path or None) == scene
+    except BoomTwinError:
+        is_same = False
+    if not is_same:
+        _say(f"warning: the twin's scene is {path or 'the default one'}, session.yaml holds another. Give it with --scene.")
 
 
 def _say(text: str) -> None:
@@ -86,7 +112,7 @@ def _wanted(args: Namespace) -> list[Wanted]:
     """The topics of the command line, or the chosen ones of ``topics.yaml``."""
     from ..ros.wanted import Wanted, wanted_of
 
-    known = load_topics()
+    known = load_mapping(args.mapping)
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
     outputs = {topic.absolute: topic for topic in known.outputs.values()}
     if args.topics:
@@ -103,12 +129,14 @@ def _scene_text(source: str | None) -> str:
     return default_text() if source is None else Path(source).read_text(encoding="utf-8")
 
 
-def _parameters_text(path: Path | None) -> str:
-    """Text of the parameter file, which must be valid."""
+def _parameters(path: Path | None) -> tuple[Thresholds, str]:
+    """The recorder's part of the parameter file, which must be valid, and all its text."""
     from ..settings import DEFAULT_FILE, load_settings
+    from ..thresholds import load_thresholds
 
     load_settings(path)
-    return (path or DEFAULT_FILE).read_text(encoding="utf-8")
+    file = path or DEFAULT_FILE
+    return load_thresholds(file), file.read_text(encoding="utf-8")
 
 
 def size(text: str) -> int:

@@ -17,6 +17,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser, option=True)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for summary.json, bag/ and pictures")
     parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    parser.add_argument(
+        "--mapping", metavar="FILE", help="topics and sensors; by default as the session was recorded, else topics.yaml"
+    )
+    parser.add_argument(
+        "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
+    )
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     add_json(parser)
 
@@ -29,7 +35,7 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    result = replay(args.bag, scene, args.out, settings, _progress)
+    result = replay(args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes)
     pictures = []
     if not args.no_pictures:
         from ..pictures import draw  # with the plotting library
@@ -56,6 +62,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
         f"wall time          {summary['wall_s']:.2f} s, {summary['realtime_factor']:.1f} times real time",
         f"left out           {summary['dropped']}",
+        f"mapping            {summary['mapping']}",
         f"tip acceleration   {summary['tip_acceleration_max_m_s2']:.2f} m/s^2 at most",
     ]
     for i, value in enumerate(summary["joint_residual_rms_rad"]):

@@ -45,12 +45,14 @@ class Tuning(NamedTuple):
 class Track(NamedTuple):
     """What the follower remembers besides the anchor's state.
 
-    nodes : (1,) number of nodes in the window. moved : (1,) whether the anchor has left its first equilibrium.
+    nodes : (1,) number of nodes in the window. passes : (1,) Newton passes for the newest sample.
+    moved : (1,) whether the anchor has left its first equilibrium.
     times : (NODES,) s. x, c : nodes of the smoother. anchor : (n, 3) drive where the anchor stands.
     angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch.
     """
 
     nodes: np.ndarray
+    passes: np.ndarray
     moved: np.ndarray
     times: Array
     x: Array
@@ -67,9 +69,9 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     """An empty track for a compiled boom whose sections are `lengths` (m), shape (n,), long."""
     n = plan.joints
     return Track(
-        nodes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES), x=np.zeros((NODES, n, 3)),
-        c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n), drive=np.zeros(n), rate=np.zeros(n),
-        closed=plan.closed_lengths, lengths=lengths,
+        nodes=np.zeros(1, np.int64), passes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES),
+        x=np.zeros((NODES, n, 3)), c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n),
+        drive=np.zeros(n), rate=np.zeros(n), closed=plan.closed_lengths, lengths=lengths,
     )  # fmt: skip
 
 
@@ -85,6 +87,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     Returns a status of `chain.status`.
     """
     add_sample(track, tuning, time, y)
+    track.passes[0] = 0
     ahead, old = False, track.nodes[0] - 1
     boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
     while True:
@@ -93,9 +96,10 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
             if track.moved[0] == 0:
                 hold(track, track.x[old])
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
-                status, _, _ = advance(
+                status, count, _ = advance(
                     t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None
                 )
+                track.passes[0] += count
                 if status != OK:
                     return status
             copy_state(anchor, live)
@@ -111,9 +115,10 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
         for k in range(steps):
             drive_to(track, start, track.x[new], span, (k + 1) / steps)
-            status, _, _ = advance(
+            status, count, _ = advance(
                 t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None
             )
+            track.passes[0] += count
             if status != OK:
                 return status
         if not ahead:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BoomTwinError
-from ..records import Sample, Stream
+from ..records import Change, Sample, Stream
+from .changes import recorded_changes
 from .intake import Intake, stamp_of
 from .pipe import Pipe, post, say_ready
 from .reader import read, scan
-from .topics import TYPES
+from .topics import Topics
 
 BATCH = 400  # samples in one pickle
-Packed = tuple[str, int, bytes] | None
+Packed = tuple[str, int, bytes] | Change | None
 
 
 class Ahead:
@@ -27,10 +29,12 @@ class Ahead:
     ----------
     path : Path
         Of the session.
-    wanted : mapping of str to Stream
-        Topics and their roles.
-    count : int
-        Number of joints.
+    topics : Topics
+        How its topics and sensors are named, and read.
+    wanted : list of str
+        The input topics to be read.
+    joints : int
+        Of the scene.
 
     Attributes
     ----------
@@ -38,25 +42,25 @@ class Ahead:
         Of the intake, once the iteration has ended.
     """
 
-    def __init__(self, path: Path, wanted: Mapping[str, Stream], count: int) -> None:
-        roles = [f"{name}={stream.value}" for name, stream in wanted.items()]
-        self._pipe = Pipe(__name__, str(path), str(count), *roles)
+    def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int) -> None:
+        self._pipe = Pipe(__name__)
+        self._pipe.send((path, topics, wanted, joints))
         self.oddities: Counter[str] = Counter()
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
         self._pipe.wait_ready()
 
-    def __iter__(self) -> Iterator[Sample | None]:
-        """Samples in the order of log times; None for a message without any usable value."""
+    def __iter__(self) -> Iterator[Sample | Change | None]:
+        """Samples in the order of log times, changes before theirs; None for a message without any usable value."""
         streams = {stream.value: stream for stream in Stream}
         for batch in self._pipe.receive():
             if isinstance(batch, Counter):
                 self.oddities = batch
                 continue
             for packed in batch:
-                if packed is None:
-                    yield None
+                if packed is None or isinstance(packed, Change):
+                    yield packed
                 else:
                     yield Sample(streams[packed[0]], packed[1], np.frombuffer(packed[2]))
         self._pipe.finish()
@@ -66,18 +70,23 @@ class Ahead:
         self._pipe.stop()
 
 
-def main(arguments: list[str]) -> int:
+def main() -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
-    wanted = {name: Stream(role) for name, role in (text.rsplit("=", 1) for text in arguments[2:])}
-    intake = Intake(int(arguments[1]))
+    path, topics, wanted, joints = pickle.load(sys.stdin.buffer)
+    heard: dict[str, list[Stream]] = topics.heard
+    intake = Intake(joints, topics)
     say_ready()
     batch: list[Packed] = []
     try:
-        for name, _, message in read(scan(Path(arguments[0])), {name: TYPES[role] for name, role in wanted.items()}):
-            role = wanted[name]
-            sample = intake.put(role, stamp_of(message), message)
-            batch.append(None if sample is None else (role.value, sample.stamp, sample.values.tobytes()))
-            if len(batch) == BATCH:
+        session = scan(path)
+        changes = recorded_changes(session, topics)
+        for name, log, message in read(session, {name: topics.inputs[heard[name][0]].type for name in wanted}):
+            stamp = stamp_of(message)
+            if Stream.STROKES in heard[name]:
+                batch += changes.due(log, stamp)
+            found = [sample for stream in heard[name] if (sample := intake.put(stream, stamp, message)) is not None]
+            batch += [(sample.stream.value, stamp, sample.values.tobytes()) for sample in found] or [None]
+            if len(batch) >= BATCH:
                 post([batch])
                 batch = []
     except BrokenPipeError:
@@ -90,4 +99,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -8,16 +8,14 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from ..errors import BagError
+from ..plain import read_plain
 from .topics import Qos
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
 """Of the format, as Jazzy writes it."""
-LARGEST = 4 * 2**20
-"""Bytes of a file that is read, and values that it may hold, aliases written out."""
 
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -87,15 +85,9 @@ def read_metadata(path: Path) -> BagMetadata:
         If it is no such file, or its bag is stored in a way that is not read here (sqlite3, compressed as a whole).
     """
     remedy = "Move it away: the .mcap files can be read without it."
+    document = read_plain(path, BagError, remedy)
     try:
-        if (size := path.stat().st_size) > LARGEST:
-            raise BagError(f"{path}: {size} bytes: at most {LARGEST} are read. {remedy}")
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-        if _count(document) > LARGEST:
-            raise BagError(f"{path}: more than {LARGEST} values, by aliases of aliases. {remedy}")
         metadata = BagMetadata.model_validate((document or {})[_ROOT])
-    except (OSError, UnicodeDecodeError, YAMLError, RecursionError) as error:
-        raise BagError(f"{path}: not a readable YAML file ({error}). {remedy}") from error
     except (KeyError, TypeError) as error:
         raise BagError(f"{path}: no {_ROOT} in it, so not rosbag2 metadata. {remedy}") from error
     except ValidationError as error:
@@ -112,17 +104,6 @@ def read_metadata(path: Path) -> BagMetadata:
             "(zstd, lz4) are read. Convert the bag with `ros2 bag convert`."
         )
     return metadata
-
-
-def _count(document: Any) -> int:
-    """How many values a document holds with its aliases written out; at most a little more than `LARGEST`."""
-    count, waiting = 0, [document]
-    while waiting and count <= LARGEST:
-        value = waiting.pop()
-        inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
-        count += 1 + len(inner)
-        waiting.extend(inner)
-    return count
 
 
 def write_metadata(path: Path, metadata: BagMetadata) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BufferedWriter
 from pathlib import Path
@@ -58,7 +58,9 @@ class BagWriter:
         self._channels: list[int] = []
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
+        self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
         self._files: list[bagmeta.FileInformation] = []
+        self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         claim(directory)
         self._open()
@@ -89,18 +91,26 @@ class BagWriter:
         try:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
-            raise self._fault(error) from error
+            raise self.fault(error) from error
 
-    def flush(self) -> None:
-        """Put all messages so far on the disk, to survive the loss of the process and of power."""
+    def flush(self) -> int:
+        """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
+
+        They survive the loss of power once ``os.fsync`` has put that file on the disk.
+        """
         with self._told():
             self._writer.flush()  # type: ignore[no-untyped-call]
-            os.fsync(self._raw.fileno())
+        return self._raw.fileno()
 
     @property
     def size(self) -> int:
         """Bytes of the open file on the disk, without what is in memory."""
-        return self._raw.tell()
+        return 0 if self._raw.closed else self._raw.tell()
+
+    @property
+    def written(self) -> int:
+        """Bytes of all files on the disk."""
+        return self._completed + self.size
 
     @property
     def first(self) -> int | None:
@@ -146,9 +156,10 @@ class BagWriter:
             self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
 
     def _finish(self) -> None:
-        """Complete the open file, down to the disk."""
+        """Complete the open file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self.flush()
+        self.sync(self.flush())
+        self._completed += self.size
         self._raw.close()
         first, last, count = self._span or (0, 0, 0)
         self._files.append(file_information(file_name(len(self._files)), first, last, count))
@@ -158,9 +169,10 @@ class BagWriter:
         try:
             yield
         except OSError as error:
-            raise self._fault(error) from error
+            raise self.fault(error) from error
 
-    def _fault(self, error: OSError) -> BagError:
+    def fault(self, error: OSError) -> BagError:
+        """What is told of a disk that is full or fails."""
         return BagError(
             f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
             f"`boom_twin recover {self.directory} --out DIR` saves what was written before."

@@ -1,4 +1,4 @@
-"""Fill messages and write a result bag in a process behind the replay."""
+"""Encode messages and write a result bag in a process behind the replay."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BoomTwinError
-from ..records import Array, Prediction, Report, Residuals, Stream
+from ..records import Array, Change, Prediction, Report, Residuals, Stream
 from ..scene.parts import Scene
 from ..settings import Settings
-from .factory import RosbagsTypes
 from .outlet import Outlet
 from .pipe import Pipe, say_ready
-from .topics import Output, Topic, load_topics
+from .topics import Output, Topic, Topics
 from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
-Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, list[tuple[str, int, tuple[str, ...], bytes, bytes]]]
+Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
+Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, Rows, Change | None]
 
 
 def pack(report: Report) -> Packed:
@@ -28,30 +28,31 @@ def pack(report: Report) -> Packed:
     residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
     p = report.prediction
     if p is None:
-        return report.stamp, None, None, residuals
+        return report.stamp, None, None, residuals, report.change
     turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
     tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
     numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
     if p.shape is None or p.undeflected is None or p.pins is None:
-        return report.stamp, numbers, None, residuals
-    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals
+        return report.stamp, numbers, None, residuals, report.change
+    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals, report.change
 
 
 def unpack(packed: Packed) -> Report:
     """What `pack` was given, less what it leaves out."""
-    stamp, numbers, lines, rows = packed
+    stamp, numbers, lines, rows, change = packed
     residuals = tuple(
         Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
         for stream, at, names, values, sigmas in rows
     )
-    return Report(stamp, True, None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines), residuals)
+    prediction = None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines)
+    return Report(stamp, True, prediction, residuals, change=change)
 
 
 def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:
     n = (len(row) - 11) // 3
-    line, undeflected, pins = lines or (None, None, None)
-    turn, velocity, acceleration = (float(value) for value in row[8:11])
-    joints, strokes, forces = (row[11 + i * n : 11 + (i + 1) * n] for i in range(3))
+    line, undeflected, pins = (None, None, None) if lines is None else map(_table, lines, (2, 2, 4))
+    turn, velocity, acceleration = row[8:11].tolist()
+    joints, strokes, forces = row[11:].reshape(3, n)
     return Prediction(
         stamp=stamp,
         tip_position=row[0:2],
@@ -64,14 +65,14 @@ def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None
         joints=joints,
         strokes=strokes,
         cylinder_forces=forces,
-        shape=_table(line, 2),
-        undeflected=_table(undeflected, 2),
-        pins=_table(pins, 4),
+        shape=line,
+        undeflected=undeflected,
+        pins=pins,
     )
 
 
-def _table(data: bytes | None, columns: int) -> Array | None:
-    return None if data is None else np.frombuffer(data).reshape(-1, columns)
+def _table(data: bytes, columns: int) -> Array:
+    return np.frombuffer(data).reshape(-1, columns)
 
 
 class Behind:
@@ -83,6 +84,8 @@ class Behind:
         Of the bag; must be new or empty.
     notes : mapping of str to str
         Kept in the bag.
+    topics : Topics
+        How its topics are named.
     scene : Scene
         What the reports are about.
     settings : Settings
@@ -94,10 +97,12 @@ class Behind:
         From any method: the bag could not be written; says why.
     """
 
-    def __init__(self, directory: Path, notes: Mapping[str, str], scene: Scene, settings: Settings) -> None:
+    def __init__(
+        self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings
+    ) -> None:
         self._batch: list[Packed] = []
         self._pipe = Pipe(__name__, str(directory))
-        self._pipe.send((dict(notes), scene, settings))
+        self._pipe.send((dict(notes), topics.outputs, scene, settings))
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
@@ -105,7 +110,7 @@ class Behind:
 
     def put(self, report: Report) -> None:
         """Write what `report` holds, in its turn; its stamp becomes the log time."""
-        if report.prediction is None and not report.residuals:
+        if report.prediction is None and not report.residuals and report.change is None:
             return
         self._batch.append(pack(report))
         if len(self._batch) == BATCH:
@@ -125,10 +130,10 @@ class Behind:
 def main(directory: Path) -> int:
     """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
     stream = sys.stdin.buffer
-    outputs: dict[str, Topic] = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
     try:
-        notes, scene, settings = pickle.load(stream)
-        outlet = Outlet(RosbagsTypes(), scene, settings)
+        notes, topics, scene, settings = pickle.load(stream)
+        outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
+        outlet = Outlet(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             while True:
@@ -138,8 +143,8 @@ def main(directory: Path) -> int:
                     return 0
                 for packed in batch:
                     report = unpack(packed)
-                    for key, message in outlet.fill(report):
-                        writer.write(key, report.stamp, message)
+                    for key, data in outlet.fill(report):
+                        writer.write_encoded(key, report.stamp, data)
     except BoomTwinError as error:
         print(error, file=sys.stderr)
     except OSError as error:

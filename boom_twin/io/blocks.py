@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from io import BytesIO
 from operator import attrgetter
 from pathlib import Path
@@ -20,6 +20,8 @@ from .damage import STUMBLES
 
 TOGETHER = 2**30
 """Bytes of messages that are held together, where the file does not keep them in order, at most."""
+MOST_TOGETHER = 2**22
+"""Messages, likewise: an empty one takes ten times its bytes."""
 
 
 def records(path: Path) -> Iterator[McapRecord]:
@@ -39,24 +41,24 @@ def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
     """
     by_time = attrgetter("log_time")
     if not chunks:
-        yield from sorted(_all_messages(path), key=by_time)
+        yield from sorted(_held(records(path)), key=by_time)
         return
     with path.open("rb") as file:
         for group in _overlapping(chunks):
             if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
                 raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
-            content = [record for index in group for record in _content(chunk_at(file, index))]
-            yield from sorted((record for record in content if isinstance(record, Message)), key=by_time)
+            content = (record for index in group for record in _content(chunk_at(file, index)))
+            yield from sorted(_held(content), key=by_time)
 
 
-def _all_messages(path: Path) -> Iterator[Message]:
-    """In the order of the file, as long as they may be held together."""
-    size = 0
-    for record in records(path):
+def _held(found: Iterable[McapRecord]) -> Iterator[Message]:
+    """The messages in the order of the file, as long as they may be held together."""
+    size = count = 0
+    for record in found:
         if isinstance(record, Message):
-            size += len(record.data)
-            if size > TOGETHER:
-                raise McapError(f"more than {TOGETHER} bytes of messages without an index")
+            size, count = size + len(record.data), count + 1
+            if size > TOGETHER or count > MOST_TOGETHER:
+                raise McapError(f"more than {TOGETHER} bytes or {MOST_TOGETHER} messages are out of order, or without an index")
             yield record
 
 

@@ -1,11 +1,11 @@
-"""Empty messages by type name, from whichever world makes them."""
+"""Empty messages of rosbags by type name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
 from operator import call
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -13,16 +13,6 @@ from rosbags.interfaces import Nodetype
 from .typestore import jazzy
 
 Maker = Callable[[], Any]
-
-
-class Types(Protocol):
-    """What `Outlet` needs of a world of messages: rosbags here, rclpy in ``boom_twin.ros``."""
-
-    def make(self, type_name: str) -> Any:
-        """A new message of ``package/msg/Name`` with every field zero or empty."""
-
-    def doubles(self, values: Iterable[float]) -> Any:
-        """`values` as this world wants a ``float64[]`` field."""
 
 
 class RosbagsTypes:

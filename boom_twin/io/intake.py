@@ -1,4 +1,4 @@
-"""From a message of the rig to a sample in the scene's order.
+"""From a message of the rig to a sample in the scene's order and units.
 
 Reads attributes only, so that messages of rclpy and of rosbags give the same numbers.
 """
@@ -6,13 +6,15 @@ Reads attributes only, so that messages of rclpy and of rosbags give the same nu
 from __future__ import annotations
 
 from collections import Counter
-from functools import lru_cache
+from collections.abc import Sequence
 from math import inf, isnan, nan
 from typing import Any
 
 import numpy as np
 
 from ..records import Sample, Stream
+from .sensors import factor
+from .topics import Topics, load_topics
 
 LIMIT = 1e6
 """Largest magnitude that is taken for a reading: no stroke (m), angle (rad) or acceleration (m/s^2) comes near it."""
@@ -20,7 +22,9 @@ LIMIT = 1e6
 LATEST = 2**31 * 1_000_000_000
 """Stamps (ns) from here on have no place in a message."""
 
-_PREFIX = {Stream.STROKES: "cylinder_", Stream.ANGLES: "joint_"}
+LONGEST = 1000
+"""Most names that are looked through; a machine has some tens of them."""
+
 _ABSENT = float("nan")
 """Known by identity: stands for a channel that the message does not have, unlike one that reads NaN."""
 
@@ -31,11 +35,27 @@ def stamp_of(msg: Any) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-@lru_cache(maxsize=64)
-def _places(names: tuple[str, ...], prefix: str, count: int) -> tuple[int, ...]:
-    """Where ``prefix1 .. prefixN`` stand in `names`, the first of equal ones; -1 for those that are not there."""
-    wanted = [f"{prefix}{number}" for number in range(1, count + 1)]
-    return tuple(names.index(name) if name in names else -1 for name in wanted)
+class _Channels:
+    """The channels of one stream: where they stand in a message, and what a reading of them means."""
+
+    def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
+        sensors = topics.sensors_of(stream, joints)
+        self.names = [sensor.name for sensor in sensors.values()]
+        self._scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
+        self._seen: Sequence[str] = ()
+        self._places = [-1] * len(self.names)
+
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Where the channels stand among `names`, the first of equal ones; -1 for those that are not there."""
+        if names != self._seen:
+            self._seen, first = names[:], {name: place for place, name in reversed(list(enumerate(names)))}
+            self._places = [first.get(name, -1) for name in self.names]
+        return self._places
+
+    def quantities(self, readings: list[float]) -> list[float]:
+        """Readings in SI units; what is absent stays so."""
+        pairs = zip(readings, self._scales, strict=True)
+        return [value if value is _ABSENT else (value - zero) * scale for value, (zero, scale) in pairs]
 
 
 class Intake:
@@ -43,8 +63,10 @@ class Intake:
 
     Parameters
     ----------
-    count : int
+    joints : int
         Number of joints of the scene, n.
+    topics : Topics, optional
+        How the rig's sensors read; as usual by default.
 
     Attributes
     ----------
@@ -56,7 +78,10 @@ class Intake:
         ``missing names``
             Some of the scene's channels are not in the message; they are NaN.
         ``unknown names only``
-            None of the scene's channels is in the message; no sample.
+            None of the scene's channels is in the message; no sample. A message of a topic that strokes and angles share
+            may have only one kind of them, which is nothing odd.
+        ``too many names``
+            More than `LONGEST`; no sample.
         ``not finite``
             NaN or infinity; NaN in the sample.
         ``absurd magnitude``
@@ -65,12 +90,17 @@ class Intake:
             An Imu that says by ``linear_acceleration_covariance[0] = -1`` that it has none (REP-145); no sample.
         ``no usable value``
             Nothing was left; no sample.
+        ``no stamp``
+            Zero, which a driver leaves that does not set it; no sample.
         ``impossible stamp``
             Before 1970, or more seconds than a message can hold; no sample.
     """
 
-    def __init__(self, count: int) -> None:
-        self._count = count
+    def __init__(self, joints: int, topics: Topics | None = None) -> None:
+        topics = topics or load_topics()
+        self._channels = {stream: _Channels(topics, stream, joints) for stream in Stream}
+        pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
+        self._beside = pair if topics.is_shared else {}
         self.oddities: Counter[str] = Counter()
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
@@ -90,39 +120,44 @@ class Intake:
         Sample or None
             None when no value of it can be used.
         """
-        if not 0 <= stamp_ns < LATEST:
-            self.oddities["impossible stamp"] += 1
+        if not 0 < stamp_ns < LATEST:
+            self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw = self._force(msg) if stream is Stream.IMU else self._positions(msg, _PREFIX[stream])
+        raw = self._force(msg) if stream is Stream.IMU else self._positions(msg, stream)
         if raw is None:
             return None
-        values = [value if -LIMIT <= value <= LIMIT else self._reject(value) for value in raw]
+        quantities = self._channels[stream].quantities(raw)
+        values = [value if -LIMIT <= value <= LIMIT else self._reject(value) for value in quantities]
         if all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
         return Sample(stream, stamp_ns, np.array(values, dtype=np.float64))
 
-    def _positions(self, msg: Any, prefix: str) -> list[float] | None:
-        """Positions in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
-        names, positions = tuple(msg.name), msg.position
-        places = _places(names, prefix, self._count)
+    def _positions(self, msg: Any, stream: Stream) -> list[float] | None:
+        """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
+        names, positions = msg.name, msg.position
+        if len(names) > LONGEST:
+            self.oddities["too many names"] += 1
+            return None
+        places = self._channels[stream].places(names)
+        if max(places) < 0:
+            beside = self._beside.get(stream)
+            if beside is None or max(self._channels[beside].places(names)) < 0:
+                self.oddities["unknown names only"] += 1
+            return None
         if len(positions) != len(names):
             self.oddities["unequal arrays"] += 1
         if -1 in places:
-            if max(places) < 0:
-                self.oddities["unknown names only"] += 1
-                return None
             self.oddities["missing names"] += 1
         end = len(positions)
         return [float(positions[place]) if 0 <= place < end else _ABSENT for place in places]
 
     def _force(self, msg: Any) -> list[float] | None:
-        """Specific force along x and z."""
+        """Specific force along the axes that are taken for the tip's x and z."""
         if msg.linear_acceleration_covariance[0] == -1.0:
             self.oddities["no measurement"] += 1
             return None
-        force = msg.linear_acceleration
-        return [float(force.x), float(force.z)]
+        return [float(getattr(msg.linear_acceleration, axis)) for axis in self._channels[Stream.IMU].names]
 
     def _reject(self, value: float) -> float:
         """NaN, and a count of why; a channel that is absent has been counted before."""

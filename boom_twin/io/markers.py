@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import struct
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..records import Array, Prediction
-from .places import fill_header, fill_xz
+from .factory import RosbagsTypes
+from .places import fill_xz
+from .template import Holes, Template, stamped
 from .topics import TYPES, Output
 
-if TYPE_CHECKING:
-    from .factory import Types
-
+POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
 LIFETIME = 1
 """Seconds that a marker stays when no other comes."""
@@ -46,47 +47,50 @@ class ShapeMarkers:
 
     Parameters
     ----------
-    types : Types
-        Makes the empty messages.
     exaggeration : float
         Factor of the displacements.
     force_scale : float
         Force that has the full colour, N.
     """
 
-    def __init__(self, types: Types, exaggeration: float, force_scale: float) -> None:
-        self._types, self._factor, self._scale = types, exaggeration, force_scale
-        self._message = types.make(TYPES[Output.SHAPE])
-        self._boom = self._line("boom", 0, 0.12, BOOM)
-        self._large = self._line("boom_exaggerated", 0, 0.06, LARGE)
-        self._text = self._label("boom_exaggerated", 1, f"displacements x {exaggeration:g}")
-        self._ghost = self._line("boom_undeflected", 0, 0.06, GHOST)
-        self._trace = self._line("tip_trace", 0, 0.03, TIP)
-        self._cylinders: list[Any] = []
-        self._past: deque[tuple[int, Any]] = deque()
+    def __init__(self, exaggeration: float, force_scale: float) -> None:
+        self._types, self._factor, self._scale = RosbagsTypes(), exaggeration, force_scale
+        self._template: Template | None = None
+        self._past: deque[tuple[int, bytes]] = deque()
 
-    def fill(self, prediction: Prediction) -> Any:
-        """The message of a prediction that has a shape; it is filled anew at the next call."""
+    def fill(self, prediction: Prediction) -> bytes:
+        """The encoded message of a prediction that has a shape."""
         line, straight, pins = prediction.shape, prediction.undeflected, prediction.pins
         assert line is not None and straight is not None and pins is not None
         large = straight + self._factor * (line - straight)
-        for marker, points in ((self._boom, line), (self._large, large), (self._ghost, straight)):
-            self._put(marker, points)
-        fill_xz(self._text.pose.position, large[-1] + (0.0, 2.0 * TEXT_HEIGHT))
-        self._draw_cylinders(pins, prediction.cylinder_forces)
+        label = large[-1] + (0.0, 2.0 * TEXT_HEIGHT)
+        if self._template is None:
+            self._template = self._new_template(len(line), len(pins))
+        numbers = np.concatenate([part.ravel() for part in (line, large, label, straight, pins, prediction.tip_position)])
+        colours = [value for force in prediction.cylinder_forces for value in force_colour(float(force) / self._scale)]
         self._extend_trace(prediction.stamp, prediction.tip_position)
-        markers = [self._boom, self._large, self._text, self._ghost, *self._cylinders, self._trace]
-        for marker in markers:
-            fill_header(marker.header, prediction.stamp)
-        self._message.markers = markers
-        return self._message
+        return self._with_trace(self._template.fill(prediction.stamp, numbers, colours))
 
-    def _draw_cylinders(self, pins: Array, forces: Array) -> None:
-        while len(self._cylinders) < len(pins):
-            self._cylinders.append(self._line("cylinders", len(self._cylinders) + 1, 0.09, GHOST))
-        for marker, ends, force in zip(self._cylinders, pins.reshape(-1, 2, 2), forces, strict=True):
-            self._put(marker, ends)
-            _paint(marker, force_colour(float(force) / self._scale))
+    def _new_template(self, points: int, cylinders: int) -> Template:
+        """The message with a trace of one point; its lines have so many points."""
+        msg, holes = self._types.make(TYPES[Output.SHAPE]), Holes()
+        msg.markers = [
+            self._line("boom", 0, 0.12, BOOM, holes, points),
+            self._line("boom_exaggerated", 0, 0.06, LARGE, holes, points),
+            self._label("boom_exaggerated", 1, f"displacements x {self._factor:g}", holes),
+            self._line("boom_undeflected", 0, 0.06, GHOST, holes, points),
+            *(self._line("cylinders", i + 1, 0.09, None, holes, 2) for i in range(cylinders)),
+            self._line("tip_trace", 0, 0.03, TIP, holes, 1),
+        ]
+        return Template(TYPES[Output.SHAPE], msg, holes)
+
+    def _with_trace(self, data: bytes) -> bytes:
+        """All points of the trace instead of the single one; 24 bytes each, so nothing behind them is aligned anew."""
+        assert self._template is not None
+        point = self._template.byte_of(-2)
+        count = point - 4 if data[point - 4] else point - 8  # before the padding, if there is any
+        head, padding, tail = data[:count], data[count + 4 : point], data[point + POINT.size :]
+        return b"".join([head, len(self._past).to_bytes(4, "little"), padding, *(place for _, place in self._past), tail])
 
     def _extend_trace(self, stamp: int, tip: Array) -> None:
         """Forget what is too old, and what is to come where time was set back; add the newest."""
@@ -94,33 +98,29 @@ class ShapeMarkers:
             self._past.pop()
         while self._past and self._past[0][0] < stamp - TRACE:
             self._past.popleft()
-        point = self._types.make("geometry_msgs/msg/Point")
-        fill_xz(point, tip)
-        self._past.append((stamp, point))
-        self._trace.points = [place for _, place in self._past]
+        self._past.append((stamp, POINT.pack(tip[0], 0.0, tip[1])))
 
-    def _put(self, marker: Any, points: Array) -> None:
-        """Give a line its points."""
-        if len(marker.points) != len(points):
-            marker.points = [self._types.make("geometry_msgs/msg/Point") for _ in points]
-        for point, (x, y) in zip(marker.points, points.tolist(), strict=True):
-            point.x, point.z = x, y
-
-    def _line(self, namespace: str, number: int, width: float, colour: Colour) -> Any:
-        marker = self._marker(namespace, number, LINE_STRIP, colour)
+    def _line(self, namespace: str, number: int, width: float, colour: Colour | None, holes: Holes, points: int) -> Any:
+        """A line of so many points; without a colour, that is one of four holes."""
+        marker = self._marker(namespace, number, LINE_STRIP, colour or tuple(holes.single() for _ in range(4)))
         marker.scale.x = width
+        marker.points = [self._types.make("geometry_msgs/msg/Point") for _ in range(points)]
+        for point in marker.points:
+            fill_xz(point, holes.row(2))
         return marker
 
-    def _label(self, namespace: str, number: int, text: str) -> Any:
+    def _label(self, namespace: str, number: int, text: str, holes: Holes) -> Any:
         marker = self._marker(namespace, number, TEXT, LARGE)
         marker.scale.z, marker.text = TEXT_HEIGHT, text
+        fill_xz(marker.pose.position, holes.row(2))
         return marker
 
-    def _marker(self, namespace: str, number: int, kind: int, colour: Colour) -> Any:
+    def _marker(self, namespace: str, number: int, kind: int, colour: tuple[float, ...]) -> Any:
         marker = self._types.make("visualization_msgs/msg/Marker")
+        stamped(marker.header)
         marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, ADD
         marker.pose.orientation.w, marker.lifetime.sec = 1.0, LIFETIME
-        _paint(marker, colour)
+        marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour
         return marker
 
 
@@ -132,6 +132,3 @@ def force_colour(share: float) -> Colour:
     red, green, blue = (NO_FORCE + min(abs(share), 1.0) * (end - NO_FORCE)).tolist()
     return red, green, blue, 1.0
 
-
-def _paint(marker: Any, colour: Colour) -> None:
-    marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour

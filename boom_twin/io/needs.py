@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -10,14 +9,18 @@ from ..errors import BagError
 from ..records import Stream
 from .definitions import check_encoding
 from .info import BagInfo
+from .mapping import mapping_of
 from .reader import check_topic
 from .tally import NANO, Tally
-from .topics import load_topics
+from .topics import Topics
 
 SKEW = 0.05
 """Difference (s) of two streams' clocks that is worth a word: a boom moves by centimetres in it."""
 
-_NAMES = {Stream.STROKES: "cylinder_", Stream.ANGLES: "joint_"}
+JOINT_STATES = (Stream.STROKES, Stream.ANGLES)
+MOST_JOINTS = 99
+"""As far as numbers of channels are looked for where no scene tells it."""
+
 _WITHOUT = {
     Stream.STROKES: "nothing can be replayed",
     Stream.ANGLES: "there are no joint residuals",
@@ -34,30 +37,37 @@ def names_missing(info: BagInfo, joints: int | None = None) -> list[str]:
     joints : int, optional
         Of the scene; by default the highest number that occurs.
     """
-    last = joints or _highest(info)
-    return [
-        f"{name} is not in {lacking} of {sum(tally.names.values())} messages of {tally.name}"
-        for stream, tally in _joint_states(info)
-        for name in (f"{_NAMES[stream]}{number}" for number in range(1, last + 1))
-        if (lacking := sum(count for names, count in tally.names.items() if name not in names))
-    ]
+    topics = mapping_of(info.session.path).topics
+    last = joints or _highest(info, topics)
+    found: list[str] = []
+    for stream, tally in _joint_states(info, topics):
+        own = _names(topics, stream, last)
+        its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
+        for name in own:
+            if lacking := sum(count for names, count in its.items() if name not in names):
+                found.append(f"{name} is not in {lacking} of {sum(its.values())} messages of {tally.name}")
+    return found
 
 
 def names_extra(info: BagInfo, joints: int | None = None) -> list[str]:
     """Names that no replay uses, one sentence for each."""
-    last = joints or _highest(info)
+    topics = mapping_of(info.session.path).topics
+    last = joints or _highest(info, topics)
+    used: dict[str, set[str]] = {}
+    for stream, tally in _joint_states(info, topics):
+        used.setdefault(tally.name, set()).update(_names(topics, stream, last))
+    tallies = {tally.name: tally for _, tally in _joint_states(info, topics)}
     return [
-        f"{name} of {tally.name} is not used"
-        for stream, tally in _joint_states(info)
-        for name in sorted({name for names in tally.names for name in names})
-        if name not in [f"{_NAMES[stream]}{number}" for number in range(1, last + 1)]
+        f"{name} of {topic} is not used"
+        for topic, tally in tallies.items()
+        for name in sorted({name for names in tally.names for name in names} - used[topic])
     ]
 
 
 def missing(info: BagInfo, joints: int | None = None) -> list[str]:
     """What is missing for a replay, one sentence for each, the worst first; empty when all is there."""
     found: list[str] = []
-    for stream, topic in load_topics().inputs.items():
+    for stream, topic in mapping_of(info.session.path).topics.inputs.items():
         try:
             name = check_topic(info.session, topic.name, topic.type).name
             for file in info.session.files:
@@ -69,7 +79,7 @@ def missing(info: BagInfo, joints: int | None = None) -> list[str]:
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)
     lacking = names_missing(info, joints)
-    remedy = "The channel stays empty there: give the driver's names as topics.yaml says."
+    remedy = "The channel stays empty there: name the driver's own names in a mapping, see topics.yaml."
     return found + [f"{sentence}. {remedy}" for sentence in lacking]
 
 
@@ -80,7 +90,8 @@ def remarks(info: BagInfo) -> list[str]:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
     if info.synthetic is None:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
-    known = [tally for topic in load_topics().inputs.values() if (tally := info.tally(topic.name)) and tally.skewed]
+    inputs = mapping_of(info.session.path).topics.inputs.values()
+    known = [tally for topic in inputs if (tally := info.tally(topic.name)) and tally.skewed]
     for one, other in pairwise(known):
         apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO
         if abs(apart) > SKEW:
@@ -104,19 +115,23 @@ def _stamps(tally: Tally) -> Iterator[str]:
         )
 
 
-def _joint_states(info: BagInfo) -> Iterator[tuple[Stream, Tally]]:
-    for stream, topic in load_topics().inputs.items():
-        if stream in _NAMES and (tally := info.tally(topic.name)) is not None and tally.named:
+def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally]]:
+    for stream in JOINT_STATES:
+        if (tally := info.tally(topics.inputs[stream].name)) is not None and tally.named:
             yield stream, tally
 
 
-def _highest(info: BagInfo) -> int:
-    """The highest number of a cylinder or joint that occurs, at most 99."""
+def _names(topics: Topics, stream: Stream, joints: int) -> list[str]:
+    """Under which names the channels of a stream are published."""
+    return [sensor.name for sensor in topics.sensors_of(stream, joints).values()]
+
+
+def _highest(info: BagInfo, topics: Topics) -> int:
+    """The highest number of a cylinder or joint that occurs."""
     numbers = [
-        int(match[1])
-        for stream, tally in _joint_states(info)
-        for names in tally.names
-        for name in names
-        if (match := re.fullmatch(rf"{_NAMES[stream]}([1-9]\d?)", name))
+        number
+        for stream, tally in _joint_states(info, topics)
+        for number, name in enumerate(_names(topics, stream, MOST_JOINTS), start=1)
+        if any(name in names for names in tally.names)
     ]
     return max(numbers, default=0)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic import ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
+from ..plain import plain
 from .topics import Qos
 
 DEEPEST = 10_000
@@ -28,8 +27,8 @@ def profiles(value: Any) -> list[Qos]:
     """
     if isinstance(value, str):
         try:
-            value = YAML(typ="safe").load(value) if len(value) <= _LONGEST else []
-        except (YAMLError, RecursionError, ValueError):
+            value = plain(value) if len(value) <= _LONGEST else []
+        except ValueError:
             return []
     found = [_profile(entry) for entry in (value if isinstance(value, list) else []) if isinstance(entry, dict)]
     return [qos for qos in found if qos is not None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from ..records import Array
@@ -15,6 +16,6 @@ def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
     header.frame_id = frame
 
 
-def fill_xz(target: Any, values: Array) -> None:
+def fill_xz(target: Any, values: Array | Sequence[float]) -> None:
     """Model x to x, model y to z; y is 0."""
     target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

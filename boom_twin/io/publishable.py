@@ -8,9 +8,10 @@ from typing import Any
 
 from ..errors import BagError
 from ..records import Stream
+from .mapping import mapping_of
 from .offered import profiles
 from .reader import Session, TopicInfo, check_topic
-from .topics import Qos, load_topics
+from .topics import Qos, Topics
 
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)
 
@@ -32,18 +33,19 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
     BagError
         One of them is not there, empty, or an input of another type.
     """
+    topics = mapping_of(session.path).topics
     if names is None:
-        chosen = _inputs(session)
+        chosen = _inputs(session, topics)
     else:
         found = [check_topic(session, name, _type(session, name)) for name in names]
         chosen = {topic.name: topic for topic in found}
-    return [Publishable(name, topic.type, _qos(session, topic)) for name, topic in chosen.items()]
+    return [Publishable(name, topic.type, _qos(session, topic, topics)) for name, topic in chosen.items()]
 
 
-def _inputs(session: Session) -> dict[str, TopicInfo]:
-    """By the names of ``topics.yaml``, which may be relative and so be put into a namespace."""
+def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
+    """By the names of the mapping, which may be relative and so be put into a namespace."""
     found: dict[str, TopicInfo] = {}
-    for stream, topic in load_topics().inputs.items():
+    for stream, topic in topics.inputs.items():
         info = session.find(topic.name)
         if stream is Stream.STROKES or (info is not None and info.count):
             found[topic.name] = check_topic(session, topic.name, topic.type)
@@ -58,11 +60,11 @@ def _type(session: Session, name: str) -> str:
     return info.type if info else ""
 
 
-def _qos(session: Session, topic: TopicInfo) -> Qos:
-    """What was offered by the metadata, else by the channels, else as ``topics.yaml`` has it; the strongest of several."""
+def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
+    """What was offered by the metadata, else by the channels, else as the mapping has it; the strongest of several."""
     offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
     if not offered:
-        known = (each for each in load_topics().inputs.values() if each.absolute == topic.name)
+        known = (each for each in topics.inputs.values() if each.absolute == topic.name)
         return next((each.qos for each in known), _USUAL)
     return Qos(
         reliability="reliable" if any(qos.reliability == "reliable" for qos in offered) else "best_effort",

@@ -9,6 +9,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from ..errors import BagError
+from ..plain import LARGEST
 from .bagmeta import FILE_NAME, BagMetadata
 from .bagwriter import BagWriter, file_name
 from .blocks import heads
@@ -20,6 +21,7 @@ from .outcome import Outcome
 from .reader import scan
 from .recorded import Recorded
 from .salvage import Fault, walk
+from .sheet import FILE_NAME as SHEET
 
 
 def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
@@ -60,6 +62,7 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
     if not bag.counts.total():
         _remove(out)
         raise BagError(f"{path}: nothing can be saved: {_first(outcome)}. {out} was not kept.")
+    _copy_sheet(path, out)
     outcome.saved = _count(out)
     outcome.lost = _lost(outcome.saved, legends, metadata, files)
     return outcome
@@ -108,6 +111,13 @@ def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorde
     if identity not in keys:
         (keys[identity],) = bag.add(topic)
     return keys[identity]
+
+
+def _copy_sheet(path: Path, out: Path) -> None:
+    """Keep what the session was recorded with, for a replay: scene and mapping."""
+    sheet = (path if path.is_dir() else path.parent) / SHEET
+    if sheet.is_file() and sheet.stat().st_size <= LARGEST:
+        (out / SHEET).write_bytes(sheet.read_bytes())
 
 
 def _count(out: Path) -> Counter[str]:

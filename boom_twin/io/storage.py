@@ -5,15 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from queue import Empty, SimpleQueue
+from shutil import disk_usage
 from threading import Thread
 
 from ..errors import BagError
+from ..watch.recording import DiskState
 from .bagwriter import BagWriter
 from .recorded import Recorded
+from .syncer import Syncer
 
-FLUSH = 0.5
-"""Seconds after which what was recorded is on the disk: a kill costs at most this and one write."""
+FLUSH = 0.25
+"""Seconds after which what was recorded is out of this process, and asked onto the disk: a kill costs at most this."""
 STALL = 5.0
 """Seconds without an answer from the disk after which that is told."""
 PATIENCE = 30.0
@@ -41,7 +45,7 @@ class Split:
 
 
 class Storage:
-    """Takes messages at any pace; they are on the disk `FLUSH` later.
+    """Takes messages at any pace; `FLUSH` later they survive this process, and the loss of power as soon as the disk has them.
 
     Parameters
     ----------
@@ -56,7 +60,10 @@ class Storage:
         self._bag, self._split, self._tell = bag, split, tell
         self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
         self._put = self._taken = 0  # bytes; each is changed by one thread only
-        self._alive = time.monotonic()
+        self._began = self._alive = time.monotonic()
+        self._syncer = Syncer()
+        bag.sync = lambda file: self._syncer.put(file, self._taken)
+        self._free = self._written = 0
         self._is_late = False
         self._error: BaseException | None = None
         self._topics = 0
@@ -84,7 +91,7 @@ class Storage:
         """
         if self._error is not None:
             raise self._error
-        silent = time.monotonic() - self._alive
+        silent = max(time.monotonic() - self._alive, self._syncer.waits)
         if silent > STALL and not self._is_late:
             self._tell(f"{self._bag.directory}: the disk has not answered for {silent:.0f} s; messages wait in memory")
         elif silent < STALL and self._is_late:
@@ -92,6 +99,18 @@ class Storage:
         self._is_late = silent > STALL
         if self._put - self._taken > MOST:
             raise self._stalled(f"{MOST // 2**20} MiB of messages wait in memory")
+
+    def state(self) -> DiskState:
+        """What is on the disk."""
+        now = time.monotonic()
+        pace = self._written / (now - self._began)
+        return DiskState(
+            lag=now - self._syncer.time if self._put > self._syncer.done else 0.0,
+            waiting=self._put - self._taken,
+            written=self._written,
+            free=self._free,
+            left=self._free / pace if pace else inf,
+        )
 
     def close(self) -> list[int]:
         """Complete the bag; gives the messages written by key.
@@ -120,17 +139,19 @@ class Storage:
         try:
             self._serve()
             self._bag.close()
+            self._syncer.drain()
+            self._check_disk()
         except Exception as error:  # told where it can be told: by `check` and `close`
             self._error = error
             self._bag.abandon()
 
     def _serve(self) -> None:
         """Write until the end, flushing now and then."""
-        due = time.monotonic() + FLUSH
+        due = time.monotonic()
         while True:
             self._alive = time.monotonic()
             if self._alive >= due:
-                self._bag.flush()
+                self._flush()
                 due = time.monotonic() + FLUSH
             try:
                 item = self._queue.get(timeout=max(due - time.monotonic(), 0.0))
@@ -142,6 +163,16 @@ class Storage:
                 self._bag.add(item)
             else:
                 self._write(item)
+
+    def _flush(self) -> None:
+        """Ask onto the disk what was taken; its room is asked for here, because a stalled disk holds up that too."""
+        self._syncer.ask(self._bag.flush(), self._taken)
+        self._check_disk()
+        self._written, self._free = self._bag.written, disk_usage(self._bag.directory).free
+
+    def _check_disk(self) -> None:
+        if self._syncer.error is not None:
+            raise self._bag.fault(self._syncer.error)
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message

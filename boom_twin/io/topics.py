@@ -1,18 +1,18 @@
-"""The topics by role: names, types, QoS, units and meanings, as ``msg_config/topics.yaml`` lists them."""
+"""A mapping: topics by role with their QoS, and the sensors in them, as ``msg_config/topics.yaml`` lists them."""
 
 from __future__ import annotations
 
 from enum import StrEnum
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
 from ..errors import UsageError
-from ..records import Stream
+from ..plain import read_plain
+from ..records import Mount, Stream
+from .sensors import Sensor, channels, usual
 
 NODE = "boom_twin"
 DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
@@ -27,6 +27,7 @@ class Output(StrEnum):
     JOINT_STATES = "joint_states"
     RESIDUALS = "residuals"
     SHAPE = "shape"
+    CHANGES = "changes"
     DIAGNOSTICS = "diagnostics"
 
 
@@ -40,6 +41,7 @@ TYPES: dict[Stream | Output, str] = {
     Output.JOINT_STATES: "sensor_msgs/msg/JointState",
     Output.RESIDUALS: "sensor_msgs/msg/JointState",
     Output.SHAPE: "visualization_msgs/msg/MarkerArray",
+    Output.CHANGES: "sensor_msgs/msg/JointState",
     Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 """The one message type that the program reads or fills for each role."""
@@ -76,40 +78,41 @@ class Topic(_Entry):
 
 
 class Topics(_Entry):
-    """All topics by role."""
+    """All topics by role, and the sensors that are not as usual by channel; see `boom_twin.io.mapping` for how it is read."""
 
     inputs: dict[Stream, Topic]
     outputs: dict[Output, Topic]
+    sensors: dict[str, Sensor] = {}
 
-    @model_validator(mode="after")
-    def _complete(self) -> Topics:
-        present: dict[Stream | Output, Topic] = dict(self.inputs.items() | self.outputs.items())
-        for role, expected in TYPES.items():
-            if role not in present:
-                raise ValueError(f"{role.value} is missing: every topic must be listed; copy it from the default file")
-            if present[role].type != expected:
-                raise ValueError(
-                    f"{role.value}.type = {present[role].type!r}: only {expected} is read or filled there; restore it"
-                )
-        names = [topic.absolute for topic in present.values()]
-        if twice := {name for name in names if names.count(name) > 1}:
-            raise ValueError(f"name = {sorted(twice)}: used by two topics; give each its own name")
-        return self
+    @property
+    def is_shared(self) -> bool:
+        """Whether strokes and angles come by one topic."""
+        return self.inputs[Stream.STROKES].absolute == self.inputs[Stream.ANGLES].absolute
+
+    @property
+    def heard(self) -> dict[str, list[Stream]]:
+        """The streams of every input topic, by its name; strokes first."""
+        found: dict[str, list[Stream]] = {}
+        for stream in Stream:
+            found.setdefault(self.inputs[stream].name, []).append(stream)
+        return found
+
+    def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
+        """The sensors of a stream by channel, in the order of its samples."""
+        return {name: self.sensors.get(name) or Sensor(**usual(name)) for name in channels(stream, joints)}
+
+    def mounts(self, joints: int) -> list[Mount | None]:
+        """Where the inclinometers of a boom sit, one entry for each joint; None is an encoder."""
+        return [sensor.absolute for sensor in self.sensors_of(Stream.ANGLES, joints).values()]
 
 
-@lru_cache(maxsize=8)
-def load_topics(path: Path = DEFAULT_FILE) -> Topics:
-    """The topics of one YAML file, read once.
+@cache
+def load_topics() -> Topics:
+    """The topics of the package, read once; sensors as usual."""
+    return Topics.model_validate(default_document())
 
-    Raises
-    ------
-    UsageError
-        If the file cannot be read, or an entry is unknown, missing or outside its bounds: all faults, with their paths.
-    """
-    try:
-        return Topics.model_validate(YAML(typ="safe").load(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise UsageError(f"{path}: no readable YAML file of topics ({error}). Start from the default file.") from error
-    except ValidationError as error:
-        faults = [f"  {'.'.join(map(str, fault['loc'])) or 'file'}: {fault['msg']}" for fault in error.errors()]
-        raise UsageError("\n".join([f"{path}: topics that cannot be used", *faults])) from error
+
+@cache
+def default_document() -> Any:
+    """What the package's own file says; not to be changed."""
+    return read_plain(DEFAULT_FILE, UsageError, "Install the package anew.")

@@ -24,6 +24,7 @@ ARGUMENTS = [
         default_value=PathJoinSubstitution([CONFIG, "twin.yaml"]),
         description="parameters of the node; `scene` above wins",
     ),
+    DeclareLaunchArgument("namespace", default_value="", description="of the node and of all its topics, for several booms"),
     DeclareLaunchArgument("use_sim_time", default_value="false", description="time from /clock instead of the machine's"),
     DeclareLaunchArgument("rviz", default_value="false", description="start RViz"),
     DeclareLaunchArgument(
@@ -50,6 +51,7 @@ def twin() -> Node:
         package="boom_twin",
         executable="twin_node",
         name="boom_twin",
+        namespace=LaunchConfiguration("namespace"),
         output="screen",
         parameters=[LaunchConfiguration("params_file"), own],
     )
@@ -64,6 +66,7 @@ def state_publisher(context: LaunchContext) -> list[LaunchDescriptionEntity]:
         Node(
             package="robot_state_publisher",
             executable="robot_state_publisher",
+            namespace=LaunchConfiguration("namespace"),
             parameters=[{"robot_description": description, "use_sim_time": sim_time}],
             remappings=[("joint_states", "boom_twin/joint_states")],
         )

@@ -8,9 +8,9 @@ The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^
 c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
 radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
 K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.notation`); the laws differ
-in chi, a function of the coefficient of restitution each. The bracket is kept above `LEAST_SHARE`: nothing pulls, and a journal
-without mass, which leaves as fast as it likes, is still held somewhere. With g' in the bracket the rebound does not depend on how d is
-smoothed. The elastic part is convex in delta: at rest a pin has one place.
+in chi, a function of the coefficient of restitution each. The bracket is kept above `LEAST_SHARE`: nothing pulls, and a
+journal without mass, which leaves as fast as it likes, is still held somewhere. With g' in the bracket the rebound does not
+depend on how d is smoothed. The elastic part is convex in delta: at rest a pin has one place.
 
 Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2),
 with F of the step before, which leaves the tangent symmetric.

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ROSInterruptException
@@ -23,7 +21,7 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
     """rclpy, started with the process's or the given ROS arguments, and shut down at the end.
 
     rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
-    is going. What a signal does is up to Python, see `on_stop_signal`.
+    is going. What a signal does is up to Python, see `boom_twin.ros.stop`.
 
     Raises
     ------
@@ -38,24 +36,6 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
         yield
     finally:
         rclpy.try_shutdown()
-
-
-def on_stop_signal(act: Callable[[], None]) -> None:
-    """From now on the first SIGINT or SIGTERM calls `act`, and further ones do nothing."""
-    known = (signal.SIGINT, signal.SIGTERM)
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        for each in known:
-            signal.signal(each, signal.SIG_IGN)
-        act()
-
-    for each in known:
-        signal.signal(each, stop)
-
-
-def interrupt() -> None:
-    """Raise KeyboardInterrupt."""
-    raise KeyboardInterrupt
 
 
 def one_line(error: BaseException) -> str:

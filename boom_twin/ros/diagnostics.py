@@ -1,29 +1,29 @@
-"""State of the node on ``/diagnostics`` (REP-107), once a second and on every change of level."""
+"""State of the node on ``/diagnostics``, once a second and as soon as the model fails or an input falls silent."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..io.intake import Intake
 from ..io.topics import Output, Topics
-from ..records import Report, Stream
-from ..twin import EVENTS, Twin
-from .input_watch import InputWatch, seconds
-from .qos import qos_profile
+from ..records import Report, Sample, Stream
+from ..thresholds import Thresholds
+from ..twin import EVENTS, TOLD_AT_ONCE, Twin
+from ..watch.sensors import sensors_of
+from ..watch.twin import TwinWatch
+from .board import Board
+from .peers import PeerBook
 
-TICK = 0.1  # s of steady time between looks at the state
-PERIOD = 10  # ticks from one message to the next, where no level changes
-HOLD = 1.0  # s by the node's clock for which a failure of the model is shown
-
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+TICK = 0.1  # s of steady time between looks at whether something is urgent
+PERIOD = 10  # ticks from one message to the next, where nothing is
+NANO = 1e-9
 
 
 class Diagnostics:
-    """Watches the inputs and the model of one node; nothing is computed or logged for a single message.
+    """Watches one node; nothing is computed or logged for a single message.
 
     Parameters
     ----------
@@ -33,29 +33,33 @@ class Diagnostics:
 
     def __init__(self, node: Node, topics: Topics) -> None:
         self._node = node
-        self._inputs = {stream: InputWatch(topic) for stream, topic in topics.inputs.items()}
-        topic = topics.outputs[Output.DIAGNOSTICS]
-        self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
+        self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
+        self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
+        self._board = Board(node, topics.outputs[Output.DIAGNOSTICS])
+        self._peers = PeerBook(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._ticks, self._published = 0, self._now()
-        self._levels: dict[str, bytes] = {}
-        self._oddities_told: set[str] = set()
-        self._twin: Twin | None = None
-        self._intake: Intake | None = None
+        self._ticks, self._active = 0, False
+        self._watch = TwinWatch({}, {}, Thresholds())
+        self._counts: dict[str, Mapping[str, int]] = {}
         self._scene = ""
-        self._rest()
+        self._told: set[str] = set()
 
     def watch(self, twin: Twin, intake: Intake, scene: str) -> None:
         """The node is configured with these."""
-        self._twin, self._intake, self._scene = twin, intake, scene
-        self._oddities_told.clear()
+        sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
+        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
+        self._counts = {"samples": twin.counts, "messages": intake.oddities}
+        self._scene = scene
+        self._told.clear()
+
+    def tune(self, thresholds: Thresholds) -> None:
+        """Judge by these from now on."""
+        self._watch.thresholds = thresholds
 
     def start(self) -> None:
         """The node is active: from now on an input that is silent is stale."""
-        self._rest()
+        self._watch.begin()
         self._active = True
-        for entry in self._inputs.values():
-            entry.begin(self._now())
 
     def stop(self) -> None:
         """The node is active no more."""
@@ -63,105 +67,47 @@ class Diagnostics:
 
     def seen(self, stream: Stream, stamp: int) -> None:
         """A message came."""
-        self._inputs[stream].seen(stamp)
+        self._watch.seen(stream, stamp)
 
-    def reported(self, report: Report) -> None:
-        """The twin took a sample."""
-        if report.prediction is not None:
-            self._predictions += 1
-        elif report.status != "ok":
-            self._fail(report.status)
+    def took(self, sample: Sample, report: Report, duration: float) -> None:
+        """The twin made `report` of `sample` in so many seconds."""
+        self._watch.took(sample, report, duration)
 
     def broken(self, stream: Stream, error: Exception) -> None:
         """A message could not be handled at all."""
-        self._broken += 1
-        self._fail(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
-
-    def _rest(self) -> None:
-        self._active = False
-        self._predictions = self._broken = 0
-        self._failure = ""
-        self._failed_at = 0.0
-
-    def _fail(self, reason: str) -> None:
-        self._failure, self._failed_at = reason, self._now()
-
-    def _now(self) -> float:
-        """Seconds of the node's clock."""
-        return float(self._node.get_clock().now().nanoseconds) * 1e-9
+        self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
 
     def _tick(self) -> None:
-        now = self._now()
-        for entry in self._inputs.values():
-            entry.look(now)
-        self._tell_oddities()
+        """Look up one topic's other ends; look at everything, if it is due."""
+        self._peers.look()
         self._ticks += 1
-        due = self._ticks >= PERIOD
-        if due:
+        if self._ticks >= PERIOD or (self._active and self._watch.is_urgent()):
             self._ticks = 0
-            for entry in self._inputs.values():
-                entry.count_rate(now - self._published)
-            self._published = now
-        statuses = [self._model(now), *(self._input(entry, now) for entry in self._inputs.values())]
-        if self._tell_changes(statuses) or due:
-            message = DiagnosticArray(status=statuses)
-            message.header.stamp = self._node.get_clock().now().to_msg()
-            self._publisher.publish(message)
+            self._look()
 
-    def _model(self, now: float) -> DiagnosticStatus:
-        """State of the twin, with all its counts."""
-        level, message = self._judge(now)
-        newest = self._inputs[Stream.STROKES].newest
-        values: dict[str, Any] = {
-            "scene": self._scene,
-            "predictions": self._predictions,
-            "newest stroke stamp": seconds(newest),
-            "unhandled messages": self._broken,
-        }
-        if self._twin is not None and self._intake is not None:
-            values |= {f"samples: {name}": self._twin.counts[name] for name in EVENTS}
-            values |= {f"messages: {name}": count for name, count in sorted(self._intake.oddities.items())}
-        return self._status("model", level, message, values)
-
-    def _judge(self, now: float) -> tuple[bytes, str]:
-        if not self._active:
-            return WARN, "not active"
-        if self._failure and 0.0 <= now - self._failed_at <= HOLD:
-            return ERROR, self._failure
-        if self._predictions == 0 or self._inputs[Stream.STROKES].is_silent(now):
-            return WARN, "waiting for strokes"
-        return OK, "following the strokes"
-
-    def _input(self, entry: InputWatch, now: float) -> DiagnosticStatus:
-        """State of one input topic."""
-        topic = self._node.resolve_topic_name(entry.topic.name)
-        return self._status(entry.topic.name, *entry.judge(self._active, now), {"topic": topic, **entry.values()})
-
-    def _status(self, name: str, level: bytes, message: str, values: dict[str, Any]) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            name=f"{self._node.get_name()}: {name}",
-            hardware_id="",
-            level=level,
-            message=message,
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-
-    def _tell_changes(self, statuses: list[DiagnosticStatus]) -> bool:
-        """Log every change of level; whether there was one."""
-        before, self._levels = self._levels, {status.name: status.level for status in statuses}
-        changed = [status for status in statuses if before.get(status.name, status.level) != status.level]
-        for status in changed:
-            if status.level == OK:
-                self._node.get_logger().info(f"{status.name}: {status.message}")
-            else:
-                self._node.get_logger().warning(f"{status.name}: {status.message}")
-        return bool(changed)
+    def _look(self) -> None:
+        clock = self._node.get_clock().now().nanoseconds * NANO
+        told: dict[str, str | int] = {"scene": self._scene}
+        told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
+        peers = self._peers
+        self._board.show(self._watch.look(told, self._active, peers.publishers, peers.subscribers.values(), clock))
+        self._tell_oddities()
+        self._tell_clock(clock)
 
     def _tell_oddities(self) -> None:
         """Log the first sample of every kind that is out of the ordinary; all of them are counted."""
-        if self._twin is None or self._intake is None:
-            return
-        for name in sorted({*self._twin.counts, *self._intake.oddities} - self._oddities_told):
-            self._oddities_told.add(name)
-            meaning = EVENTS.get(name, "seen in a message")
-            self._node.get_logger().warning(f"{name}: {meaning} (told once; counted on /diagnostics)")
+        for name in sorted({name for found in self._counts.values() for name in found} - TOLD_AT_ONCE):
+            self._tell(name, f"{name}: {EVENTS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
+
+    def _tell_clock(self, clock: float) -> None:
+        """Log that the strokes are stamped by another clock than the node's."""
+        newest = self._watch.newest if self._active else None
+        if newest is not None and abs(clock - newest * NANO) > self._watch.thresholds.stamp_offset:
+            apart = clock - newest * NANO
+            self._tell("clock", f"newest stamp is {apart:.1f} s from the node's clock: set use_sim_time or play with --clock")
+
+    def _tell(self, name: str, text: str) -> None:
+        """Log something once."""
+        if name not in self._told:
+            self._told.add(name)
+            self._node.get_logger().warning(text)

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 
 from ..errors import BoomTwinError
 from .require import require_rclpy
+from .stop import Stop
 
 if TYPE_CHECKING:
     from .node import TwinNode
-
-WAKE = 0.2
-"""Longest wait (s) for work: a signal is noticed between two waits."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()
-        return _run(arguments)
+        return _run(arguments, Stop())
     except BoomTwinError as error:
         print(f"twin_node: {error}", file=sys.stderr)
         return 1
@@ -40,12 +38,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], stop: Stop) -> int:
     from rclpy.utilities import remove_ros_args
 
-    from .context import interrupt, on_stop_signal, ros
+    from .context import ros
 
-    on_stop_signal(interrupt)
     parser = ArgumentParser(prog="twin_node", description="The live boom twin, a ROS 2 lifecycle node.")
     parser.epilog = "Parameters: --ros-args -p scene:=PATH --params-file msg_config/twin.yaml"
     with ros(["twin_node", *arguments]):
@@ -54,30 +51,24 @@ def _run(arguments: list[str]) -> int:
 
         node = TwinNode()
         try:
-            return _live(node)
+            return _live(node, stop)
         finally:
             node.destroy_node()
 
 
-def _live(node: TwinNode) -> int:
+def _live(node: TwinNode, stop: Stop) -> int:
     """Start, spin, stop in order."""
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.lifecycle import TransitionCallbackReturn as Outcome
-
     from .context import STOPPED
+    from .executor import spin
 
     try:
-        if node.autostart and not (
-            node.trigger_configure() == Outcome.SUCCESS and node.trigger_activate() == Outcome.SUCCESS
-        ):
+        if node.autostart and not node.start():
             return 1
-        # One thread: samples are taken in the order of their arrival, and nothing needs a lock. EventsExecutor costs
-        # less, but it is experimental and its spin() does not return.
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not node.finished:
-            executor.spin_once(timeout_sec=WAKE)
+        spin(node, lambda: node.finished or stop.asked)
     except STOPPED:
+        pass
+    stop.over()
+    if not node.finished:
         node.get_logger().info("stopping")
         node.leave()
     return 0

@@ -5,22 +5,29 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from ..errors import BoomTwinError
-from ..io.intake import Intake, stamp_of
+from ..io.intake import Intake
+from ..io.mapping import load_mapping
 from ..io.outlet import Outlet
-from ..io.topics import NODE, Output, load_topics
+from ..io.topics import NODE, Output
+from ..io.wire import Wire
 from ..records import Stream
 from ..scene.load import DEFAULT_NAME, examine
+from ..settings import Settings
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, refuse_while, scene_path, settings_of
+from .parameters import declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
-from .types import RclpyTypes, message_class
+from .services import Services
+from .started import Started
+from .types import message_class
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -41,17 +48,22 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
-        self._topics = load_topics()
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
-        refuse_while(self, frozen=lambda: self._twin is not None)
+        self._topics = load_mapping(mapping_path(self))
         self._diagnostics = Diagnostics(self, self._topics)
+        self._diagnostics.tune(thresholds_of(self))
+        guard(self, lambda: self._twin is not None, self._tune)
 
     @property
     def autostart(self) -> bool:
         """Whether the node is to configure and activate itself."""
         return bool(self.get_parameter("autostart").value)
+
+    def start(self) -> bool:
+        """Configure and activate; whether both went well."""
+        return bool(self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS)
 
     # -- transitions --------------------------------------------------------------------------------------------------
 
@@ -79,10 +91,12 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         gc.collect()
         gc.freeze()  # what lives from here on as long as the node is not searched again
         outcome = super().on_activate(state)
-        for stream, topic in self._topics.inputs.items():
-            receive = partial(self._receive, stream)
+        for name, streams in self._topics.heard.items():
+            topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            self._subscriptions_in.append(self.create_subscription(kind, topic.name, receive, qos))
+            wire = Wire(topic.type, partial(deserialize_message, message_type=kind))
+            receive = partial(self._receive, streams, wire)
+            self._subscriptions_in.append(self.create_subscription(kind, name, receive, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
         return outcome
@@ -121,15 +135,25 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         scene, oddities = examine(path)
         for oddity in oddities:
             self.get_logger().warning(str(oddity))
-        settings = settings_of(self)
-        twin = Twin(scene, settings)
+        settings, joints = settings_of(self), len(scene.joints)
+        topics = load_mapping(mapping_path(self), joints)
+        twin = Twin(scene, settings, topics.mounts(joints))
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
-        self._twin, self._intake = twin, Intake(twin.plan.joints)
-        self._outlet = Outlet(RclpyTypes(), scene, settings)
+        self._twin, self._intake = twin, Intake(joints, topics)
+        self._outlet = Outlet(scene, settings)
+        self._asked = Services(self, twin, lambda: bool(self._subscriptions_in))
+        self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
+
+    def _tune(self, live: dict[str, float]) -> None:
+        """Live parameters were set."""
+        self._diagnostics.tune(thresholds_of(self))
+        asked = {name: value for name, value in live.items() if name in Settings.live_names()}
+        if asked and self._twin is not None:
+            self._twin.requests.tune(asked)
 
     def _go_quiet(self) -> None:
         self._diagnostics.stop()
@@ -141,16 +165,19 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
+        if self._twin is not None:
+            self._asked.close()
         self._twin = None
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, stream: Stream, msg: Any) -> None:
+    def _receive(self, streams: list[Stream], wire: Wire, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
-        try:
-            self._take(stream, stamp_of(msg), msg)
-        except Exception as error:  # the last resort, such as a stamp that no message can carry back
-            self._diagnostics.broken(stream, error)
+        for stream in streams:
+            try:
+                self._take(stream, *wire.read(data))
+            except Exception as error:  # the last resort, such as a message that is not whole
+                self._diagnostics.broken(stream, error)
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
@@ -158,7 +185,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         sample = self._intake.put(stream, stamp, msg)
         if sample is None:
             return
+        began = perf_counter()
         report = self._twin.update(sample)
-        self._diagnostics.reported(report)
-        for key, filled in self._outlet.fill(report):
-            self._outputs[key].publish(filled)
+        self._diagnostics.took(sample, report, perf_counter() - began)
+        if report.change is not None:
+            self._started.tell(report, report.change)
+        for key, encoded in self._outlet.fill(report):
+            self._outputs[key].publish(encoded)

@@ -1,12 +1,14 @@
-"""The node's parameters: declared from the table of `Settings`, frozen while the node is configured."""
+"""The node's parameters, from one table: its own here, those of others in `Settings` and `Thresholds`."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, ParameterException
@@ -15,14 +17,42 @@ from rclpy.parameter import Parameter
 
 from ..errors import UsageError
 from ..settings import Settings, settings_from
+from ..thresholds import Thresholds, thresholds_from
 from .context import one_line
 
 SOURCE = "parameters of the node"
+FIXED, LIVE, AT_START = "fixed while the node is configured", "changes at once", "given at start"
 _LARGEST = sys.float_info.max
 
 
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One parameter; its type is that of the default, its unit stands at the end of the text."""
+
+    name: str
+    default: str | bool | float
+    text: str
+    when: str
+    bounds: dict[str, float] | None = None
+
+
+def _row(name: str, field: FieldInfo, is_live: bool) -> Row:
+    keys = ("gt", "ge", "lt", "le")
+    bounds = {key: float(getattr(rule, key)) for rule in field.metadata for key in keys if hasattr(rule, key)}
+    return Row(name, float(field.default), field.description or "", LIVE if is_live else FIXED, bounds)
+
+
+TABLE = (
+    Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
+    Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
+    Row("autostart", True, "the node configures and activates itself", AT_START),
+    *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
+    *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
+)
+
+
 def declare(node: Node) -> None:
-    """Declare ``scene``, ``autostart`` and all settings.
+    """Declare every row of the table.
 
     Raises
     ------
@@ -30,33 +60,41 @@ def declare(node: Node) -> None:
         A value given at start has the wrong type or is out of range.
     """
     try:
-        node.declare_parameter("scene", "", _text("path of the scene file; empty = the scene of the package"))
-        node.declare_parameter("autostart", True, _switch("the node configures and activates itself"))
-        for name, field in Settings.model_fields.items():
-            node.declare_parameter(name, float(field.default), _number(name, field))
+        for row in TABLE:
+            node.declare_parameter(row.name, row.default, _descriptor(row))
     except InvalidParameterTypeException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
     except ParameterException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
 
 
-def refuse_while(node: Node, frozen: Callable[[], bool]) -> None:
-    """Refuse changes of these parameters while `frozen`, and values out of bounds at any time."""
-    own = {"scene", *Settings.model_fields}
+def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[str, float]], None]) -> None:
+    """Refuse what cannot be set, with the reason; give live values that were set to `tune`."""
+    fixed = {row.name for row in TABLE if row.when == FIXED}
 
     def check(parameters: list[Parameter[Any]]) -> SetParametersResult:
-        changed = {parameter.name: parameter.value for parameter in parameters if parameter.name in own}
-        if changed and frozen():
-            reason = f"{', '.join(changed)}: fixed while the node is configured. Deactivate and clean it up first."
+        values = {parameter.name: parameter.value for parameter in parameters}
+        if is_configured() and (refused := sorted(fixed & values.keys())):
+            reason = f"{', '.join(refused)}: {FIXED}. Deactivate and clean it up first."
             return SetParametersResult(successful=False, reason=reason)
-        changed.pop("scene", None)
         try:
-            settings_from(changed, SOURCE)
+            settings_from(_only(Settings, values), SOURCE)
+            thresholds_from(_only(Thresholds, values), SOURCE)
         except UsageError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
+    def apply(parameters: list[Parameter[Any]]) -> None:
+        live = {row.name for row in TABLE if row.when == LIVE}
+        if changed := {each.name: each.value for each in parameters if each.name in live}:
+            tune(changed)
+
     node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(apply)
+
+
+def _only(table: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name in table.model_fields}
 
 
 def scene_path(node: Node) -> Path | None:
@@ -65,29 +103,33 @@ def scene_path(node: Node) -> Path | None:
     return Path(text) if text else None
 
 
+def mapping_path(node: Node) -> Path | None:
+    """The mapping to load; None = the package's own."""
+    text: str = node.get_parameter("mapping").value
+    return Path(text) if text else None
+
+
 def settings_of(node: Node) -> Settings:
     """The settings as the parameters stand; UsageError if a value is out of bounds."""
     return settings_from({name: node.get_parameter(name).value for name in Settings.model_fields}, SOURCE)
 
 
-def _text(description: str) -> ParameterDescriptor:
-    return ParameterDescriptor(type=ParameterType.PARAMETER_STRING, description=description)
+def thresholds_of(node: Node) -> Thresholds:
+    """The thresholds of ``/diagnostics`` as the parameters stand."""
+    return thresholds_from({name: node.get_parameter(name).value for name in Thresholds.model_fields}, SOURCE)
 
 
-def _switch(description: str) -> ParameterDescriptor:
-    return ParameterDescriptor(type=ParameterType.PARAMETER_BOOL, description=description, read_only=True)
-
-
-def _number(name: str, field: FieldInfo) -> ParameterDescriptor:
-    """Type, meaning and bounds of one setting; a ROS range includes its ends, so words say where they are out."""
-    keys = ("gt", "ge", "lt", "le")
-    bounds = {key: float(getattr(rule, key)) for rule in field.metadata for key in keys if hasattr(rule, key)}
-    words = {"gt": f"{name} > {bounds.get('gt')}", "lt": f"{name} < {bounds.get('lt')}"}
-    low = bounds.get("gt", bounds.get("ge", -_LARGEST))
-    high = bounds.get("lt", bounds.get("le", _LARGEST))
-    return ParameterDescriptor(
-        type=ParameterType.PARAMETER_DOUBLE,
-        description=field.description or "",
-        additional_constraints=", ".join(text for key, text in words.items() if key in bounds),
-        floating_point_range=[FloatingPointRange(from_value=low, to_value=high, step=0.0)],
+def _descriptor(row: Row) -> ParameterDescriptor:
+    """Type, meaning and bounds; a ROS range includes its ends, so words say where they are out."""
+    kinds = {str: ParameterType.PARAMETER_STRING, bool: ParameterType.PARAMETER_BOOL, float: ParameterType.PARAMETER_DOUBLE}
+    descriptor = ParameterDescriptor(
+        type=kinds[type(row.default)], description=row.text, read_only=row.when == AT_START, additional_constraints=row.when
     )
+    if row.bounds is not None:
+        words = {"gt": f"{row.name} > {row.bounds.get('gt')}", "lt": f"{row.name} < {row.bounds.get('lt')}"}
+        told = [text for key, text in words.items() if key in row.bounds]
+        descriptor.additional_constraints = "; ".join([*told, row.when])
+        low = row.bounds.get("gt", row.bounds.get("ge", -_LARGEST))
+        high = row.bounds.get("lt", row.bounds.get("le", _LARGEST))
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
+    return descriptor

@@ -10,14 +10,21 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from ..errors import BagError
+from ..errors import BagError, BoomTwinError
 from ..io.storage import Storage
+from ..io.topics import Output, load_topics
+from ..thresholds import Thresholds
+from ..watch.recording import RecordingJudge, TopicState
+from .board import Board
+from .remote import RemoteParameters
 from .wanted import Wanted, subscription_of
 
 NAME = "boom_twin_recorder"
 WAKE = 0.1
 LOOK = 0.5
 """Seconds between looks for new topics, publishers and the disk."""
+LOOKS = 2
+"""Looks from one state on ``/diagnostics`` to the next."""
 COMPLETE = "every required topic has a publisher"
 
 
@@ -65,11 +72,15 @@ class _Channel:
         self._has_one = self._has_one and number <= 1
         return number
 
+    @property
+    def missed(self) -> int | None:
+        """Messages that never arrived, if that can be known."""
+        return self.count.missed if self._has_one and self._number is not None else None
+
     def finish(self, written: Sequence[int]) -> Count:
         """The final count."""
         self.count.written = written[self._key] if self.subscription is not None else 0
-        if not self._has_one or self._number is None:
-            self.count.missed = None
+        self.count.missed = self.missed
         return self.count
 
     def _store(self, data: bytes, info: Mapping[str, Any]) -> None:
@@ -83,7 +94,41 @@ class _Channel:
         self._storage.put(self._key, received, data, max(info["source_timestamp"], 0), (number or self.count.received) % 2**32)
 
 
-def record(storage: Storage, wanted: Sequence[Wanted], stopped: Callable[[], bool], tell: Callable[[str], None]) -> list[Count]:
+class _Recording:
+    """What is recorded, told on ``/diagnostics``."""
+
+    def __init__(self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds) -> None:
+        self.node, self.storage, self._thresholds = node, storage, thresholds
+        self.channels = [_Channel(each, storage) for each in wanted]
+        self._board, self._judge = Board(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self.twin = RemoteParameters(node)
+
+    def look(self) -> bool:
+        """Subscribe to what has come up; whether every required topic has a publisher. BagError if the disk fails."""
+        self.storage.check()
+        for channel in self.channels:
+            channel.open(self.node)
+        numbers = [channel.look() for channel in self.channels]
+        return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
+
+    def tell(self, end: str | None = None) -> None:
+        """Publish the state; `end` as for `boom_twin.watch.recording.RecordingJudge`."""
+        topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
+        clock = self.node.get_clock().now().nanoseconds * 1e-9
+        disk = self.storage.state()
+        self._board.show([self._judge.status(topics, disk, end, self._thresholds, time.monotonic(), clock)])
+        if end is not None:
+            self._board.settle()
+
+
+def record(
+    storage: Storage,
+    wanted: Sequence[Wanted],
+    thresholds: Thresholds,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+    meet: Callable[[Mapping[str, object]], None],
+) -> list[Count]:
     """Record until `stopped`; needs an initialised rclpy. Log times are those of the reception.
 
     Parameters
@@ -91,10 +136,14 @@ def record(storage: Storage, wanted: Sequence[Wanted], stopped: Callable[[], boo
     storage : Storage
         Completed at the end.
     wanted : sequence of Wanted
+    thresholds : Thresholds
+        Of the state on ``/diagnostics``.
     stopped : callable
         Asked after every message, and ten times a second.
     tell : callable
         Told in words when recording begins, and once every required topic has a publisher (`COMPLETE`).
+    meet : callable
+        Told the parameters of the twin, if there is one.
 
     Returns
     -------
@@ -109,38 +158,45 @@ def record(storage: Storage, wanted: Sequence[Wanted], stopped: Callable[[], boo
         The type of a topic is not installed.
     """
     node = rclpy.create_node(NAME)
-    channels = [_Channel(each, storage) for each in wanted]
+    recording = _Recording(node, storage, wanted, thresholds)
     try:
-        _spin(node, channels, storage, stopped, tell)
+        try:
+            _spin(recording, stopped, tell, meet)
+        finally:
+            written = storage.close()
+        counts = [channel.finish(written) for channel in recording.channels]
+        if wrong := [count for count in counts if count.written != count.received]:
+            told = "; ".join(f"{count.topic}: {count.received} received, {count.written} written" for count in wrong)
+            raise BagError(f"not all that was received was written ({told}). Report this fault.")
+        recording.tell(end="")
+    except BoomTwinError as error:
+        recording.tell(end=str(error))
+        raise
     finally:
-        written = storage.close()
         node.destroy_node()
-    counts = [channel.finish(written) for channel in channels]
-    if wrong := [count for count in counts if count.written != count.received]:
-        told = "; ".join(f"{count.topic}: {count.received} received, {count.written} written" for count in wrong)
-        raise BagError(f"not all that was received was written ({told}). Report this fault.")
     return counts
 
 
 def _spin(
-    node: Any, channels: list[_Channel], storage: Storage, stopped: Callable[[], bool], tell: Callable[[str], None]
+    recording: _Recording,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+    meet: Callable[[Mapping[str, object]], None],
 ) -> None:
     """Receive until `stopped`."""
     executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    for channel in channels:
-        channel.open(node)
-    tell(f"recording {len(channels)} topics; Ctrl-C ends it")
-    due, is_complete = 0.0, not any(channel.wanted.required for channel in channels)
+    executor.add_node(recording.node)
+    recording.look()
+    tell(f"recording {len(recording.channels)} topics; Ctrl-C ends it")
+    due, looks, is_complete = time.monotonic() + LOOK, 0, False
     while not stopped():
         if time.monotonic() >= due:
-            due = time.monotonic() + LOOK
-            storage.check()
-            for channel in channels:
-                channel.open(node)
-            numbers = [channel.look() for channel in channels]
-            pairs = zip(channels, numbers, strict=True)
-            if not is_complete and all(number for channel, number in pairs if channel.wanted.required):
+            due, looks = time.monotonic() + LOOK, looks + 1
+            if recording.look() and not is_complete:
                 is_complete = True
                 tell(COMPLETE)
+            if parameters := recording.twin.look():
+                meet(parameters)
+            if looks % LOOKS == 0:
+                recording.tell()
         executor.spin_once(timeout_sec=WAKE)

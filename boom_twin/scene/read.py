@@ -16,6 +16,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from ..errors import Fault, SceneError
+from ..plain import BoundedComposer
 
 Place = tuple[str | int, ...]
 
@@ -85,6 +86,7 @@ def parse(text: str, source: str) -> Document:
         If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
     """
     yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = BoundedComposer
     try:
         root = yaml.compose(text)
     except (YAMLError, RecursionError, ValueError) as error:

@@ -15,7 +15,7 @@ from boom_twin.cli.main import main
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.info import inspect
 from boom_twin.io.needs import missing, names_extra, remarks
-from boom_twin.io.outlet import fill_header
+from boom_twin.io.places import fill_header
 from boom_twin.io.topics import load_topics
 from boom_twin.io.writer import FILE_NAME, SessionWriter
 from boom_twin.records import Stream

@@ -13,7 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.intake import Intake, stamp_of
+from boom_twin.io.intake import LONGEST, Intake, stamp_of
+from boom_twin.io.sensors import Sensor, channels, usual
+from boom_twin.io.topics import Topics, load_topics
 from boom_twin.records import Stream
 
 TYPES = RosbagsTypes()
@@ -59,7 +61,7 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
     """Whatever is wrong with a message: a value in the sample is the one under that name, or NaN."""
     names = [f"cylinder_{i + 1}" for i in sorted(present)]
     positions = [values[i] for i in sorted(present)][:cut]
-    sample = Intake(3).put(Stream.STROKES, 0, joint_state(names, positions))
+    sample = Intake(3).put(Stream.STROKES, 1, joint_state(names, positions))
     usable = {i: values[i] for i in sorted(present)[:cut] if abs(values[i]) <= 1e6}
     if not usable:
         assert sample is None
@@ -126,7 +128,7 @@ def test_imu_with_one_bad_axis_keeps_the_other() -> None:
 def test_counts_add_up_over_messages() -> None:
     intake = Intake(1)
     for _ in range(3):
-        intake.put(Stream.STROKES, 0, joint_state(["x"], [1.0]))
+        intake.put(Stream.STROKES, 1, joint_state(["x"], [1.0]))
     assert dict(intake.oddities) == {"unknown names only": 3}
 
 
@@ -156,10 +158,65 @@ def test_stamp_of_is_exact() -> None:
     assert stamp_of(msg) == 1_700_000_000_999_999_999
 
 
-@pytest.mark.parametrize("stamp", [-1, 2**31 * 10**9])
-def test_impossible_stamps_give_no_sample(stamp: int) -> None:
+@pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
+def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
     intake = Intake(1)
     message = RosbagsTypes().make("sensor_msgs/msg/JointState")
     message.name, message.position = ["cylinder_1"], np.array([0.1])
     assert intake.put(Stream.STROKES, stamp, message) is None
-    assert intake.oddities == {"impossible stamp": 1}
+    assert intake.oddities == {name: 1}
+
+
+def test_a_flood_of_names_is_not_looked_through() -> None:
+    intake = Intake(1)
+    names = [*(f"x{i}" for i in range(LONGEST)), "cylinder_1"]
+    assert intake.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
+    assert intake.oddities == {"too many names": 1}
+    assert intake.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * LONGEST)) is not None
+
+
+def mapped(sensors: dict[str, Any], **names: str) -> Topics:
+    topics = load_topics()
+    named = {stream: {"name": names.get(stream.value, topic.name)} for stream, topic in topics.inputs.items()}
+    inputs = {stream: topic.model_copy(update=named[stream]) for stream, topic in topics.inputs.items()}
+    made = {channel: Sensor(**(usual(channel) | given)) for channel, given in sensors.items()}
+    return topics.model_copy(update={"inputs": inputs, "sensors": made})
+
+
+@pytest.mark.parametrize(
+    ("channel", "given", "reading", "expected"),
+    [
+        ("cylinder_2", {"name": "b", "unit": "mm", "zero": 12.5}, 112.5, 0.1),
+        ("cylinder_2", {"name": "b", "unit": "in"}, 10.0, 0.254),
+        ("cylinder_2", {"name": "b", "sign": -1, "scale": 1.01, "zero": 0.5}, 0.2, 0.303),
+        ("joint_1", {"name": "pitch", "unit": "deg", "sign": -1, "zero": 90.0}, 180.0, -np.pi / 2),
+        ("joint_1", {"name": "pitch", "unit": "gon"}, -50.0, -np.pi / 4),
+        ("joint_1", {"name": "pitch", "unit": "mrad"}, 250.0, 0.25),
+    ],
+)
+def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], reading: float, expected: float) -> None:
+    stream = Stream.STROKES if channel.startswith("cyl") else Stream.ANGLES
+    other = {"cylinder_2": "cylinder_1", "joint_1": "joint_2"}[channel]
+    sample = Intake(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
+    assert sample is not None
+    values = dict(zip(channels(stream, 2), sample.values.tolist(), strict=True))
+    assert values == {channel: pytest.approx(expected, rel=1e-12), other: 0.7}
+
+
+def test_an_imu_may_lie_on_its_side() -> None:
+    topics = mapped({"tip_imu_x": {"name": "y", "sign": -1}, "tip_imu_z": {"name": "x", "unit": "g", "zero": 0.02}})
+    msg = imu(1.02, 5.0)
+    sample = Intake(1, topics).put(Stream.IMU, 1, msg)
+    assert sample is not None
+    np.testing.assert_allclose(sample.values, [-77.0, 9.80665], rtol=1e-12)
+
+
+def test_one_topic_for_both_kinds() -> None:
+    """A message feeds the streams that it has values of, and a stream without any is nothing odd."""
+    intake = Intake(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
+    both = joint_state(["other", "a", "cylinder_1"], [9.0, 0.1, 0.2])
+    angles, strokes, neither = joint_state(["a"], [0.3]), joint_state(["cylinder_1"], [0.4]), joint_state(["joint_1"], [1.0])
+    samples = [intake.put(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)]
+    found = [None if sample is None else sample.values.tolist() for sample in samples]
+    assert found == [[0.2], [0.1], None, [0.3], [0.4], None] and not intake.oddities
+    assert intake.put(Stream.STROKES, 1, neither) is None and intake.oddities == {"unknown names only": 1}

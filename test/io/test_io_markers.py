@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.markers import TRACE, ShapeMarkers, force_colour
+from boom_twin.io.topics import TYPES, Output
+from boom_twin.io.typestore import jazzy
 from boom_twin.records import Prediction
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -37,9 +38,10 @@ def predictions(scene: Any) -> list[Prediction]:
 
 
 def drawn(predictions: list[Prediction]) -> list[dict[tuple[str, int], dict[str, Any]]]:
-    """By namespace and id what the messages held, one after the other: their maker fills them anew."""
-    markers = ShapeMarkers(RosbagsTypes(), FACTOR, FULL)
-    return [{(m.ns, m.id): snapshot(m) for m in markers.fill(prediction).markers} for prediction in predictions]
+    """By namespace and id what the messages hold."""
+    markers = ShapeMarkers(FACTOR, FULL)
+    messages = [jazzy().deserialize_cdr(markers.fill(prediction), TYPES[Output.SHAPE]) for prediction in predictions]
+    return [{(m.ns, m.id): snapshot(m) for m in message.markers} for message in messages]
 
 
 def snapshot(m: Any) -> dict[str, Any]:
@@ -121,7 +123,7 @@ def test_cylinders_are_red_in_tension_and_blue_in_compression(messages: Any, pre
     for message, prediction in zip(messages, predictions, strict=True):
         for i, force in enumerate(prediction.cylinder_forces, start=1):
             colour = message["cylinders", i]["colour"]
-            assert colour == force_colour(force / FULL)
+            assert colour == pytest.approx(force_colour(force / FULL), abs=1e-7)
             assert (colour[0] > colour[2]) == (force > 0.0)
     assert {bool(force > 0.0) for force in predictions[0].cylinder_forces} == {True, False}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -155,12 +156,35 @@ def test_a_disk_that_stalls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(told) == 2 and "has not answered for" in told[0] and "answers again; nothing was lost" in told[1]
 
 
+def test_messages_leave_the_process_while_the_disk_is_slow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    release, real = [False], os.fsync
+    monkeypatch.setattr(module, "FLUSH", 0.05)
+    monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: release[0], True)] and real(file))
+    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    key = storage.add(recorded(TOPIC))
+    for number in range(100):
+        storage.put(key, number * STEP, message(number), number * STEP, number)
+        time.sleep(0.005)
+    time.sleep(0.5)
+    shutil.copytree(tmp_path / "bag", tmp_path / "killed")
+    assert 0.5 < storage.state().lag < 30.0
+    release[0] = True
+    assert storage.close() == [100]
+    assert recover(tmp_path / "killed", tmp_path / "out").saved.total() == 100
+
+
 def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    release = [False]
+    release, flush = [False], BagWriter.flush
+
+    def stuck(bag: BagWriter) -> int:
+        while not release[0]:
+            time.sleep(0.02)
+        return flush(bag)
+
     monkeypatch.setattr(module, "MOST", 10_000)
     monkeypatch.setattr(module, "FLUSH", 0.01)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
-    monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: release[0], True)])
+    monkeypatch.setattr(BagWriter, "flush", stuck)
     storage = Storage(BagWriter(tmp_path / "bag"), Split(), lambda text: None)
     key = storage.add(recorded(TOPIC))
     time.sleep(0.1)

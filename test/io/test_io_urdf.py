@@ -11,9 +11,9 @@ import pytest
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.cli.main import main
-from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.outlet import Outlet
-from boom_twin.io.topics import Output
+from boom_twin.io.topics import TYPES, Output
+from boom_twin.io.typestore import jazzy
 from boom_twin.io.urdf import urdf
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.parts import Scene
@@ -187,9 +187,9 @@ def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
 def test_joint_states_drive_every_joint() -> None:
     """A message that comes with a shape names each joint of the URDF that can move, and no other."""
     scene = load_scene()
-    twin, outlet = Twin(scene), Outlet(RosbagsTypes(), scene, Settings())
+    twin, outlet = Twin(scene), Outlet(scene, Settings())
     report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
-    msg = dict(outlet.fill(report))[Output.JOINT_STATES]
+    msg = jazzy().deserialize_cdr(dict(outlet.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
     robot = ElementTree.fromstring(urdf(scene))
     assert set(msg.name) == {j.attrib["name"] for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
     positions = dict(zip(msg.name, msg.position.tolist(), strict=True))

@@ -7,7 +7,12 @@ import pytest
 
 from boom_twin import load_scene, replay
 from boom_twin.errors import BagError
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.places import fill_header
 from boom_twin.io.session import write_session
+from boom_twin.io.topics import load_topics
+from boom_twin.io.writer import SessionWriter
+from boom_twin.records import Stream
 from boom_twin.scene.kinematics import strokes_of_posture
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
@@ -52,6 +57,25 @@ def test_a_gap_is_an_alarm_with_its_times(tmp_path):
     assert (alarm["channel"], alarm["kind"], alarm["cause"]) == ("cylinder_strokes", "gap", None)
     assert (alarm["from_s"], alarm["to_s"]) == (pytest.approx(0.295), pytest.approx(0.7))
     assert result.summary["samples"] == 120
+
+
+def test_stray_stamps_are_dropped_and_told(tmp_path):
+    """Of the far future, of 1970 and unset; the samples after them are used at once."""
+    scene = load_scene()
+    still = strokes_of_posture(scene, "arch")
+    topic = load_topics().inputs[Stream.STROKES]
+    types, stray = RosbagsTypes(), {50: (2**31 - 1) * 10**9, 70: 10**9, 90: 0}
+    with SessionWriter(tmp_path / "bag", {"strokes": topic}) as bag:
+        for row in range(200):
+            msg = types.make(topic.type)
+            fill_header(msg.header, stray.get(row, START + row * STEP))
+            msg.name, msg.position = [f"cylinder_{i}" for i in range(1, 5)], types.doubles(still)
+            bag.write("strokes", START + row * STEP, msg)
+    result = replay(tmp_path / "bag", scene, tmp_path / "out")
+    assert (result.summary["samples"], result.summary["dropped"]) == (197, 3)
+    assert result.summary["events"] == {"leap": 2, "no stamp": 1} and result.summary["alarms"] == []
+    stamps = [prediction.stamp for prediction in result.recording.predictions]
+    assert stamps == [START + row * STEP for row in range(200) if row not in stray]
 
 
 def test_an_earlier_result_is_replaced_but_nothing_else(tmp_path):

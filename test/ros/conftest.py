@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin.io.intake import stamp_of
 from boom_twin.io.session import write_session
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -33,6 +34,10 @@ class Process:
         self._child = subprocess.Popen(
             command, stdin=stdin, stdout=self._file, stderr=subprocess.STDOUT, start_new_session=True
         )
+
+    @property
+    def pid(self) -> int:
+        return self._child.pid
 
     def said(self) -> str:
         return self._log.read_text()
@@ -96,6 +101,56 @@ def spawn_node(spawn: Callable[..., Process]) -> Callable[..., Process]:
     return start
 
 
+class Remote:
+    """A node's services, called from here."""
+
+    def __init__(self, name: str = "/boom_twin") -> None:
+        import rclpy
+
+        self.node, self.name = rclpy.create_node("remote"), name
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        import rclpy
+
+        client = self.node.create_client(kind, f"{self.name}/{name}")
+        assert client.wait_for_service(30.0)
+        future = client.call_async(request)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=240.0)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def trigger(self, name: str) -> Any:
+        from std_srvs.srv import Trigger
+
+        return self.call(Trigger, name, Trigger.Request())
+
+    def change(self, transition: int) -> bool:
+        from lifecycle_msgs.msg import Transition
+        from lifecycle_msgs.srv import ChangeState
+
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return bool(self.call(ChangeState, "change_state", request).success)
+
+    def state(self) -> str:
+        from lifecycle_msgs.srv import GetState
+
+        return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def set(self, name: str, value: Any) -> Any:
+        from rcl_interfaces.srv import SetParameters
+        from rclpy.parameter import Parameter
+
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        return self.call(SetParameters, "set_parameters", request).results[0]
+
+
+@pytest.fixture(scope="module")
+def remote(domain: None) -> Iterator[Remote]:
+    caller = Remote()
+    yield caller
+    caller.node.destroy_node()
+
+
 @pytest.fixture(scope="session")
 def motion() -> dict[str, Any]:
     """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""
@@ -122,3 +177,56 @@ def bag(motion: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Pat
     path = tmp_path_factory.mktemp("session") / "bag"
     write_session(path, **motion, description={"origin": "synthetic, made for a test"})
     return path
+
+
+class Bench:
+    """Sends to a node and listens to it."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray
+        from geometry_msgs.msg import PointStamped
+        from sensor_msgs.msg import Imu, JointState
+
+        self.node = rclpy.create_node("bench")
+        self.strokes = self.node.create_publisher(JointState, "cylinder_strokes", 100)
+        self.imu = self.node.create_publisher(Imu, "tip_imu", 100)
+        self.answers: list[int] = []
+        self.diagnostics: list[Any] = []
+        self.node.create_subscription(
+            PointStamped, "/boom_twin/tip/position", lambda msg: self.answers.append(stamp_of(msg)), 100
+        )
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 10)
+
+    def until(self, condition: Callable[[], bool], patience: float = 60.0) -> None:
+        """Listen until it holds."""
+        import rclpy
+
+        end = time.monotonic() + patience
+        while not condition():
+            assert time.monotonic() < end, self.statuses()
+            rclpy.spin_once(self.node, timeout_sec=0.05)
+
+    def statuses(self) -> dict[str, Any]:
+        """The newest diagnostics by name."""
+        return {status.name: status for status in self.diagnostics[-1].status} if self.diagnostics else {}
+
+    def values(self, name: str) -> dict[str, str]:
+        status = self.statuses().get(name)
+        return {} if status is None else {pair.key: pair.value for pair in status.values}
+
+
+@pytest.fixture
+def bench(domain: None) -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.node.destroy_node()
+
+
+@pytest.fixture
+def node(spawn_node: Callable[..., Any]) -> Iterator[Any]:
+    """An active node, gone after the test."""
+    made = spawn_node()
+    made.wait_for("active;")
+    yield made
+    made.close()

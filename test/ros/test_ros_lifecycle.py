@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,47 +13,11 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-import rclpy
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.srv import DescribeParameters, SetParameters
-from rclpy.parameter import Parameter
+from rcl_interfaces.srv import DescribeParameters
 
 from boom_twin.scene.load import default_text
 from boom_twin.settings import Settings
-
-
-class Remote:
-    """A node's services, called from here."""
-
-    def __init__(self) -> None:
-        self.node = rclpy.create_node("remote")
-
-    def call(self, kind: Any, name: str, request: Any) -> Any:
-        client = self.node.create_client(kind, f"/boom_twin/{name}")
-        assert client.wait_for_service(30.0)
-        future = client.call_async(request)
-        rclpy.spin_until_future_complete(self.node, future, timeout_sec=240.0)
-        self.node.destroy_client(client)
-        return future.result()
-
-    def change(self, transition: int) -> bool:
-        request = ChangeState.Request(transition=Transition(id=transition))
-        return bool(self.call(ChangeState, "change_state", request).success)
-
-    def state(self) -> str:
-        return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
-
-    def set(self, name: str, value: Any) -> Any:
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        return self.call(SetParameters, "set_parameters", request).results[0]
-
-
-@pytest.fixture
-def remote(domain: None) -> Iterator[Remote]:
-    caller = Remote()
-    yield caller
-    caller.node.destroy_node()
 
 
 @pytest.fixture
@@ -59,10 +25,10 @@ def idle(spawn_node: Callable[..., Any]) -> Iterator[Any]:
     """A node that waits for its transitions; strokes remapped."""
     node = spawn_node("-p", "autostart:=false", "-r", "cylinder_strokes:=rig/strokes")
     yield node
-    node.close()
+    node.stop()  # in order, or the next one's services are taken for those of this one
 
 
-def test_transitions_by_service(idle: Any, remote: Remote) -> None:
+def test_transitions_by_service(idle: Any, remote: Any) -> None:
     assert remote.state() == "unconfigured"
     steps = [
         (Transition.TRANSITION_CONFIGURE, "inactive"),
@@ -81,11 +47,12 @@ def test_transitions_by_service(idle: Any, remote: Remote) -> None:
     assert "listening to /rig/strokes, /joint_angles, /tip_imu" in idle.said()
 
 
-def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote: Remote) -> None:
+def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote: Any) -> None:
     request = DescribeParameters.Request(names=["rho", "lag"])
     rho, lag = remote.call(DescribeParameters, "describe_parameters", request).descriptors
     assert (rho.floating_point_range[0].from_value, rho.floating_point_range[0].to_value) == (0.0, 1.0)
-    assert (rho.description, lag.additional_constraints) == (Settings.model_fields["rho"].description, "lag > 0.0")
+    words = "fixed while the node is configured"
+    assert (rho.description, lag.additional_constraints) == (Settings.model_fields["rho"].description, f"lag > 0.0; {words}")
     for name, value in [
         ("rho", 1.5),
         ("rho", 1.0),
@@ -97,13 +64,16 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
         assert not remote.set(name, value).successful, (name, value)
     assert remote.set("lag", 0.08).successful
     assert remote.change(Transition.TRANSITION_CONFIGURE), idle.said()
-    refused = remote.set("lag", 0.05)
-    assert not refused.successful and "lag: fixed while the node is configured" in refused.reason
+    for name, value in [("lag", 0.05), ("scene", "other.yaml")]:
+        refused = remote.set(name, value)
+        assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
+    assert remote.set("gap", 0.2).successful
+    assert not remote.set("payload", -2.0).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)
     assert remote.set("lag", 0.05).successful
 
 
-def test_a_scene_that_cannot_be_used_can_be_replaced(idle: Any, remote: Remote, tmp_path: Path) -> None:
+def test_a_scene_that_cannot_be_used_can_be_replaced(idle: Any, remote: Any, tmp_path: Path) -> None:
     assert remote.set("scene", str(tmp_path / "absent.yaml")).successful
     assert not remote.change(Transition.TRANSITION_CONFIGURE)
     assert remote.state() == "unconfigured"
@@ -139,8 +109,41 @@ def test_a_bad_argument_ends_the_node_with_its_name(
     assert words in node.said() and "Traceback" not in node.said()
 
 
-def test_sigterm_ends_the_node_in_order(spawn_node: Callable[..., Any]) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["", "preparing the model", "active;"])
+def test_signals_end_the_node_in_order_at_any_time(
+    spawn_node: Callable[..., Any], number: signal.Signals, moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if moment == "preparing the model":
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # so that it compiles
     node = spawn_node()
-    node.wait_for("active;")
-    assert node.stop(signal.SIGTERM) == 0
+    node.wait_for(moment)
+    time.sleep(0.7)
+    began = time.monotonic()
+    assert node.stop(number) == 0, node.said()
+    assert time.monotonic() - began < 4.0  # 2 on a machine that is free
+    assert "Traceback" not in node.said() and "FATAL" not in node.said()
+
+
+MISSING = "del e.EventsExecutor"
+FAILING = """
+class Bad:
+    add_node = remove_node = lambda self, node: None
+    def spin_until_future_complete(self, future, timeout_sec): raise RuntimeError("worn out")
+e.EventsExecutor = Bad
+"""
+
+
+@pytest.mark.parametrize("fault", [MISSING, FAILING])
+def test_without_the_events_executor(
+    spawn: Callable[..., Any], fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.getcwd()}")
+    lines = ["import sys, rclpy.experimental as e", fault, "from boom_twin.ros.main import main", "sys.exit(main([]))"]
+    (tmp_path / "start_without.py").write_text("\n".join(lines))
+    node = spawn("start_without")
+    node.wait_for("the single-threaded executor goes on")
+    assert node.said().count("events executor:") == 1
+    time.sleep(0.5)
+    assert node.stop() == 0, node.said()
     assert "Traceback" not in node.said()

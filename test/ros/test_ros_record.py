@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import random
+import resource
 import signal
 import threading
 import time
@@ -33,28 +35,45 @@ from boom_twin.ros.recorder import COMPLETE
 from boom_twin.ros.wanted import wanted_of
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
+STATE = "boom_twin_recorder: recording"
+
+
+class Source:
+    """Publishes from a thread; `times` (ns) tells when."""
+
+    def __init__(self, topic: str, kind: Any, rate: float, make: Callable[[int], Any]) -> None:
+        self._node = rclpy.create_node("source_of" + topic.replace("/", "_"))
+        self._publisher = self._node.create_publisher(kind, topic, 100)
+        self.times: list[int] = []
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(rate, make))
+        self._thread.start()
+
+    def _run(self, rate: float, make: Callable[[int], Any]) -> None:
+        began = time.monotonic()
+        while not self._end.wait(max(0.0, began + len(self.times) / rate - time.monotonic())):
+            self.times.append(time.time_ns())
+            self._publisher.publish(make(len(self.times)))
+
+    def wait_for_listener(self) -> None:
+        end = time.monotonic() + 30.0
+        while self._publisher.get_subscription_count() == 0:
+            assert time.monotonic() < end, "nobody listens"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self._end.set()
+        self._thread.join()
+        self._node.destroy_node()
 
 
 @contextmanager
-def publishing(topic: str, kind: Any, rate: float, make: Callable[[int], Any]) -> Iterator[list[int]]:
-    """Publishes in a thread; gives the times (ns) at which."""
-    node = rclpy.create_node("source_of" + topic.replace("/", "_"))
-    publisher, times, end = node.create_publisher(kind, topic, 100), [], threading.Event()
-
-    def run() -> None:
-        began = time.monotonic()
-        while not end.wait(max(0.0, began + len(times) / rate - time.monotonic())):
-            times.append(time.time_ns())
-            publisher.publish(make(len(times)))
-
-    thread = threading.Thread(target=run)
-    thread.start()
+def publishing(topic: str, kind: Any, rate: float, make: Callable[[int], Any]) -> Iterator[Source]:
+    source = Source(topic, kind, rate, make)
     try:
-        yield times
+        yield source
     finally:
-        end.set()
-        thread.join()
-        node.destroy_node()
+        source.close()
 
 
 def strokes(number: int) -> JointState:
@@ -66,13 +85,15 @@ def strokes(number: int) -> JointState:
 def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], tmp_path: Path) -> None:
     out = tmp_path / "bag"
     with (
-        publishing("cylinder_strokes", JointState, 200.0, strokes),
-        publishing("/odd", ParameterEvent, 50.0, lambda number: ParameterEvent(node=f"/n{number}")),
+        publishing("cylinder_strokes", JointState, 200.0, strokes) as first,
+        publishing("/odd", ParameterEvent, 50.0, lambda number: ParameterEvent(node=f"/n{number}")) as second,
     ):
         topics = ["cylinder_strokes", "/odd", "/never:std_msgs/String"]
         options = ["--split-duration", "1", "--note", "wind: 5 m/s\nx", "--origin", "a test"]
         record = spawn("boom_twin.cli.main", "record", "--out", str(out), "--topics", *topics, *options)
         record.wait_for("recording 3 topics")
+        first.wait_for_listener()
+        second.wait_for_listener()
         time.sleep(3.5)
         assert record.stop(signal.SIGINT) == 0, record.said()
     info = inspect(out)
@@ -91,25 +112,61 @@ def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], tmp_path:
     here = Path(__file__).parents[2] / "msg_config"
     assert sheet["scene"] == (here / "scene.yaml").read_text()
     assert sheet["parameters"] == (here / "twin.yaml").read_text()
+    assert sheet["mapping"] == (here / "topics.yaml").read_text()
+    found = {count["topic"]: (count["received"], count["written"], count["missed"]) for count in sheet["counts"]}
+    assert found == {name: (count, count, 0) for name, count in counts.items()} | {"/never": (0, 0, None)}
+    assert sheet["started"] < sheet["ended"]
     assert sheet["topics"] == {"/cylinder_strokes": JOINT_STATE, "/odd": None, "/never": "std_msgs/msg/String"}
 
 
-def kill_once(spawn: Callable[..., Any], tmp_path: Path, delay: float) -> None:
+def test_the_state_of_a_recording_is_published_until_its_disk_is_full(
+    spawn: Callable[..., Any], bench: Any, tmp_path: Path
+) -> None:
+    """The limit on the size of a file stands for the disk's. All that came before can be saved."""
+    bag = tmp_path / "bag"
+    with publishing("odd_strokes", JointState, 200.0, strokes) as source:
+        record = spawn("boom_twin.cli.main", "record", "--out", str(bag), "--topics", "odd_strokes:sensor_msgs/JointState")
+        bench.until(lambda: float(bench.values(STATE).get("received /odd_strokes", 0)) > 300)
+        status, values = bench.statuses()[STATE], bench.values(STATE)
+        assert (status.level, status.message) == (b"\x00", "running")
+        assert float(values["lag_s"]) < 2.0 == float(values["lag_s_warn"])
+        assert values["never_arrived"] == values["never_arrived /odd_strokes"] == "0"
+        assert int(values["disk_free_bytes"]) > 0 and float(values["disk_left_s"]) > 1800.0
+        full = (bag / "session_0.mcap").stat().st_size + 10_000
+        resource.prlimit(record.pid, resource.RLIMIT_FSIZE, (full, full))
+        bench.until(lambda: bench.statuses().get(STATE) is not None and bench.statuses()[STATE].level == b"\x02")
+        assert record.end(10.0) == 1
+    fault = [line for line in record.said().splitlines() if "cannot be written" in line]
+    assert "Make room or choose another disk" in fault[-1] and "Traceback" not in record.said()
+    assert "cannot be written" in bench.statuses()[STATE].message
+    outcome = recover(bag, tmp_path / "out")
+    saved = numbers(tmp_path / "out", "odd_strokes")
+    assert saved == list(range(saved[0], saved[0] + len(saved))) and outcome.saved.total() == len(saved) > 300
+    assert len(saved) < len(source.times)
+
+
+def numbers(path: Path, topic: str) -> list[int]:
+    """Those of the messages, see `strokes`."""
+    return [round(1e6 * msg.position[0]) for _, _, msg in read(scan(path), {topic: JOINT_STATE})]
+
+
+def kill_once(spawn: Callable[..., Any], tmp_path: Path, delay: float, *options: str) -> None:
     """Record at 200 Hz, kill the recorder after so long, and look at what is left."""
-    with publishing("cylinder_strokes", JointState, 200.0, strokes) as times:
-        record = spawn("boom_twin.cli.main", "record", "--out", str(tmp_path / "bag"), "--topics", "cylinder_strokes")
+    bag = tmp_path / "bag"
+    with publishing("cylinder_strokes", JointState, 200.0, strokes) as source:
+        record = spawn("boom_twin.cli.main", "record", "--out", str(bag), "--topics", "cylinder_strokes", *options)
         record.wait_for(COMPLETE)
         time.sleep(delay)
         assert record.stop(signal.SIGKILL) == -signal.SIGKILL
         killed = time.time_ns()
-        assert times
-    outcome = recover(tmp_path / "bag", tmp_path / "out")
-    session = scan(tmp_path / "out")
-    assert killed - session.end < 1_200_000_000
-    values = [msg.position[0] for _, _, msg in read(session, {"cylinder_strokes": JOINT_STATE})]
-    first = round(1e6 * values[0])
-    assert values == pytest.approx([1e-6 * number for number in range(first, first + len(values))])
-    assert outcome.saved.total() == len(values)
+    outcome = recover(bag, tmp_path / "out")
+    saved = numbers(tmp_path / "out", "cylinder_strokes")
+    assert saved == list(range(saved[0], saved[0] + len(saved)))
+    lost = killed - source.times[saved[-1] - 1]
+    print(f"killed after {delay:.3f} s, lost {lost * 1e-9:.3f} s")
+    assert lost < 1_200_000_000
+    assert outcome.saved.total() == len(saved)
+    assert outcome.lost is None or not any(outcome.lost.values())
 
 
 def test_a_killed_recorder_loses_little(spawn: Callable[..., Any], tmp_path: Path) -> None:
@@ -119,7 +176,8 @@ def test_a_killed_recorder_loses_little(spawn: Callable[..., Any], tmp_path: Pat
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(20))
 def test_a_recorder_killed_many_times(spawn: Callable[..., Any], tmp_path: Path, number: int) -> None:
-    kill_once(spawn, tmp_path, 1.3 + 0.0937 * number)
+    """At a moment drawn anew in each run; every other one while its files are split."""
+    kill_once(spawn, tmp_path, random.uniform(1.3, 4.0), *(["--split-duration", "0.4"] if number % 2 else []))
 
 
 @pytest.mark.parametrize(

@@ -137,12 +137,35 @@ def test_time_set_back_starts_everything_again(scene, still):
     assert sum(len(report.residuals) for report in again) == 0
 
 
-def test_a_stamp_of_the_far_future_is_survived(scene, still):
-    twin = Twin(scene)
-    follow(twin, still, 100)
-    assert twin.update(Sample(Stream.STROKES, 4_102_444_800_000_000_000, still)).events == ("restart",)
-    assert twin.update(strokes(105, still)).events == ("jump back",)
-    assert twin.update(strokes(110, still)).accepted
+@pytest.mark.parametrize("stamp", [4_102_444_800 * 10**9, 2**31 * 10**9 - 1, 1, START - 5000 * 10**9])
+@pytest.mark.parametrize("stream", [Stream.STROKES, Stream.ANGLES])
+def test_a_stray_stamp_changes_nothing(scene, still, stamp, stream):
+    """Of the year 2100, or of 1970: counted, in no prediction, and the next sample is used at once."""
+    clean, disturbed = Twin(scene), Twin(scene)
+    for ms in range(0, 200, 5):
+        if ms in (100, 110):
+            held = disturbed.update(Sample(stream, stamp, still + 0.1))
+            assert held.events == ("leap",) and held.prediction is None and held.residuals == ()
+        expected, got = (twin.update(strokes(ms, moved(still, ms * 1e-3))) for twin in (clean, disturbed))
+        assert equal(expected.prediction, got.prediction) and got.events == ()
+        expected, got = (twin.update(angles(ms, np.zeros(4))) for twin in (clean, disturbed))
+        assert np.array_equal(expected.residuals[0].values, got.residuals[0].values)
+    assert disturbed.counts == {"leap": 2}
+
+
+@pytest.mark.parametrize("far", [-1_600_000_000_000, 1_000_000_000_000])
+def test_a_clock_that_was_set_costs_one_sample(scene, still, far):
+    """And of all samples that were accepted the same comes again."""
+    fresh, twin = Twin(scene), Twin(scene)
+    samples = [strokes(ms, moved(still, ms * 1e-3)) for ms in range(0, 100, 5)]
+    samples += [strokes(far + ms, moved(still, ms * 1e-3)) for ms in range(0, 100, 5)]
+    reports = [twin.update(sample) for sample in samples]
+    assert [report.events for report in reports[20:22]] == [("leap",), ("jump back" if far < 0 else "restart",)]
+    expected = [fresh.update(sample) for sample in samples[21:]]
+    assert all(equal(a.prediction, b.prediction) for a, b in zip(expected, reports[21:], strict=True))
+    again, accepted = Twin(scene), [s for s, report in zip(samples, reports, strict=True) if report.accepted]
+    repeated = [again.update(sample) for sample in accepted]
+    assert [r.stamp for r in repeated if r.prediction] == [r.stamp for r in reports if r.prediction]
 
 
 def test_strokes_out_of_reach_do_not_start_the_model(twin, still):

@@ -1,6 +1,6 @@
 """Normal contact of a pin in its bush: force over penetration and its rate, with the damping of the common laws.
 
-    F = K d^n (1 + chi d' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
+    F = K d^n (1 + chi g' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
 
 K, internal contact of cylinders [R]: K = 4/[3(s_i + s_j)] sqrt(R_i R_j / (R_j - R_i)), s = (1 - nu^2)/E, R_j = R_i + c.
 chi: Lankarani and Nikravesh (1990); Flores et al. (2011); Hunt and Crossley (1975); Hertz has none.
@@ -75,8 +75,7 @@ class Contact:
         elastic = self.stiffness * depth**self.exponent
         if entry is None or depth == 0.0:
             return elastic
-        rate = gap_rate if self.smoothing == 0.0 else gap_rate * depth / hypot(gap, self.smoothing)
-        return max(elastic * (1.0 + self.hysteresis * rate / max(entry, LEAST_SPEED)), 0.0)
+        return max(elastic * (1.0 + self.hysteresis * gap_rate / max(entry, LEAST_SPEED)), 0.0)
 
     def force(self, offset, rate, entry):
         """Force (N) of the bush on the pin, complex; offset (m) and rate (m/s) of the pin against the bush."""

@@ -1,0 +1,185 @@
+"""Read a mapping: a YAML file, or the one that a session was recorded with; whatever it leaves out is as usual."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from ..errors import BagError, Fault, UsageError
+from ..plain import plain, read_plain
+from .sensors import Sensor, kind_faults, set_faults, stream_of, usual
+from .sheet import FILE_NAME
+from .topics import TYPES, Qos, Topic, Topics, default_document, load_topics
+
+DEFAULT_NAME = "default mapping"
+
+_REMEDIES = {
+    "name": "Give the name as it is published.",
+    "sign": "Give 1, or -1 for a sensor that counts the other way.",
+    "zero": "Give what the sensor reads where the quantity is 0, in its unit.",
+    "scale": "Give the factor that corrects the sensor, 1.0 for one that is right; turn it round by sign.",
+    "unit": "Give the unit of the published values.",
+    "absolute": "Give root or head, where on its section the inclinometer sits; leave it out for an encoder.",
+    "depth": "Give a number of messages.",
+}
+_SEE = "See the comments in msg_config/topics.yaml."
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Topics, and where they were read from."""
+
+    topics: Topics
+    source: str
+
+
+def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
+    """The topics and sensors of a YAML file; the package's own if no path is given.
+
+    Parameters
+    ----------
+    path : Path, optional
+    joints : int, optional
+        Of the scene, if that is known: then channels that it does not have are faults too.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or something in it cannot be used: all faults, each with path, value, bound and remedy.
+    """
+    if path is None:
+        return load_topics()
+    return _topics(read_plain(path, UsageError, "Give a file like msg_config/topics.yaml."), str(path), joints)
+
+
+def mapping_of(session: Path, path: Path | None = None, joints: int | None = None) -> Mapped:
+    """The mapping for a recorded session: that of `path`; else that in its ``session.yaml``; else the package's own.
+
+    Raises
+    ------
+    UsageError
+        As `load_mapping`.
+    BagError
+        ``session.yaml`` cannot be read.
+    """
+    if path is not None:
+        return Mapped(load_mapping(path, joints), str(path))
+    sheet = (session if session.is_dir() else session.parent) / FILE_NAME
+    if sheet.is_file():
+        document = read_plain(sheet, BagError, "Move it away, and give the mapping by --mapping.")
+        text = document.get("mapping") if isinstance(document, dict) else None
+        if text is not None:
+            source = f"{sheet}, mapping"
+            try:
+                return Mapped(_topics(plain(str(text)), source, joints), source)
+            except ValueError as error:
+                raise BagError(f"{source}: not YAML ({error}). Give the mapping by --mapping.") from None
+    return Mapped(load_topics(), DEFAULT_NAME)
+
+
+def _topics(document: Any, source: str, joints: int | None) -> Topics:
+    """The topics of a document; UsageError with all faults."""
+    if not isinstance(document, dict | None):
+        raise UsageError(f"{source}: a list or a value: keys inputs, outputs, sensors are needed. {_SEE}")
+    usual_values = default_document()
+    values = _merged(usual_values, document or {})
+    faults = _role_faults(values, usual_values)
+    sensors, names, found = _sensors(values.pop("sensors", None) or {})
+    faults += found
+    topics: Topics | None = None
+    try:
+        topics = Topics.model_validate(values)
+        faults += _name_faults(topics)
+    except ValidationError as error:
+        faults += [_fault(detail) for detail in error.errors(include_url=False)]
+    if joints is not None:
+        faults += set_faults(names, joints, topics is not None and topics.is_shared)
+    if faults or topics is None:
+        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+        raise UsageError("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
+    return topics.model_copy(update={"sensors": sensors})
+
+
+def _merged(base: Any, own: Any) -> Any:
+    """`own`, with what it leaves out as in `base`."""
+    if not (isinstance(base, dict) and isinstance(own, dict)):
+        return own
+    return {**base, **{key: _merged(base.get(key), value) for key, value in own.items()}}
+
+
+def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[Fault]:
+    """Roles that are not known, which are taken out of `values`, and types that are not those of their roles."""
+    faults: list[Fault] = []
+    types = {role.value: type_name for role, type_name in TYPES.items()}
+    for side in ("inputs", "outputs"):
+        if not isinstance(values[side], dict):
+            continue
+        for role in [role for role in values[side] if role not in usual_values[side]]:
+            near = get_close_matches(str(role), usual_values[side], n=1, cutoff=0.0)
+            faults.append(Fault(f"{side}.{role}", values[side].pop(role), "unknown topic", f"The nearest is `{near[0]}`."))
+        for role, topic in values[side].items():
+            if isinstance(topic, dict) and topic["type"] != types[role]:
+                bound = f"only {types[role]} is read or filled there"
+                faults.append(Fault(f"{side}.{role}.type", topic["type"], bound, "Leave the key out."))
+    return faults
+
+
+def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault]]:
+    """The sensors that can be used by themselves, the names of all, and the faults."""
+    if not isinstance(values, dict):
+        return {}, {}, [Fault("sensors", values, "a block of channels is needed", _SEE)]
+    sensors: dict[str, Sensor] = {}
+    names: dict[str, str] = {}
+    faults: list[Fault] = []
+    for channel, given in values.items():
+        if stream_of(str(channel)) is None:
+            bound = "channels are cylinder_1, cylinder_2 .., joint_1, joint_2 .., tip_imu_x and tip_imu_z"
+            faults.append(Fault(f"sensors.{channel}", given, bound, "Name one of them."))
+            continue
+        merged = _merged(usual(channel), given or {})
+        if isinstance(merged, dict):
+            names[channel] = str(merged["name"])
+            faults += kind_faults(channel, merged)
+        try:
+            sensors[channel] = Sensor.model_validate(merged)
+        except ValidationError as error:
+            faults += [_fault(detail, "sensors", channel) for detail in error.errors(include_url=False)]
+    return sensors, names, faults
+
+
+def _fault(detail: ErrorDetails, *before: str) -> Fault:
+    """A pydantic error in the words of the file; `before` leads to what was validated."""
+    place = [*before, *map(str, detail["loc"])]
+    if detail["type"] == "extra_forbidden":
+        near = get_close_matches(place[-1], _model_at(place).model_fields, n=1, cutoff=0.0)
+        return Fault(".".join(place), detail["input"], "unknown key", f"The nearest known key here is `{near[0]}`.")
+    bound = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "it must")
+    return Fault(".".join(place), detail["input"], bound, _REMEDIES.get(place[-1], _SEE))
+
+
+def _model_at(place: list[str]) -> type[BaseModel]:
+    """What the key at `place` stands in."""
+    if place[0] == "sensors" and len(place) > 1:
+        return Sensor
+    return Qos if "qos" in place[:-1] else Topic if len(place) > 1 else Topics
+
+
+def _name_faults(topics: Topics) -> Iterator[Fault]:
+    """Names that two topics have; only strokes and angles may, if their QoS is the same."""
+    present: dict[str, Topic] = {f"inputs.{stream.value}": topic for stream, topic in topics.inputs.items()}
+    present |= {f"outputs.{key.value}": topic for key, topic in topics.outputs.items()}
+    users: dict[str, str] = {}
+    for place, topic in present.items():
+        first = users.setdefault(topic.absolute, place)
+        if {first, place} == {"inputs.cylinder_strokes", "inputs.joint_angles"}:
+            if topic.qos != present[first].qos:
+                bound = f"{first} is the same topic with another"
+                yield Fault(f"{place}.qos", topic.qos.model_dump(), bound, "Give both the same.")
+        elif first != place:
+            yield Fault(f"{place}.name", topic.name, f"{first} has this name too", "Give each its own name.")

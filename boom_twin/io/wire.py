@@ -1,0 +1,113 @@
+"""Messages of the rig read from their bytes: numbers where they stand, as long as all before them is as it was.
+
+A publisher sends the same names in every message. Decoding a message costs ten times as much as unpacking its numbers.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ..records import Stream
+from .cdr import names_in, stamp_in
+from .topics import TYPES
+
+_ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
+_LITTLE = b"\x00\x01"
+_TIME = 8  # bytes of a stamp
+_BEFORE_FORCE = 25  # doubles of an Imu before its linear acceleration
+
+
+class Joints(NamedTuple):
+    """What is read of a sensor_msgs/JointState."""
+
+    name: tuple[str, ...]
+    position: tuple[float, ...]
+
+
+class Vector(NamedTuple):
+    """A geometry_msgs/Vector3."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Force(NamedTuple):
+    """What is read of a sensor_msgs/Imu."""
+
+    linear_acceleration: Vector
+    linear_acceleration_covariance: tuple[float]
+
+
+class _Layout(NamedTuple):
+    """How a message was laid out that was decoded; the next one may be as that one was."""
+
+    size: int
+    head: bytes
+    end: int
+    at: int
+    numbers: struct.Struct
+    make: Callable[[tuple[float, ...]], Joints | Force]
+
+    def is_of(self, data: bytes) -> bool:
+        """Whether `data` is laid out like this."""
+        return len(data) == self.size and data[:2] == _LITTLE and data[_ORIGIN + _TIME : self.end] == self.head
+
+
+class Wire:
+    """Reads the messages of one topic.
+
+    Parameters
+    ----------
+    type_name : str
+        ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
+    decode : callable
+        Decodes a message that is laid out in another way than the one before.
+    """
+
+    def __init__(self, type_name: str, decode: Callable[[bytes], Any]) -> None:
+        self._learn = _force_layout if type_name == TYPES[Stream.IMU] else _joints_layout
+        self._decode = decode
+        self._layout: _Layout | None = None
+
+    def read(self, data: bytes) -> tuple[int, Any]:
+        """Stamp (ns) and message, which has the fields that `boom_twin.io.intake.Intake` reads.
+
+        Raises
+        ------
+        ValueError, or what `decode` raises
+            The message is not whole.
+        """
+        layout = self._layout
+        if layout is not None and layout.is_of(data):
+            msg: Any = layout.make(layout.numbers.unpack_from(data, layout.at))
+        else:
+            msg = self._decode(data)
+            self._layout = self._learn(data) if data[:2] == _LITTLE else None
+        stamp = stamp_in(data)
+        if stamp is None:
+            raise ValueError("the message is too short for a header")
+        return stamp, msg
+
+
+def _joints_layout(data: bytes) -> _Layout:
+    """Of a JointState: header, names, and the number of positions come before these."""
+    names, place = names_in(data)
+    end = place + -(place - _ORIGIN) % 4 + 4
+    count = int.from_bytes(data[end - 4 : end], "little")
+    at = end + -(end - _ORIGIN) % 8
+    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct(f"<{count}d"), lambda row: Joints(names, row))
+
+
+def _force_layout(data: bytes) -> _Layout:
+    """Of an Imu: after the header all has its place."""
+    end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
+    at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
+    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), _force)
+
+
+def _force(row: tuple[float, ...]) -> Force:
+    x, y, z, covariance = row
+    return Force(Vector(x, y, z), (covariance,))

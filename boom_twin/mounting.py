@@ -1,0 +1,73 @@
+"""What an angle sensor is compared with: the angle of its joint, or the angle of its section to the horizontal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .chain.program import JOINT_A, JOINT_B, State
+from .errors import UsageError
+from .plan.compile import Plan
+from .records import Array, Mount
+
+TURN = 2.0 * np.pi
+
+
+class Mounting:
+    """The angle sensors of a boom, one for each joint.
+
+    An encoder reads the angle of its joint. An inclinometer reads the angle of the root, or of the head, of its section to
+    the horizontal, and is compared with just that: nothing measured by another sensor enters, so a fault of one inclinometer
+    stays in its own residual. Readings of an inclinometer may differ by whole turns. It is taken as ideal: a real one that
+    finds the horizontal by its acceleration is wrong while its section accelerates.
+
+    Parameters
+    ----------
+    plan : Plan
+    inclination : float
+        Of the base, rad.
+    mounts : sequence of Mount or None
+        Of the sensor of each joint; None is an encoder. Empty: encoders all.
+
+    Raises
+    ------
+    UsageError
+        Their number is not that of the joints.
+    """
+
+    def __init__(self, plan: Plan, inclination: float, mounts: Sequence[Mount | None]) -> None:
+        mounts = mounts or [None] * plan.joints
+        if len(mounts) != plan.joints:
+            raise UsageError(f"mounts has {len(mounts)} entries, not {plan.joints}. Give one for each joint, or none.")
+        self._has_any = any(mounts)
+        kinds = plan.tables.operations.kind
+        roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
+        heads = np.append(roots[1:] - 1, len(kinds))
+        self._frames = np.where([mount == "head" for mount in mounts], heads, roots)
+        self._absolute = np.array([mount is not None for mount in mounts])
+        self._inclination = inclination
+
+    def expected(self, joints: Array, live: State) -> Array:
+        """What the sensors should read, rad, shape (n,), while the joint angles are `joints` and the boom is as `live`."""
+        if not self._has_any:
+            return joints
+        return np.where(self._absolute, live.frames[self._frames, 2] + self._inclination, joints)
+
+    def deviations(self, joint_sigmas: Array, variance: float) -> Array:
+        """Deviations expected of the readings, rad, shape (n,), from those of the joints' angles.
+
+        What stroke noise does to the joints inboard is added up as if all of it came from one mode, which is the most that it
+        can be; the sensor's own noise, of `variance` (rad^2), counts once.
+        """
+        if not self._has_any:
+            return joint_sigmas
+        shaken = np.sqrt(np.maximum(joint_sigmas**2 - variance, 0.0))
+        return np.where(self._absolute, np.sqrt(variance + np.cumsum(shaken) ** 2), joint_sigmas)
+
+    def residuals(self, measured: Array, expected: Array) -> Array:
+        """Measured minus expected, rad, shape (n,); of inclinometers the smallest of all whole turns."""
+        difference = measured - expected
+        if not self._has_any:
+            return difference
+        return difference - np.where(self._absolute, TURN * np.round(difference / TURN), 0.0)

@@ -1,0 +1,105 @@
+"""Plain values of a YAML text from anyone: no tag makes an object, and no alias or list fills the memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+
+from .errors import BoomTwinError
+
+LARGEST = 4 * 2**20
+"""Bytes of a file that is read."""
+MOST = 50_000
+"""Values that it may hold, aliases written out."""
+DEEPEST = 30
+
+_TAG = "tag:yaml.org,2002:"
+
+
+def read_plain(path: Path, failure: type[BoomTwinError], remedy: str) -> Any:
+    """The values of a YAML file; `failure` with the path, the reason and the remedy if it cannot be read."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise ValueError(f"more than {LARGEST} bytes")
+        return plain(data.decode("utf-8-sig"))
+    except OSError as error:
+        raise failure(f"{path}: {error.strerror}. {remedy}") from None
+    except ValueError as error:
+        raise failure(f"{path}: not a readable YAML file ({error}). {remedy}") from None
+
+
+def plain(text: str) -> Any:
+    """The values of a YAML text: dict, list, str, int, float, bool or None; None for an empty text.
+
+    Raises
+    ------
+    ValueError
+        It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST` values, or is
+        nested deeper than `DEEPEST`.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = BoundedComposer
+    try:
+        root = yaml.compose(text)
+        return None if root is None else _Values(yaml.constructor).of(root, 0)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    except YAMLError as error:
+        raise ValueError(" ".join(str(error).split())) from None
+
+
+class BoundedComposer(Composer):
+    """Stops at too many nodes, each of which takes a hundred times the memory of its text."""
+
+    nodes = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """The next node."""
+        self.nodes += 1
+        if self.nodes > MOST:
+            raise YAMLError(f"more than {MOST} values")
+        return super().compose_node(parent, index)
+
+
+class _Values:
+    """Turns nodes into values."""
+
+    def __init__(self, constructor: Any) -> None:
+        self._constructor, self._count = constructor, 0
+
+    def of(self, node: Node, depth: int) -> Any:
+        self._count += 1
+        if self._count > MOST or depth > DEEPEST:
+            raise ValueError(f"more than {MOST} values by aliases, or nested deeper than {DEEPEST}")
+        if isinstance(node, MappingNode):
+            return self._mapping(node, depth)
+        if isinstance(node, ScalarNode):
+            return self._scalar(node)
+        return [self.of(item, depth + 1) for item in node.value]
+
+    def _mapping(self, node: MappingNode, depth: int) -> dict[Any, Any]:
+        found: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, ScalarNode) or key_node.tag == _TAG + "merge":
+                raise ValueError(f"line {line}: a key that is not plain")
+            key = self._scalar(key_node)
+            if key in found:
+                raise ValueError(f"line {line}: key {key} stands there twice")
+            found[key] = self.of(value_node, depth + 1)
+        return found
+
+    def _scalar(self, node: ScalarNode) -> Any:
+        kind = str(node.tag).removeprefix(_TAG)
+        if kind in ("int", "float", "bool", "null"):
+            return self._constructor.construct_object(node)
+        if kind not in ("str", "timestamp"):
+            raise ValueError(f"line {node.start_mark.line + 1}: the tag {node.tag}, which is not allowed")
+        return node.value

@@ -1,0 +1,62 @@
+"""The node's services: start again from rest, set the zero of a sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.service import Service
+from std_srvs.srv import Trigger
+
+from ..errors import UsageError
+from ..twin import Twin
+
+INACTIVE = "the node is not active, so nothing is measured. Activate it first."
+
+
+class Services:
+    """``~/reset`` and, by sensor, ``~/rezero/joint_i``, ``~/rezero/cylinder_i``, ``~/rezero/tip_imu``; all std_srvs/Trigger.
+
+    Parameters
+    ----------
+    node : Node
+    twin : Twin
+        Takes what is asked for with its next full stroke sample.
+    is_active : callable
+        Whether the node is.
+    """
+
+    def __init__(self, node: Node, twin: Twin, is_active: Callable[[], bool]) -> None:
+        self._node, self._twin, self._is_active = node, twin, is_active
+        numbers = range(1, twin.plan.joints + 1)
+        sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
+        acts: dict[str, Callable[[], str]] = {"reset": self._reset}
+        acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
+        self._services: list[Service] = [
+            node.create_service(Trigger, f"~/{name}", partial(self._answer, act)) for name, act in acts.items()
+        ]
+
+    def close(self) -> None:
+        """Offer them no more."""
+        for service in self._services:
+            self._node.destroy_service(service)
+
+    def _answer(self, act: Callable[[], str], request: Any, response: Any) -> Any:
+        try:
+            if not self._is_active():
+                raise UsageError(INACTIVE)
+            response.success, response.message = True, act()
+        except UsageError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _reset(self) -> str:
+        self._twin.requests.rest()
+        return "starts again from rest with the next full stroke sample"
+
+    def _rezero(self, sensor: str) -> str:
+        found = self._twin.rezero(sensor)
+        told = ", ".join(f"zero of {name}: {value:g}" for name, value in found.items())
+        return f"{told}; holds from the next full stroke sample on"

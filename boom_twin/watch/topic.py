@@ -1,0 +1,79 @@
+"""Whether one input topic is as it should be."""
+
+from __future__ import annotations
+
+from math import nan
+
+from ..thresholds import Thresholds
+from .channel import NANO
+from .gate import Bounds
+from .judge import Judge
+from .peers import Peers
+from .status import Level, Status
+from .stream import StreamWatch
+
+
+class TopicJudge:
+    """Judges one input topic.
+
+    Parameters
+    ----------
+    name : str
+        As in ``topics.yaml``.
+    required : bool
+        Whether the twin needs it.
+    """
+
+    def __init__(self, name: str, required: bool) -> None:
+        self._judge, self._required = Judge(name), required
+        self._counted = (nan, 0)
+
+    def status(
+        self, stream: StreamWatch, publishers: Peers, offset: float, thresholds: Thresholds, now: float, clock: float
+    ) -> Status:
+        """State of the topic.
+
+        Parameters
+        ----------
+        stream : StreamWatch
+            After its look.
+        publishers : Peers
+        offset : float
+            By how much the stamps are behind those of the strokes, s; NaN where it is not known.
+        thresholds : Thresholds
+        now, clock : float
+            As for `boom_twin.watch.sensor.SensorJudge`.
+        """
+        judge, age = self._judge, stream.age(now)
+        judge.begin(now, thresholds)
+        judge.note("topic", publishers.address)
+        self._count(stream, now)
+        names = ", ".join(publishers.names)
+        judge.note("publisher_names", names)
+        told = f"{len(publishers.names)} publishers of the same readings: {names}"
+        judge.note("publishers", len(publishers.names))
+        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Bounds(warn=0), told)
+        if publishers.incompatible:
+            judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
+        if stream.newest is None and not self._required:
+            return judge.finish(clock, "not there; optional")
+        told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
+        judge.check_age(age, thresholds.stale_after, told)
+        if stream.newest is not None:
+            judge.note("newest_stamp_s", seconds(stream.newest))
+            judge.note("clock_minus_stamp_s", clock - stream.newest * NANO)
+        told = f"stamped {offset:+.3f} s behind the strokes: synchronise the sensors' clocks"
+        judge.check("clock_offset_s", abs(offset), Bounds(thresholds.clock_offset), told)
+        return judge.finish(clock, "listened to" if stream.newest is not None else "waiting for a message")
+
+    def _count(self, stream: StreamWatch, now: float) -> None:
+        """Messages, and how many a second since the last look."""
+        time, count = self._counted
+        self._counted = (now, stream.count)
+        self._judge.note("messages", stream.count)
+        self._judge.note("rate_Hz", (stream.count - count) / (now - time) if now > time else nan)
+
+
+def seconds(stamp: int | None) -> str:
+    """A stamp (ns) in seconds, exactly."""
+    return "nan" if stamp is None else f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d}"

@@ -1,0 +1,143 @@
+"""The twin and all that it listens to, judged together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from ..records import Report, Residuals, Sample, Stream
+from ..thresholds import Thresholds
+from .model import ModelWatch
+from .outputs import OutputsJudge
+from .peers import Peers
+from .residual import ResidualJudge
+from .sensor import Sensor, SensorJudge
+from .status import Status
+from .stream import StreamWatch
+from .topic import TopicJudge
+
+
+class TwinWatch:
+    """Takes what the node does, message by message, and judges it when asked; nothing is worked out for a single message.
+
+    Parameters
+    ----------
+    sensors : dict of Stream to sequence of Sensor
+        In the order of a sample's values; empty before the node is configured.
+    names : dict of Stream to str
+        Names of the input topics.
+    thresholds : Thresholds
+        May be replaced while it runs.
+    """
+
+    def __init__(self, sensors: Mapping[Stream, Sequence[Sensor]], names: Mapping[Stream, str], thresholds: Thresholds) -> None:
+        self.thresholds = thresholds
+        self._sensors = {stream: [SensorJudge(sensor) for sensor in each] for stream, each in sensors.items()}
+        self._topics = {stream: TopicJudge(names[stream], each[0].required) for stream, each in sensors.items()}
+        self._streams = {
+            stream: StreamWatch(np.array([sensor.low for sensor in each]), np.array([sensor.high for sensor in each]))
+            for stream, each in sensors.items()
+        }
+        self._model, self._outputs = ModelWatch(), OutputsJudge()
+        self.begin()
+
+    def begin(self) -> None:
+        """Listening begins."""
+        now = time.monotonic()
+        for stream in self._streams.values():
+            stream.begin(now)
+        self._model.begin(now)
+        self._residuals: list[Residuals] = []
+        self._judges: dict[str, ResidualJudge] = {}
+        self._silent: set[Stream] = set()
+
+    # -- one message --------------------------------------------------------------------------------------------------
+
+    def seen(self, stream: Stream, stamp: int) -> None:
+        """A message came."""
+        self._streams[stream].seen(stamp)
+
+    def took(self, sample: Sample, report: Report, duration: float) -> None:
+        """The twin made `report` of `sample` in so many seconds."""
+        self._streams[sample.stream].took(sample)
+        self._model.took(report, duration)
+        if report.residuals:
+            self._residuals += report.residuals
+
+    def broken(self, reason: str) -> None:
+        """A message could not be handled at all."""
+        self._model.break_down(reason)
+
+    # -- a look -------------------------------------------------------------------------------------------------------
+
+    @property
+    def newest(self) -> int | None:
+        """Stamp of the newest stroke, ns."""
+        return self._streams[Stream.STROKES].newest
+
+    def is_urgent(self) -> bool:
+        """Whether the model failed, or a stream fell silent or is heard again: worth a look out of turn."""
+        now = time.monotonic()
+        before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
+        return self._model.has_failed or before != self._silent
+
+    def look(
+        self,
+        counts: Mapping[str, str | int],
+        is_active: bool,
+        publishers: Mapping[Stream, Peers],
+        subscribers: Iterable[Peers],
+        clock: float,
+    ) -> list[Status]:
+        """The state of model, topics, sensors and residuals; of the model alone while the twin does not listen.
+
+        Parameters
+        ----------
+        counts : dict
+            Told with the model.
+        is_active : bool
+            Whether the twin listens.
+        publishers : dict of Stream to Peers
+            Of every input.
+        subscribers : iterable of Peers
+            Of all outputs.
+        clock : float
+            Time that people know, s.
+        """
+        now = time.monotonic()
+        is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], now)
+        found = [self._model.status(counts, is_active, is_fed, self.thresholds, now, clock)]
+        if not is_active:
+            return found
+        sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
+        found += [self._topic(stream, publishers[stream], now, clock) for stream in self._streams]
+        found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
+        return found + sensors + self._look_at_residuals(now, clock)
+
+    def _is_silent(self, stream: StreamWatch, now: float) -> bool:
+        return stream.newest is None or stream.age(now) > self.thresholds.stale_after
+
+    def _topic(self, stream: Stream, peers: Peers, now: float, clock: float) -> Status:
+        watch = self._streams[stream]
+        offset = watch.lag - self._streams[Stream.STROKES].lag
+        return self._topics[stream].status(watch, peers, offset, self.thresholds, now, clock)
+
+    def _look_at(self, stream: Stream, now: float, clock: float) -> list[Status]:
+        """The sensors of one stream."""
+        watch = self._streams[stream]
+        return [
+            judge.status(figures, watch.age_of(figures, now), self.thresholds, now, clock)
+            for judge, figures in zip(self._sensors[stream], watch.look(self.thresholds.gap_warn), strict=True)
+        ]
+
+    def _look_at_residuals(self, now: float, clock: float) -> list[Status]:
+        """Every channel that ever had a residual."""
+        taken, self._residuals = self._residuals, []
+        for names in dict.fromkeys(each.names for each in taken):
+            those = [each for each in taken if each.names == names]
+            values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
+            for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
+                self._judges.setdefault(name, ResidualJudge(name)).take(column, now)
+        return [judge.status(self.thresholds, now, clock) for judge in self._judges.values()]

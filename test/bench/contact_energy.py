@@ -1,0 +1,93 @@
+"""Energy of closed booms with contact over many steps, for every step size: ``python test/bench/contact_energy.py [STEPS]``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from oracle import booms, energy
+from oracle.clearance.scenes import RODS, contact_energy, with_pins
+
+from boom_twin.analysis.rows import row_width
+from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
+from boom_twin.analysis.statics import settle
+from boom_twin.chain.step import run
+from boom_twin.physics.contact import LOST
+from boom_twin.physics.integrators import GENERALISED_ALPHA
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+
+PULSE, DURATION = np.array([0.03, -0.02, 0.03, 0.02]), 0.4  # m, s: a jerk of all four cylinders
+STEPS = (1e-3, 3e-4, 1e-4, 1e-5)
+LAWS = (("hertz", 1.0, False), ("lankarani-nikravesh", 0.9, False), ("flores", 0.5, False), ("lankarani-nikravesh", 0.9, True))
+
+
+def booms_with(law, restitution, damped=False, **contact):
+    """The default boom on worn rod pins, with damping of its own or without any."""
+    spec = booms.document()
+    if not damped:
+        for section, joint in zip(spec["sections"], spec["joints"], strict=True):
+            section.pop("beta")
+            joint["cylinder"].pop("d")
+    return with_pins(spec, RODS, law=law, restitution=restitution, **contact)
+
+
+class Closed:
+    """A boom after its drives have shaken it; its energy counts from where it will rest."""
+
+    def __init__(self, scene, posture, step):
+        self.plan = compile_scene(scene)
+        self.state, self.work, self.step = self.plan.state(), self.plan.work(), step
+        first, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
+        self.drive, self.rest = self.plan.closed_lengths + first + PULSE, 0.0
+        settle(self.plan, self.state, self.work, first + PULSE, angles)
+        self.rest = self.energy()
+        settle(self.plan, self.state, self.work, first, angles)
+        x = np.arange(1, round(DURATION / step) + 1)[:, None] * step / DURATION
+        drives = self.plan.closed_lengths + first + PULSE * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        self._run(drives, PULSE * 30.0 * x**2 * (1.0 - x) ** 2 / DURATION)
+        self.first = self.energy()
+
+    def energy(self):
+        """J above rest."""
+        return energy.total(self.plan, self.state, self.drive) + contact_energy(self.plan, self.state) - self.rest
+
+    def watch(self, steps, every):
+        """Largest rise above the first energy, energy at the end (both over the first), contacts lost."""
+        still, worst = np.zeros((every, self.plan.joints)), 0.0
+        drives = np.tile(self.drive, (every, 1))
+        for _ in range(steps // every):
+            self._run(drives, still)
+            worst = max(worst, self.energy() - self.first)
+        return worst / self.first, self.energy() / self.first, int(self.state.contacts[:, LOST].sum())
+
+    def _run(self, drives, rates):
+        out, count = np.zeros((1, row_width(self.plan))), np.array([len(drives)])
+        status, *_ = run(
+            self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, GENERALISED_ALPHA, RHO,
+            TOLERANCE, PASSES, None, out,
+        )  # fmt: skip
+        assert status == 0, status
+
+
+def main(steps):
+    """A line a case, and the worst."""
+    worst = (-np.inf, "")
+    print(f"{steps} steps each, from {DURATION:g} s after the start; energies over the first")
+    for law, restitution, damped in LAWS:
+        for step in STEPS:
+            begun = time.perf_counter()
+            rise, left, lost = Closed(booms_with(law, restitution, damped), "arch", step).watch(steps, max(1, steps // 20000))
+            name = f"{law} {restitution:g}{', damped' if damped else ''}, dt {step:g} s"
+            print(f"{name:42s} rise {rise:.1e}  end {left:.4f}  lost {lost}  {time.perf_counter() - begun:.0f} s", flush=True)
+            worst = max(worst, (rise, name))
+    print(f"worst: {worst[1]}, {worst[0]:.1e}")
+
+
+if __name__ == "__main__":
+    main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000)

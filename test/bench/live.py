@@ -1,0 +1,240 @@
+"""The live node beside a bare echo node with the same topics in and out: loss, latency, processor time.
+
+Run ``python test/bench/live.py`` on an idle machine: real processes and DDS, loopback only; medians of three runs. A
+source sends strokes and angles, stamped with the time of sending; a listener takes everything that is published. The node
+comes first, then the echo, which is rclpy as its tutorials use it: four stamped messages for every stroke sample, one for every
+angle sample, nothing computed; once on rclpy's default executor, once on the events executor.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from argparse import ArgumentParser
+from array import array
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import AccelStamped, PointStamped, Vector3Stamped
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from boom_twin.io.cdr import stamp_in
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+
+OUT = {
+    "tip/position": PointStamped,
+    "tip/displacement": Vector3Stamped,
+    "tip/acceleration": AccelStamped,
+    "joint_states": JointState,
+    "residuals": JointState,
+}
+SENSOR = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+NAMES = {"node": "boom_twin", "echo": "echo", "echo-events": "echo"}
+TICK = os.sysconf("SC_CLK_TCK")
+
+
+class Echo(Node):
+    """Answers every message at once."""
+
+    def __init__(self) -> None:
+        super().__init__("echo")
+        self._out = {name: (self.create_publisher(kind, f"~/{name}", 100), kind()) for name, kind in OUT.items()}
+        for message in (self._out["joint_states"][1], self._out["residuals"][1]):
+            message.name = [f"joint_{i}" for i in range(1, 5)]
+            message.position = message.velocity = message.effort = array("d", [0.0] * 4)
+        strokes = ["tip/position", "tip/displacement", "tip/acceleration", "joint_states"]
+        self.create_subscription(JointState, "cylinder_strokes", lambda msg: self._answer(msg, strokes), SENSOR)
+        self.create_subscription(JointState, "joint_angles", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
+
+    def _answer(self, msg: JointState, names: list[str]) -> None:
+        for name in names:
+            publisher, answer = self._out[name]
+            answer.header.stamp = msg.header.stamp
+            publisher.publish(answer)
+
+
+def echo() -> None:
+    """On rclpy's default executor, until it is killed."""
+    node = Echo()
+    print("active;", flush=True)
+    rclpy.spin(node)
+
+
+def echo_on_events() -> None:
+    """On the executor that costs least."""
+    node, executor = Echo(), EventsExecutor()
+    executor.add_node(node)
+    print("active;", flush=True)
+    while True:
+        executor.spin_once(timeout_sec=1.0)
+
+
+def source(rate_text: str, duration_text: str) -> None:
+    """Send, once it has been found; prints a line when it begins, and the stamps of the strokes."""
+    rate, duration = float(rate_text), float(duration_text)
+    node, scene = rclpy.create_node("source"), load_scene()
+    publishers = [node.create_publisher(JointState, name, SENSOR) for name in ("cylinder_strokes", "joint_angles")]
+    end = time.monotonic() + 30.0
+    while any(publisher.get_subscription_count() < 1 for publisher in publishers):
+        if time.monotonic() > end:
+            raise SystemExit("nobody listens")
+        time.sleep(0.1)
+    time.sleep(1.0)
+    random, rest = np.random.default_rng(1), strokes_of_posture(scene, "arch")
+    angles = joint_angles_of_strokes(scene, rest)
+    templates = []
+    for kind, values, sigma in (("cylinder", rest, 2e-5), ("joint", angles, 1.7e-4)):
+        msg = JointState(name=[f"{kind}_{i}" for i in range(1, 5)])
+        rows = values + random.normal(0.0, sigma, (200, 4))
+        for row in rows:
+            msg.position = array("d", row)
+            templates.append(bytearray(serialize_message(msg)))
+    print("sending", flush=True)
+    stamps, began = [], time.monotonic()
+    for k in range(int(rate * duration)):
+        left = began + k / rate - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)
+        for publisher, place in zip(publishers, (k % 200, 200 + k % 200), strict=True):
+            stamp = time.time_ns()
+            data = templates[place]
+            data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")
+            publisher.publish(bytes(data))
+            if publisher is publishers[0]:
+                stamps.append(stamp)
+    print(json.dumps({"sent": stamps, "seconds": time.monotonic() - began}), flush=True)
+    time.sleep(1.0)
+
+
+def listen(who: str, *forget: str) -> None:
+    """Until SIGTERM; prints stamps and delays by topic, unless it is to forget them."""
+    node, heard = rclpy.create_node("listener"), {}
+    qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
+
+    def hear(name: str, kind: type) -> None:
+        rows: Any = deque(maxlen=1 if forget else None)
+        heard[name] = rows
+        node.create_subscription(kind, f"/{who}/{name}", lambda data: rows.append((data[:12], time.time_ns())), qos, raw=True)
+
+    for name, kind in OUT.items():
+        hear(name, kind)
+    ended: list[int] = []
+    signal.signal(signal.SIGTERM, lambda *_: ended.append(1))
+    executor = EventsExecutor()
+    executor.add_node(node)
+    while not ended:
+        executor.spin_once(timeout_sec=0.1)
+    found = {name: [(stamp_in(data), now) for data, now in rows] for name, rows in heard.items()}
+    print(json.dumps({name: [[stamp, now - stamp] for stamp, now in rows] for name, rows in found.items()}))
+
+
+def cpu(process: subprocess.Popen) -> float:
+    """Processor seconds so far."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / TICK
+
+
+def memory(process: subprocess.Popen) -> float:
+    """Resident, MB."""
+    return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
+
+
+def run(who: str, rate: float, duration: float, arguments: list[str]) -> dict[str, float]:
+    """One answering process with source and listener."""
+    own = [sys.executable, __file__]
+    command = [sys.executable, "-m", "boom_twin.ros.main", *arguments] if who == "node" else [*own, who]
+    with tempfile.TemporaryDirectory() as folder:
+        log, out = Path(folder) / "log", Path(folder) / "heard"
+        answering = subprocess.Popen(command, stdout=log.open("w"), stderr=subprocess.STDOUT)
+        listener = subprocess.Popen([*own, "listen", NAMES[who]], stdout=out.open("w"))
+        try:
+            while "active;" not in log.read_text():
+                if answering.poll() is not None:
+                    raise SystemExit(log.read_text())
+                time.sleep(0.2)
+            sending = subprocess.Popen([*own, "source", str(rate), str(duration)], stdout=subprocess.PIPE, text=True)
+            assert sending.stdout is not None
+            sending.stdout.readline()
+            before = cpu(answering)
+            told = json.loads(sending.stdout.readline())
+            used = cpu(answering) - before
+            resident = memory(answering)
+            time.sleep(1.0)
+            listener.send_signal(signal.SIGTERM)
+            listener.wait(60)
+            heard = json.loads(out.read_text())
+        finally:
+            for process in (answering, listener):
+                process.kill()
+    return judge(told, heard) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
+
+
+def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, float]:
+    """Loss and latency of one process."""
+    answers = heard["tip/position"]
+    delays = np.array([delay for _, delay in answers]) * 1e-6
+    sent, stamps = told["sent"], [stamp for stamp, _ in answers]
+    return {
+        "rate": len(sent) / told["seconds"],
+        "lost": len(set(sent) - set(stamps)),
+        "twice": len(stamps) - len(set(stamps)),
+        "residuals lost": len(sent) - len(heard["residuals"]),
+        "p50": float(np.quantile(delays, 0.5)),
+        "p99": float(np.quantile(delays, 0.99)),
+    }
+
+
+def compared(rate: float, duration: float, arguments: list[str]) -> dict[str, float]:
+    """The node, then the echoes, in one go."""
+    of = {who: run(who, rate, duration, arguments) for who in NAMES}
+    found = {f"{who} {key}": value for who, numbers in of.items() for key, value in numbers.items()}
+    for who in ("echo", "echo-events"):
+        found[f"cpu over {who}"] = of["node"]["cpu"] / of[who]["cpu"]
+        for key in ("p50", "p99"):
+            found[f"{key} added to {who}"] = of["node"][key] - of[who][key]
+    return found
+
+
+def main() -> None:
+    """Print the medians."""
+    if sys.argv[1:2] and sys.argv[1] in ROLES:
+        rclpy.init()
+        ROLES[sys.argv[1]](*sys.argv[2:])
+        return
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--rate", type=float, default=1000.0, help="of strokes and of angles, Hz (1000)")
+    parser.add_argument("--duration", type=float, default=60.0, help="s (60)")
+    parser.add_argument("--runs", type=int, default=3)
+    args, rest = parser.parse_known_args()
+    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
+    for name in runs[0]:
+        values = [each[name] for each in runs]
+        print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")
+    print(f"load of the machine, 1 min {os.getloadavg()[0]:10.2f}")
+
+
+ROLES = {
+    "echo": echo,
+    "echo-events": echo_on_events,
+    "listen": listen,
+    "source": source,
+}
+
+if __name__ == "__main__":
+    main()

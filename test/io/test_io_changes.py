@@ -1,0 +1,99 @@
+"""Changes of a running twin as messages, and where a replay repeats them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay
+from boom_twin.errors import BagError
+from boom_twin.io.changes import Changes, decode, encode
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.reader import read, scan
+from boom_twin.io.session import _Messages
+from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.io.typestore import jazzy
+from boom_twin.io.writer import SessionWriter
+from boom_twin.records import Change, Stream
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.settings import Settings
+
+TYPE = TYPES[Output.CHANGES]
+SECOND = 1_000_000_000
+
+
+def change(stamp: int, **live: float) -> Change:
+    return Change(stamp, bool(live), Settings(**live).live, {})
+
+
+def test_there_and_back() -> None:
+    there = Change(12 * SECOND + 5, True, Settings(payload=40.0, gap=0.3).live, {"joint_2": 0.01, "tip_imu_x": -0.2})
+    assert decode(jazzy().deserialize_cdr(encode(there), TYPE)) == there
+
+
+@pytest.mark.parametrize(("name", "value"), [("gap", -1.0), ("payload", np.nan), ("gap", np.inf)])
+def test_values_of_a_stranger_are_checked(name: str, value: float) -> None:
+    msg = RosbagsTypes().make(TYPE)
+    msg.name, msg.position = [name], np.array([value])
+    with pytest.raises(BagError, match=name):
+        decode(msg)
+
+
+def begun(logged: list[tuple[float, float]], strokes: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Stamps of changes and log times of the strokes that they begin with, from log times and stamps; all in s."""
+    changes = Changes([(round(log * SECOND), change(round(stamp * SECOND))) for log, stamp in logged])
+    return [
+        (each.stamp / SECOND, round(log, 6))
+        for log, stamp in strokes
+        for each in changes.due(round(log * SECOND), round(stamp * SECOND))
+    ]
+
+
+ROUND = [(10.0 + 0.1 * k, 0.1 * k) for k in range(100)]
+LOOP = [*ROUND, *((log + 10.0, stamp) for log, stamp in ROUND)]
+
+
+@pytest.mark.parametrize(
+    ("logged", "strokes", "expected"),
+    [
+        ([(10.01, 0.0), (13.0, 3.0)], ROUND, [(0.0, 10.0), (3.0, 13.0)]),
+        ([(10.0, 0.25)], ROUND, [(0.25, 10.3)]),
+        ([(10.3, 0.0)], ROUND[2:], [(0.0, 10.2)]),
+        ([(13.02, 3.0)], [*ROUND[:20], *LOOP[100:]], [(3.0, 20.0)]),
+        ([(23.0, 3.0)], LOOP, [(3.0, 23.0)]),
+        ([(20.0, 0.0)], LOOP, [(0.0, 20.0)]),
+    ],
+    ids=["plain", "its stroke is lost", "recorded from later on", "in a pause of the recording", "second round", "jump back"],
+)
+def test_where_a_change_begins(logged: list, strokes: list, expected: list) -> None:
+    assert begun(logged, strokes) == expected
+
+
+def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
+    scene, topics = load_scene(), load_topics()
+    strokes = strokes_of_posture(scene, "arch")
+    joints = joint_angles_of_strokes(scene, strokes)
+    messages = _Messages(4)
+    keys = {"s": topics.inputs[Stream.STROKES], "a": topics.inputs[Stream.ANGLES], "c": topics.outputs[Output.CHANGES]}
+    told = Change(5 * SECOND, True, Settings(payload=50.0).live, {"joint_1": 0.02})
+    with SessionWriter(tmp_path / "bag", keys) as bag:
+        for k in range(100):
+            stamp = 4 * SECOND + 20_000_000 * k
+            bag.write("s", stamp, messages.joint_state("cylinder", stamp, strokes))
+            bag.write("a", stamp, messages.joint_state("joint", stamp, joints))
+            if stamp == told.stamp:
+                bag.write_encoded("c", stamp + 1_000_000, encode(told))
+    result = replay(tmp_path / "bag", scene, tmp_path / "out")
+    predictions, residuals = result.recording.predictions, result.recording.of(Stream.ANGLES)
+    assert predictions[49].tip_position[1] - predictions[50].tip_position[1] > 0.01
+    assert residuals[49].values[0] - residuals[50].values[0] > 0.015
+    events = json.loads((tmp_path / "out" / "summary.json").read_text())["events"]
+    assert events == {"load": 1, "zero": 1}
+    unchanged = replay(tmp_path / "bag", scene, tmp_path / "other", changes=False)
+    assert unchanged.summary["events"] == {}
+    topic = keys["c"]
+    again = [decode(msg) for _, _, msg in read(scan(tmp_path / "out" / "bag"), {topic.absolute: topic.type})]
+    assert [each.stamp for each in again] == [4 * SECOND, 5 * SECOND] and again[1] == told

@@ -1,0 +1,175 @@
+"""Mappings: what they leave out, what they may not say, and which one a session is read with."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from boom_twin.errors import BagError, UsageError
+from boom_twin.io.bagmeta import dump
+from boom_twin.io.mapping import DEFAULT_NAME, load_mapping, mapping_of
+from boom_twin.io.sheet import FILE_NAME, Sheet
+from boom_twin.io.topics import DEFAULT_FILE, load_topics
+from boom_twin.records import Stream
+
+EXAMPLE = """
+inputs:
+  cylinder_strokes: {name: /rig/joint_states, qos: {reliability: reliable}}
+  joint_angles: {name: /rig/joint_states, qos: {reliability: reliable}}
+sensors:
+  cylinder_1: {name: boom_cyl_a, unit: mm, zero: 12.5}
+  joint_1: {name: slew_pitch, sign: -1, unit: deg}
+  joint_2: {name: incl_2, unit: deg, absolute: root}
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Any:
+    def write(text: str) -> Path:
+        path = tmp_path / "mapping.yaml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_what_is_left_out_is_as_usual(write: Any) -> None:
+    topics, usual = load_mapping(write(EXAMPLE), 3), load_topics()
+    assert topics.heard == {"/rig/joint_states": [Stream.STROKES, Stream.ANGLES], "tip_imu": [Stream.IMU]}
+    assert topics.is_shared and topics.outputs == usual.outputs
+    assert topics.inputs[Stream.STROKES].qos.depth == usual.inputs[Stream.STROKES].qos.depth
+    assert [sensor.name for sensor in topics.sensors_of(Stream.ANGLES, 3).values()] == ["slew_pitch", "incl_2", "joint_3"]
+    assert topics.mounts(3) == [None, "root", None]
+
+
+@pytest.mark.parametrize("text", ["", "sensors: {}", "inputs:\n  tip_imu: {}", DEFAULT_FILE.read_text()])
+def test_nothing_said_is_the_default(write: Any, text: str) -> None:
+    assert load_mapping(write(text), 4) == load_topics()
+
+
+def test_the_example_of_the_default_file_is_good(write: Any) -> None:
+    lines = DEFAULT_FILE.read_text().splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("#   inputs:"))
+    example = "\n".join(line[4:] for line in lines[first:][: lines[first:].index("#")])
+    assert load_mapping(write(example), 4).mounts(4) == [None, "root", None, None]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("outputs: {shape: {qos: {depth: 0}}}", "outputs.shape.qos.depth = 0: it must be greater than or equal to 1."),
+        ("inputs: {tip_imu: {qos: {reliability: sometimes}}}", "inputs.tip_imu.qos.reliability = 'sometimes'"),
+        ("inputs: {tip_imu: {type: a/msg/B}}", "inputs.tip_imu.type = 'a/msg/B': only sensor_msgs/msg/Imu is read or"),
+        ("inputs: {tip_imu: {name: joint_angles}}", "inputs.tip_imu.name = 'joint_angles': inputs.joint_angles has this"),
+        ("inputs: {tip_imu: {name: tip imu}}", "inputs.tip_imu.name = 'tip imu'"),
+        ("inputs: {tip_gyro: {}}", "inputs.tip_gyro = {}: unknown topic. The nearest is `tip_imu`."),
+        ("inputs: {tip_imu: {requird: false}}", "inputs.tip_imu.requird = false: unknown key. The nearest known key here is"),
+        ("sensor: {}", "sensor = {}: unknown key. The nearest known key here is `sensors`."),
+        (EXAMPLE.replace("qos: {reliability: reliable}", "qos: {}", 1), "inputs.joint_angles.qos = {'reliability'"),
+        ("sensors: {joint_1: {sign: 0}}", "sensors.joint_1.sign = 0: it must be 1 or -1. Give 1, or -1 for a sensor"),
+        ("sensors: {joint_1: {scale: 0.0}}", "sensors.joint_1.scale = 0.0: it must be greater than 0."),
+        ("sensors: {joint_1: {zero: .nan}}", "sensors.joint_1.zero = nan: it must be a finite number."),
+        ("sensors: {joint_1: {unit: mm}}", "sensors.joint_1.unit = 'mm': it must be one of rad, mrad, deg, gon."),
+        ("sensors: {joint_1: {unit: [mm]}}", "sensors.joint_1.unit = ['mm']"),
+        ("sensors: {joint_1: {absolut: root}}", "sensors.joint_1.absolut = 'root': unknown key. The nearest known key here"),
+        ("sensors: {joint_1: {absolute: tip}}", "sensors.joint_1.absolute = 'tip': it must be 'root' or 'head'."),
+        ("sensors: {cylinder_1: {absolute: root}}", "only an angle (joint_i) can be absolute"),
+        ("sensors: {elbow: {}}", "sensors.elbow = {}: channels are cylinder_1"),
+        ("sensors: {joint_0: {}}", "sensors.joint_0 = {}: channels are cylinder_1"),
+        ("sensors: {joint_5: {}}", "sensors.joint_5 = 'joint_5': the scene has 4 joints, so channels end at joint_4."),
+        ("sensors: {joint_2: {name: joint_1}}", "sensors.joint_2.name = 'joint_1': joint_1 has this name too"),
+        (EXAMPLE.replace("incl_2", "cylinder_3"), "sensors.joint_2.name = 'cylinder_3'"),
+        ("sensors: {tip_imu_x: {name: z}}", "sensors.tip_imu_z.name = 'z': tip_imu_x has this name too"),
+        ("sensors: {tip_imu_x: {name: up}}", "sensors.tip_imu_x.name = 'up': it must be x, y or z."),
+        ("sensors: [1]", "sensors = [1]: a block of channels is needed"),
+        ("[1, 2]", "keys inputs, outputs, sensors are needed"),
+        ("inputs: [", "not a readable YAML file"),
+        ("inputs: {}\ninputs: {}", "key inputs stands there twice"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_used_is_refused_with_its_place(write: Any, text: str, words: str) -> None:
+    path = write(text)
+    with pytest.raises(UsageError) as caught:
+        load_mapping(path, 4)
+    assert words in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_all_faults_are_told_at_once(write: Any) -> None:
+    text = """
+inputs: {tip_imu: {type: x, nam: y}}
+outputs: {shape: {qos: {depth: 0}}}
+sensors:
+  cylinder_1: {sign: 0, scale: 0, unit: furlong}
+  joint_9: {}
+  elbow: {}
+"""
+    with pytest.raises(UsageError, match="8 faults") as caught:
+        load_mapping(write(text), 4)
+    assert len(str(caught.value).splitlines()) == 9
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none\.yaml: No such file"):
+        load_mapping(tmp_path / "none.yaml")
+
+
+KEYS = ["inputs", "outputs", "sensors", "joint_1", "cylinder_2", "tip_imu", "shape", "qos", "name", "sign", "unit"]
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-5, 5) | st.floats() | st.sampled_from(["x", "root", "joint_1", "mm", "~/a"]),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.sampled_from(KEYS), inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(document=st.dictionaries(st.sampled_from(["inputs", "outputs", "sensors", "x"]), VALUES, max_size=3))
+def test_whatever_stands_in_a_mapping_is_used_or_refused(document: dict[str, Any], tmp_path_factory: Any) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.yaml"
+    path.write_text(dump(document))
+    try:
+        load_mapping(path, 4)
+    except UsageError as error:
+        assert "fault" in str(error)
+
+
+def recorded(directory: Path, mapping: str) -> Path:
+    directory.mkdir(exist_ok=True)
+    Sheet("1", "scene", "parameters", mapping, {}).write(directory)
+    return directory
+
+
+def test_a_session_is_read_as_it_was_recorded(tmp_path: Path, write: Any) -> None:
+    bag = recorded(tmp_path / "bag", EXAMPLE)
+    assert YAML(typ="safe").load((bag / FILE_NAME).read_text())["mapping"] == EXAMPLE
+    mapped = mapping_of(bag)
+    assert mapped.topics.mounts(2) == [None, "root"] and mapped.source == f"{bag / FILE_NAME}, mapping"
+    assert mapping_of(bag / "session_0.mcap").topics == mapped.topics
+    other = write("sensors: {joint_1: {absolute: head}}")
+    assert mapping_of(bag, other).topics.mounts(2) == ["head", None] and mapping_of(bag, other).source == str(other)
+    assert mapping_of(tmp_path / "elsewhere").source == DEFAULT_NAME
+    (bag / FILE_NAME).write_text("note: of an older version\n")
+    assert mapping_of(bag).source == DEFAULT_NAME
+
+
+@pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: [", "a: b: c"])
+def test_a_recorded_mapping_that_cannot_be_used_is_told(tmp_path: Path, mapping: str) -> None:
+    bag = recorded(tmp_path / "bag", mapping)
+    with pytest.raises((BagError, UsageError), match=FILE_NAME):
+        mapping_of(bag)
+
+
+def test_a_hostile_sheet_is_refused_at_once(tmp_path: Path) -> None:
+    bag = recorded(tmp_path / "bag", "")
+    rows = ["a0: &a0 [x, x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))]
+    for text in ("\n".join(rows), "mapping: !!python/object/apply:os.mkdir [trap]", "[" * 100_000, "x" * (5 * 2**20)):
+        (bag / FILE_NAME).write_text(text)
+        began = time.monotonic()
+        with pytest.raises((BagError, UsageError), match=FILE_NAME):
+            mapping_of(bag)
+        assert time.monotonic() - began < 30.0

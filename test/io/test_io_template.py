@@ -1,0 +1,45 @@
+"""Templates of encoded messages: every number in its place, and none but those."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.template import Holes, Template, stamped
+from boom_twin.io.typestore import jazzy
+
+MARKER = "visualization_msgs/msg/Marker"
+
+
+def marker(holes: Holes) -> Any:
+    """Holes of both widths, made in another order than they stand in."""
+    msg = RosbagsTypes().make(MARKER)
+    stamped(msg.header)
+    msg.ns, msg.color.g = "odd", holes.single()
+    msg.scale.z, msg.pose.position.y, msg.pose.orientation.w = holes.double(), holes.double(), -0.0
+    msg.color.r = holes.single()
+    return msg
+
+
+def test_numbers_come_in_the_order_of_their_holes() -> None:
+    template = Template(MARKER, marker(holes := Holes()), holes)
+    for stamp, doubles, singles in (
+        (1_999_999_999, [0.1, np.nan], [0.5, 0.25]),
+        (2**31 * 10**9 - 1, [-np.inf, 5e-324], [1.0, 0.0]),
+    ):
+        msg = jazzy().deserialize_cdr(template.fill(stamp, doubles, singles), MARKER)
+        assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == divmod(stamp, 10**9)
+        np.testing.assert_array_equal([msg.scale.z, msg.pose.position.y], doubles)
+        assert [msg.color.g, msg.color.r] == singles
+        assert (msg.ns, msg.color.b, msg.pose.position.x) == ("odd", 0.0, 0.0)
+
+
+def test_a_hole_that_is_in_no_message_is_refused() -> None:
+    holes = Holes()
+    msg = marker(holes)
+    holes.double()
+    with pytest.raises(ValueError, match="2 of 3 holes"):
+        Template(MARKER, msg, holes)

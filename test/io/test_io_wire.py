@@ -1,0 +1,94 @@
+"""Messages read from their bytes against the same messages decoded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.intake import Intake
+from boom_twin.io.places import fill_header
+from boom_twin.io.topics import TYPES
+from boom_twin.io.typestore import jazzy
+from boom_twin.io.wire import Wire
+from boom_twin.records import Stream
+
+MAKE = RosbagsTypes()
+
+
+def decoder(stream: Stream, calls: list[bytes]) -> Any:
+    def decode(data: bytes) -> Any:
+        calls.append(data)
+        return jazzy().deserialize_cdr(data, TYPES[stream])
+
+    return decode
+
+
+def joint_state(stamp: int, names: list[str], values: Any, frame: str = "", effort: int = 0) -> bytes:
+    msg = MAKE.make(TYPES[Stream.STROKES])
+    fill_header(msg.header, stamp, frame)
+    msg.name, msg.position, msg.effort = names, np.array(values, dtype=float), np.zeros(effort)
+    return bytes(jazzy().serialize_cdr(msg, TYPES[Stream.STROKES]))
+
+
+def imu(stamp: int, frame: str, covariance: float, x: float, z: float) -> bytes:
+    msg = MAKE.make(TYPES[Stream.IMU])
+    fill_header(msg.header, stamp, frame)
+    msg.linear_acceleration.x, msg.linear_acceleration.z = x, z
+    msg.linear_acceleration_covariance[0] = covariance
+    return bytes(jazzy().serialize_cdr(msg, TYPES[Stream.IMU]))
+
+
+def same(wire: Wire, stream: Stream, data: bytes) -> None:
+    """What an intake makes of it, with and without decoding all of it."""
+    decoded = jazzy().deserialize_cdr(data, TYPES[stream])
+    stamp, msg = wire.read(data)
+    assert stamp == decoded.header.stamp.sec * 10**9 + decoded.header.stamp.nanosec
+    mine, theirs = Intake(4), Intake(4)
+    ours, other = mine.put(stream, stamp, msg), theirs.put(stream, stamp, decoded)
+    assert mine.oddities == theirs.oddities
+    assert (ours is None) == (other is None)
+    if ours is not None and other is not None:
+        assert ours.values.tobytes() == other.values.tobytes()
+
+
+def test_strokes_of_every_layout() -> None:
+    random, calls = np.random.default_rng(2), []
+    wire = Wire(TYPES[Stream.STROKES], decoder(Stream.STROKES, calls))
+    names = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
+    for frame in ("", "base_link", "x" * 7):
+        for extra in ([], ["boom_é"], ["a", "bb", "ccc"]):
+            for count in (0, 4, 9):
+                for effort in (0, 3):
+                    for k in range(3):
+                        same(wire, Stream.STROKES, joint_state(k, names + extra, random.normal(size=count), frame, effort))
+    assert len(calls) == 3 * 3 * 3 * 2
+
+
+def test_accelerations_of_every_frame() -> None:
+    calls: list[bytes] = []
+    wire = Wire(TYPES[Stream.IMU], decoder(Stream.IMU, calls))
+    for frame in ("", "tip", "tip_link", "base_footprint"):
+        for k, covariance in enumerate((0.0, -1.0, 0.2)):
+            same(wire, Stream.IMU, imu(10**18 + k, frame, covariance, 0.1 * k, -9.0))
+    assert len(calls) == 4
+
+
+def test_other_names_of_the_same_length() -> None:
+    calls: list[bytes] = []
+    wire = Wire(TYPES[Stream.ANGLES], decoder(Stream.ANGLES, calls))
+    for names in (["joint_1", "joint_2"], ["joint_2", "joint_1"], ["joint_1", "joint_2"]):
+        same(wire, Stream.ANGLES, joint_state(5, names, [1.0, 2.0]))
+    assert len(calls) == 3
+
+
+@pytest.mark.parametrize("cut", [0, 3, 8, 11, 20, 40, 60])
+def test_a_message_that_is_cut_off_is_refused_and_the_next_one_read(cut: int) -> None:
+    wire = Wire(TYPES[Stream.STROKES], decoder(Stream.STROKES, []))
+    data = joint_state(7, ["cylinder_1", "cylinder_2"], [1.0, 2.0])
+    wire.read(data)
+    with pytest.raises(Exception):  # noqa: B017 - whatever the decoder raises
+        wire.read(data[:cut])
+    same(wire, Stream.STROKES, data)

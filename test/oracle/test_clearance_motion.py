@@ -1,0 +1,75 @@
+"""A pin that is lifted off and hits: the boom on a worn pin against equations written by hand in other coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle.clearance import geometry, rigid
+from oracle.clearance.booms import freed
+from oracle.clearance.contact import HYSTERESIS, Contact
+from oracle.clearance.scenes import RODS, with_pins
+
+from boom_twin.analysis.march import march
+from boom_twin.physics.contact import SMOOTH
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import strokes_of_posture
+
+MOVE, END = 0.2, 0.3  # s
+TRAVEL = (0.03, 0.02)  # m
+HEADINGS = np.array([0.5, -0.3])
+
+
+def both(count, step, treatment="contact", clearance=1e-4, end=END):
+    """The model in steps of `step`, and the oracle at the same rows, every 4 ms."""
+    index, headings = count - 1, HEADINGS[:count]
+    spec = rigid.document(count, index) | {"postures": {"test": np.degrees(headings).tolist()}}
+    scene = with_pins(spec, [RODS[index]], clearance, treatment)
+    lengths = np.array([geometry.cylinder_length(spec, headings, i) for i in range(count)])
+    own, first = rigid.move(lengths[index], TRAVEL[index], MOVE), strokes_of_posture(scene, "test")
+
+    def drive(times):
+        strokes, rates = np.tile(first, (len(times), 1)), np.zeros((len(times), count))
+        found = [own(time)[:2] for time in times]
+        strokes[:, index] += [length - lengths[index] for length, _ in found]
+        rates[:, index] = [rate for _, rate in found]
+        return strokes, rates
+
+    every = round(4e-3 / step)
+    moved = march(scene, drive, end, step, every, angles=np.diff(headings, prepend=0.0))
+    row = compile_scene(scene).tables.clearances[0]
+    contact = Contact(row.stiffness, HYSTERESIS["lankarani-nikravesh"](0.9), row.gap, smoothing=SMOOTH)
+    boom = freed(spec, headings, index, contact)
+    found = boom.follow(lambda t: own(t)[:2], boom.rest(lengths[index], headings[index]), moved.times, [MOVE])
+    assert moved.status == "ok"
+    return moved, found
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_path_is_the_oracles(count):
+    """Slider-crank and six-bar. The stop lifts the pin, which flies, hits, and follows; later flights hang on grazing hits."""
+    moved, found = both(count, 1e-3)
+    assert np.abs(moved.tip - found.tip).max() < 5e-5 * np.ptp(found.tip[:, 1])
+    flying = np.flatnonzero(moved.pins[:, 0, 3] == 0.0)
+    first = flying[flying - flying[0] == np.arange(len(flying))]
+    assert np.hypot(*(moved.pins[first, 0, :2] - found.offset[first]).T).max() < 2e-6
+    assert len(flying) > len(first)
+
+
+def test_the_error_falls_with_the_step():
+    """As its square where the boom's motion is what errs; impacts set a floor, and are resolved by sub-steps throughout."""
+    errors = []
+    for step in (4e-3, 2e-3, 1e-4):
+        moved, found = both(1, step)
+        errors.append(np.abs(moved.tip - found.tip).max())
+    assert errors[0] > 3.0 * errors[1]
+    assert errors[2] < 2e-6
+
+
+def test_linearised_pins_follow_contact_while_they_stay_pressed():
+    """The beginning of a move, in which the force falls by a third."""
+    contact, _ = both(1, 1e-3, end=0.04)
+    linear, _ = both(1, 1e-3, treatment="spring-damper", end=0.04)
+    assert np.ptp(contact.pins[:, 0, 2]) > 0.02 * contact.pins[0, 0, 2]
+    shift = np.abs(contact.tip - contact.tip[0]).max()
+    assert np.abs(linear.tip - contact.tip).max() < 5e-3 * shift
+    assert linear.pins[0] == pytest.approx(contact.pins[0], rel=1e-4, abs=1e-9)

@@ -1,0 +1,120 @@
+"""A rig with sensors of its own: other names, units, signs and zeros, one topic for all, angles at a quarter of the rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay
+from boom_twin.cli.main import main
+from boom_twin.errors import UsageError
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.places import fill_header
+from boom_twin.io.reader import read, scan
+from boom_twin.io.session import write_session
+from boom_twin.io.sheet import Sheet
+from boom_twin.io.topics import load_topics
+from boom_twin.io.writer import SessionWriter
+from boom_twin.records import Stream
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+ROWS, EVERY = 600, 4
+MAPPING = """
+inputs:
+  cylinder_strokes: {name: /rig/joint_states}
+  joint_angles: {name: /rig/joint_states}
+sensors:
+  cylinder_1: {name: lift, unit: mm, zero: 1200.0, sign: -1}
+  cylinder_2: {name: "cyl b", unit: cm}
+  joint_1: {name: alpha, unit: deg, zero: 90.0}
+  joint_2: {name: beta, scale: 0.5}
+  joint_4: {name: delta, unit: gon, sign: -1}
+"""
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    """Stamps, strokes and angles of the first seconds of the bundled session."""
+    rows = {"cylinder_strokes": [], "joint_angles": []}
+    for name, _, msg in read(scan(SESSION), dict.fromkeys(rows, JOINT_STATE)):
+        rows[name].append((msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec, msg.position))
+        if min(map(len, rows.values())) == ROWS:
+            break
+    stamps, strokes = zip(*rows["cylinder_strokes"][:ROWS], strict=True)
+    return np.array(stamps), np.array(strokes), np.array([values for _, values in rows["joint_angles"][:ROWS]])
+
+
+@pytest.fixture(scope="module")
+def usual(arrays, tmp_path_factory):
+    """Replay of the same numbers as the twin has them by itself."""
+    path = tmp_path_factory.mktemp("usual")
+    write_session(path / "bag", *arrays, None, {"origin": "synthetic, a test"})
+    return replay(path / "bag", load_scene(), path / "out")
+
+
+@pytest.fixture(scope="module")
+def rig(arrays, tmp_path_factory):
+    """The bag of the rig, with its mapping; every fourth message has the angles too."""
+    path = tmp_path_factory.mktemp("rig") / "bag"
+    topic = load_topics().inputs[Stream.STROKES].model_copy(update={"name": "/rig/joint_states"})
+    types = RosbagsTypes()
+    with SessionWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
+        for row, (stamp, strokes, angles) in enumerate(zip(*arrays, strict=True)):
+            msg = types.make(JOINT_STATE)
+            fill_header(msg.header, int(stamp))
+            values = {
+                "slew": 0.3,
+                "lift": 1200.0 - 1e3 * strokes[0],
+                "cylinder_4": strokes[3],
+                "cyl b": 1e2 * strokes[1],
+                "cylinder_3": strokes[2],
+            }
+            if row % EVERY == 0:
+                gon = -angles[3] * 200.0 / np.pi
+                own = {"delta": gon, "joint_3": angles[2], "beta": 2 * angles[1], "alpha": 90.0 + np.degrees(angles[0])}
+                values = {**own, **values}
+            msg.name, msg.position = list(values), types.doubles([*values.values()])
+            bag.write("all", int(stamp), msg)
+    Sheet("test", "", "", MAPPING, {}).write(path)
+    return path
+
+
+def test_a_recording_is_replayed_with_its_own_mapping(rig, usual, tmp_path):
+    found = replay(rig, load_scene(), tmp_path / "out")
+    assert found.summary["mapping"] == f"{rig / 'session.yaml'}, mapping"
+    assert (found.summary["samples"], found.summary["dropped"], found.summary["events"]) == (ROWS, 0, {})
+    for one, other in zip(found.recording.predictions, usual.recording.predictions, strict=True):
+        assert one.stamp == other.stamp
+        np.testing.assert_allclose(one.tip_position, other.tip_position, atol=1e-9)
+        np.testing.assert_allclose(one.tip_acceleration, other.tip_acceleration, atol=1e-5)
+    expected = {residuals.stamp: residuals for residuals in usual.recording.of(Stream.ANGLES)}
+    angles = found.recording.of(Stream.ANGLES)
+    assert len(angles) == ROWS // EVERY
+    for residuals in angles:
+        np.testing.assert_allclose(residuals.values, expected[residuals.stamp].values, atol=1e-9)
+
+
+def test_the_mapping_can_be_given_instead(rig, tmp_path, capsys):
+    (tmp_path / "own.yaml").write_text(MAPPING.replace("zero: 1200.0", "zero: 1201.0"))
+    arguments = ["replay", str(rig), "--out", str(tmp_path / "out"), "--no-pictures", "--mapping", str(tmp_path / "own.yaml")]
+    assert main(arguments) == 0
+    assert f"mapping            {tmp_path / 'own.yaml'}" in capsys.readouterr().out
+    moved = replay(rig, load_scene(), tmp_path / "as recorded").recording.predictions[0]
+    first = replay(rig, load_scene(), tmp_path / "again", mapping=tmp_path / "own.yaml").recording.predictions[0]
+    assert first.strokes[0] - moved.strokes[0] == pytest.approx(1e-3, abs=1e-9)
+
+
+def test_a_mapping_for_another_boom_is_refused(rig, tmp_path):
+    (tmp_path / "own.yaml").write_text("sensors: {joint_7: {}}")
+    with pytest.raises(UsageError, match="the scene has 4 joints"):
+        replay(rig, load_scene(), tmp_path / "out", mapping=tmp_path / "own.yaml")
+
+
+def test_info_looks_for_the_names_of_the_recording(rig, capsys):
+    assert main(["info", str(rig)]) == 0
+    told = capsys.readouterr().out
+    assert "slew of /rig/joint_states is not used" in told and "lift" not in told and "alpha" not in told
+    assert "missing" in told and "tip_imu" in told and "is not in" not in told

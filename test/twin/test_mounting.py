@@ -1,0 +1,91 @@
+"""Inclinometers: compared with the predicted angle of their section to the horizontal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin.io.reader import read, scan
+from boom_twin.mounting import TURN
+from boom_twin.scene.kinematics import strokes_of_posture
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+MS = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene()
+
+
+def readings(scene, mounts, count=1):
+    """Predicted joint angles and tip angle at rest, and what the sensors should read: measured zero minus residual."""
+    twin = Twin(scene, Settings(), mounts)
+    report = twin.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
+    residuals = twin.update(Sample(Stream.ANGLES, MS, np.zeros(len(scene.joints)))).residuals[0]
+    return report.prediction, -residuals.values, residuals.sigmas
+
+
+def is_turn(difference):
+    return np.abs(difference - TURN * np.round(difference / TURN)) < 1e-12
+
+
+def test_roots_and_heads_chain_up(scene):
+    """The head of a section plus the angle of the next joint is the root of the next section; the last head is the tip's."""
+    prediction, roots, _ = readings(scene, ["root"] * 4)
+    _, heads, _ = readings(scene, ["head"] * 4)
+    _, mixed, _ = readings(scene, [None, "head", None, "root"])
+    assert is_turn(roots[0] - prediction.joints[0])
+    assert np.all(is_turn(heads[:-1] + prediction.joints[1:] - roots[1:]))
+    assert is_turn(heads[-1] - prediction.tip_angle)
+    assert np.all(np.abs(heads - roots) > 1e-5), "sections that bend have two ends"
+    assert mixed == pytest.approx([prediction.joints[0], heads[1], prediction.joints[2], roots[3]], abs=1e-12)
+
+
+def test_an_inclined_base_is_in_the_reading(scene):
+    tilted = scene.model_copy(update={"base": scene.base.model_copy(update={"inclination": 0.1})})
+    prediction, found, _ = readings(tilted, ["root", None, None, "head"])
+    assert found[0] == pytest.approx(prediction.joints[0] + 0.1, abs=1e-12)
+    assert is_turn(found[3] - prediction.tip_angle - 0.1)
+
+
+def test_whole_turns_do_not_matter(scene):
+    twin = Twin(scene, Settings(), ["root", "head", None, None])
+    twin.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
+    values, turns = np.array([0.5, -0.2, 0.1, 0.1]), np.array([TURN, -2 * TURN, TURN, 0.0])
+    one = twin.update(Sample(Stream.ANGLES, MS, values)).residuals[0].values
+    other = twin.update(Sample(Stream.ANGLES, MS + 1, values)).residuals
+    assert other == ()  # after the newest stroke: waits
+    turned = Twin(scene, Settings(), ["root", "head", None, None])
+    turned.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
+    again = turned.update(Sample(Stream.ANGLES, MS, values + turns)).residuals[0].values
+    assert np.abs(one[:2]).max() <= np.pi
+    assert again == pytest.approx(one + turns * [0.0, 0.0, 1.0, 1.0], abs=1e-12)
+
+
+def test_deviations_add_up_towards_the_tip(scene):
+    _, _, encoders = readings(scene, [])
+    _, _, found = readings(scene, [None, "root", None, "head"])
+    assert found[[0, 2]] == pytest.approx(encoders[[0, 2]]) and np.all(found[[1, 3]] > encoders[[1, 3]])
+    assert found[3] < 2.0 * np.sqrt(np.sum(encoders**2))
+
+
+def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
+    """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
+    truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
+    noise = np.random.default_rng(5).normal(0.0, Settings().angle_sigma, len(truth))
+    twin, found = Twin(scene, Settings(), [None, None, None, "head"]), []
+    rows = 4000
+    for row, (_, _, msg) in zip(
+        range(rows), read(scan(SESSION), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False
+    ):
+        stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
+        twin.update(Sample(Stream.STROKES, stamp, msg.position))
+        angles = np.full(4, np.nan)
+        angles[3] = truth["tip_angle_rad"][row] + noise[row]
+        found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, stamp, angles)).residuals]
+    assert len(found) == rows
+    assert abs(np.mean(found)) < 0.3 and 0.6 < np.std(found) < 1.15

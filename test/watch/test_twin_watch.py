@@ -1,0 +1,157 @@
+"""Model, topics and residuals, judged as the node has them judged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.records import Report, Residuals, Sample, Stream
+from boom_twin.scene import load_scene
+from boom_twin.settings import Settings
+from boom_twin.thresholds import Thresholds
+from boom_twin.watch import twin as module
+from boom_twin.watch.peers import Peers
+from boom_twin.watch.sensors import sensors_of
+from boom_twin.watch.status import Level, Status
+from boom_twin.watch.twin import TwinWatch
+
+NAMES = {stream: stream.value for stream in Stream}
+REQUIRED = {stream: stream is not Stream.IMU for stream in Stream}
+JOINTS = ("joint_1", "joint_2", "joint_3", "joint_4")
+
+
+class Rig:
+    """A watch whose time is set here, fed by made-up sensors."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now, self.random = 100.0, np.random.default_rng(5)
+        for name in ("twin", "stream"):
+            monkeypatch.setattr(f"boom_twin.watch.{name}.time.monotonic", lambda: self.now)
+        sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
+        self.watch = TwinWatch(sensors, NAMES, Thresholds())
+        self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
+        self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
+        self.behind = dict.fromkeys(Stream, 0.0)
+        self.scale, self.took, self.failing = 1.0, 1e-4, False
+
+    def second(self, streams: tuple[Stream, ...] = (Stream.STROKES, Stream.ANGLES)) -> dict[str, Status]:
+        """One second at 100 Hz, and the look after it."""
+        for _ in range(100):
+            self.now += 0.01
+            for stream in streams:
+                self._message(stream)
+        found = self.watch.look({"scene": "s"}, True, self.peers, [Peers("/out", ("/screen",))], self.now + 1e9)
+        return {status.name: status for status in found}
+
+    def _message(self, stream: Stream) -> None:
+        stamp = round((self.now + 1e9 - self.behind[stream]) * 1e9)
+        sample = Sample(stream, stamp, self.middle[stream] + self.random.normal(0.0, 1e-4, 4))
+        self.watch.seen(stream, stamp)
+        self.watch.took(sample, self._report(stream, stamp), self.took)
+
+    def _report(self, stream: Stream, stamp: int) -> Report:
+        if stream is Stream.STROKES:
+            if self.failing:
+                return Report(stamp, False, status="the sweep found a singular pivot")
+            return Report(stamp, True, prediction=object())  # type: ignore[arg-type]
+        values = self.scale * self.random.normal(0.0, 1.0, 4)
+        return Report(stamp, True, residuals=(Residuals(stream, stamp, JOINTS, values, np.ones(4)),))
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Rig:
+    return Rig(monkeypatch)
+
+
+def after(rig: Rig, seconds: int, **changes: Any) -> dict[str, Status]:
+    for name, value in changes.items():
+        setattr(rig, name, value)
+    for _ in range(seconds - 1):
+        rig.second()
+    return rig.second()
+
+
+def test_a_healthy_rig(rig: Rig) -> None:
+    found = after(rig, 5)
+    sick = {name: status.message for name, status in found.items() if status.level != Level.OK}
+    assert sick == {}
+    names = ["model", *NAMES.values(), "outputs"]
+    names += [f"sensor {kind}_{i}" for kind in ("cylinder", "joint") for i in (1, 2, 3, 4)]
+    names += ["sensor tip_imu_x", "sensor tip_imu_z", *(f"residual {name}" for name in JOINTS)]
+    assert list(found) == names
+    assert found["tip_imu"].message == "not there; optional"
+    model = found["model"].values
+    assert (model["predictions"], model["failures"]) == (500, 0)
+    assert model["load"] == pytest.approx(0.02) and model["step_budget_s"] == pytest.approx(0.01)
+    assert found["residual joint_1"].values["rms_normalised"] == pytest.approx(1.0, abs=0.15)
+    assert found["residual joint_1"].values["count"] == 500
+
+
+def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
+    after(rig, 12)
+    levels = [rig.second()["residual joint_3"].level for rig.scale in [5.0] * 12 + [1.0] * 20]
+    assert levels[0] == Level.OK and levels[11] == Level.ERROR and levels[-1] == Level.OK
+    assert levels.count(Level.WARN) >= 1
+
+
+def test_residuals_that_stop_are_stale(rig: Rig) -> None:
+    after(rig, 2)
+    for _ in range(12):
+        found = rig.second((Stream.STROKES,))
+    assert found["residual joint_1"].level == found["sensor joint_1"].level == found["joint_angles"].level == Level.STALE
+    assert found["model"].level == found["sensor cylinder_1"].level == Level.OK
+
+
+def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:
+    after(rig, 2)
+    rig.watch.is_urgent()
+    assert not rig.watch.is_urgent()
+    rig.failing = True
+    rig._message(Stream.STROKES)
+    assert rig.watch.is_urgent()
+    status = rig.second()["model"]
+    assert (status.level, status.message) == (Level.ERROR, "the sweep found a singular pivot")
+    assert status.values["failures"] == 101
+    assert not rig.watch.is_urgent()
+    assert after(rig, 2, failing=False)["model"].level == Level.OK
+
+
+def test_silence_is_urgent(rig: Rig) -> None:
+    after(rig, 2)
+    rig.watch.is_urgent()
+    rig.now += 2.5
+    assert rig.watch.is_urgent() and not rig.watch.is_urgent()
+    found = {status.name: status for status in rig.watch.look({}, True, rig.peers, [], rig.now)}
+    assert found["model"].message == "waiting for strokes"
+    assert (found["cylinder_strokes"].level, found["cylinder_strokes"].message) == (Level.STALE, "silent for 2.5 s")
+
+
+def test_a_model_that_is_too_slow(rig: Rig) -> None:
+    status = after(rig, 4, took=0.004)["model"]
+    assert status.level == Level.WARN and "80% of the time" in status.message
+
+
+def test_clocks_that_differ(rig: Rig) -> None:
+    rig.behind[Stream.ANGLES] = 0.08
+    status = after(rig, 4)["joint_angles"]
+    assert status.level == Level.WARN and "stamped +0.080 s behind the strokes" in status.message
+    assert status.values["clock_offset_s"] == pytest.approx(0.08) and status.values["clock_offset_s_warn"] == 0.05
+
+
+def test_other_ends(rig: Rig) -> None:
+    rig.peers[Stream.STROKES] = Peers("/strokes", ("/a", "/b"), ("/b: Best effort publisher and reliable subscription",))
+    status = after(rig, 4)["cylinder_strokes"]
+    assert status.level == Level.WARN
+    assert "2 publishers of the same readings: /a, /b" in status.message
+    assert "incompatible QoS: /b: Best effort publisher" in status.message
+    rig.peers[Stream.STROKES] = Peers("/strokes", ("/a",))
+    assert after(rig, 7)["cylinder_strokes"].level == Level.OK
+
+
+def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
+    (status,) = rig.watch.look({}, False, {}, [], 0.0)
+    assert (status.level, status.message) == (Level.WARN, "not active")
+    (status,) = module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0)
+    assert status.message == "not active"
