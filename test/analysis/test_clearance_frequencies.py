@@ -8,7 +8,7 @@ from oracle import booms
 from oracle.clearance import geometry, rigid
 from oracle.clearance.booms import freed
 from oracle.clearance.contact import Contact, stiffness
-from oracle.pinned_scenes import ALL_PINS, RADII, RODS, with_clearance
+from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 
 from boom_twin.analysis.statics import statics
 from boom_twin.physics.contact import SMOOTH
@@ -25,7 +25,7 @@ def undamped(index):
 
 def linearised(document, headings, index):
     """Natural frequencies (Hz, ascending) of the oracle's three coordinates, from differences of its accelerations."""
-    contact = Contact(stiffness(RADII[index], CLEARANCE, 2.06e11, 0.3), 0.0, CLEARANCE, smoothing=SMOOTH)
+    contact = Contact(stiffness(RADII[RODS[index]], CLEARANCE, 2.06e11, 0.3), 0.0, CLEARANCE, smoothing=SMOOTH)
     boom, drive = freed(document, headings, index, contact), geometry.cylinder_length(document, headings, index)
     rest = boom.rest(drive, headings[index])
     at = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
@@ -39,13 +39,13 @@ def test_frequencies_on_a_pin_in_contact_are_the_oracles(posture, index):
     """All three of a rigid boom; linearised, the pin is as stiff along its force, so the lowest is the same."""
     document = undamped(index)
     expected = linearised(document, np.radians(document["postures"][posture]), index)
-    found = statics(with_clearance(document, [RODS[index]], CLEARANCE), posture=posture).frequencies
+    found = statics(with_pins(document, [RODS[index]], CLEARANCE), posture=posture).frequencies
     assert found == pytest.approx(expected, rel=1e-4)
-    linear = statics(with_clearance(document, [RODS[index]], CLEARANCE, "spring-damper"), posture=posture)
+    linear = statics(with_pins(document, [RODS[index]], CLEARANCE, "spring-damper"), posture=posture)
     assert linear.frequencies[0] == pytest.approx(expected[0], rel=5e-4)
 
 
-@pytest.mark.parametrize("pins", [RODS, ALL_PINS], ids=["rods", "all"])
+@pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
 def test_frequencies_go_to_those_of_ideal_pins_as_contact_gets_stiff(pins):
     """Clearance of 1 um, rigid sections, and a steel that is stiffer in the pins alone: off by its power -2/3, then -1.
 
@@ -59,7 +59,7 @@ def test_frequencies_go_to_those_of_ideal_pins_as_contact_gets_stiff(pins):
         document["material"]["E"] *= factor
         found, ideal = (
             statics(scene, posture="arch", modes=4).frequencies
-            for scene in (with_clearance(document, pins, 1e-6), booms.scene_of(document))
+            for scene in (with_pins(document, pins, 1e-6), booms.scene_of(document))
         )
         off.append(1.0 - found / ideal)
     assert np.all(np.array(off) > 0.0)
@@ -73,5 +73,5 @@ def test_frequencies_of_the_default_boom_fall_with_the_clearance():
     document = booms.document()
     ideal = statics(booms.scene_of(document), posture="arch").frequencies
     for clearance in (1e-3, 1e-4, 1e-5, 1e-6):
-        share = statics(with_clearance(document, RODS, clearance), posture="arch").frequencies / ideal
+        share = statics(with_pins(document, RODS, clearance), posture="arch").frequencies / ideal
         assert np.all(share < 1.0) and np.all(share > 0.98)

@@ -1,28 +1,15 @@
-"""Scenes with pins that have clearance, and such a boom at rest."""
+"""A boom at rest on pins with clearance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from oracle import booms
 
 from boom_twin.analysis.rows import first_row, taken_apart
 from boom_twin.analysis.statics import settle
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-
-RADII = (0.030, 0.025, 0.025, 0.020)
-CYLINDER_PINS = tuple(f"cylinder_{i}.{end}" for i in range(1, 5) for end in ("rod", "barrel"))
-LINK_PINS = tuple(f"joint_{i}.{place}" for i in range(2, 5) for place in ("pivot", "link_L", "link_R", "Q"))
-ALL_PINS = (*CYLINDER_PINS, "joint_1.pivot", *LINK_PINS)
-RODS = CYLINDER_PINS[::2]
-
-
-def with_clearance(document, pins, clearance=1e-4, treatment="contact", **contact):
-    """Scene of a document whose `pins` have a radial clearance (m)."""
-    block = [{"at": at, "pin_radius": RADII[int(at.split("_")[1][0]) - 1], "radial_clearance": clearance} for at in pins]
-    return booms.scene_of(document | {"clearance": {"treatment": treatment, "contact": contact, "pins": block}})
 
 
 @dataclass(frozen=True)
