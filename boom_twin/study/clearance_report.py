@@ -27,7 +27,8 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
     head = [
         "# Play in the pins\n",
         f"Radial clearance: {told}; {block.contact.law}, exponent {block.contact.exponent:g}, restitution "
-        f"{block.contact.restitution:g}, friction {block.contact.friction:g}. Radii and clearances of the package's block are "
+        f"{block.contact.restitution:g}, friction {block.contact.friction:g}. Radii and clearances of the "
+        "package's block are "
         "surrogates.\n",
     ]
     parts = [_stops(swings), _rests(shifts), _convergence(found), _costs(costs)]
@@ -44,10 +45,13 @@ def _stops(found: list[Swing]) -> list[str]:
         "## After a stop\n",
         "![The tip after a stop](clearance.png)\n",
         "From rest in each posture the cylinders of the study's motion run at full speed (the whole stroke in 10 s, or as "
-        f"fast as the motion's travel allows), brake within {1e3 * SOFT:g} ms, and hold for up to {HOLD:g} s. Vertical movement "
-        "of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance from that rest "
+        f"fast as the motion's travel allows), brake within {1e3 * SOFT:g} ms, and hold for up to {HOLD:g} s. "
+        "Vertical movement "
+        "of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance "
+        "from that rest "
         "after the stop (linearised pins: from the mean). Halved: stays "
-        f"within {SETTLED:g} of the peak from then on. Contacts lost are those seen from row to row; of linearised pins, which pull as well, "
+        f"within {SETTLED:g} of the peak from then on. Contacts lost are those seen from row to row; of "
+        "linearised pins, which pull as well, "
         "those that contact would have lost.\n",
         table(STOP_HEAD, rows),
     ]
@@ -68,10 +72,13 @@ def _rests(found: list[Shift]) -> list[str]:
         "## At rest\n",
         "![The resting tip](clearance_static.png)\n",
         "Distance (mm) of the resting tip from that with ideal pins, with play in one pin only. Lever: way of the tip for "
-        "the way of the cylinder, of the rigid boom's geometry; loaded: of the elastic boom under its weight, by moving the "
-        "stroke. Ratio: the shift over loaded lever x (clearance + penetration), least and greatest over all clearances. Below "
+        "the way of the cylinder, of the rigid boom's geometry; loaded: of the elastic boom under its "
+        "weight, by moving the "
+        "stroke. Ratio: the shift over loaded lever x (clearance + penetration), least and greatest over all "
+        "clearances. Below "
         f"{1e6 * IDEAL_BELOW:g} um a pin is ideal; the tip then jumps by what the column says, at worst "
-        f"{1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}): mostly penetration, which the cap on the contact's stiffness "
+        f"{1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}): mostly penetration, which the cap on the "
+        "contact's stiffness "
         "leaves when the clearance is gone.\n",
         table(head, rows),
     ]
@@ -81,16 +88,20 @@ def _convergence(found: Convergence) -> list[str]:
     lines = [
         "## Convergence\n",
         "![Error against run time](clearance_convergence.png)\n",
-        f"A stop within {1e3 * near.BRAKE:g} ms out of full speed, {found.span:g} s in all, rows every {1e3 * near.ROW:g} ms; "
-        "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: boom_twin with steps of "
+        f"A stop within {1e3 * near.BRAKE:g} ms out of full speed, {found.span:g} s in all, rows every "
+        f"{1e3 * near.ROW:g} ms; "
+        "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: "
+        "boom_twin with steps of "
         f"{1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by hand in "
         "three coordinates, integrated by SciPy's LSODA between touch and release (`boom_twin/peers/play`), tolerance "
         f"{near.TIGHTEST:g}. It shares no equation with boom_twin but states the same contact law.\n",
     ]
     if np.isfinite(found.apart).all():
         lines.append(
-            f"Both references of the one pin differ by {found.apart[0]:.2g} mm, {found.apart[1]:.2g} % of the acceleration and "
-            f"{found.apart[2]:.2g} % of the force. Accelerations at steps below 20 us carry the round-off of positions over "
+            f"Both references of the one pin differ by {found.apart[0]:.2g} mm, {found.apart[1]:.2g} % of the "
+            "acceleration and "
+            f"{found.apart[2]:.2g} % of the force. Accelerations at steps below 20 us carry the round-off of "
+            "positions over "
             "the square of the step: the run of 1 us is no reference for them, the independent one is.\n"
         )
     else:
@@ -121,7 +132,8 @@ def _costs(found: list[Cost]) -> list[str]:
     return [
         "## What a pin costs\n",
         f"Step 1 ms. Gentle: the move of the other studies. Violent: to full speed within {1e3 * RAMP:g} ms, after "
-        f"{1e3 * STOP:g} ms to a stop within {1e3 * BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. Factor: real time "
+        f"{1e3 * STOP:g} ms to a stop within {1e3 * BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. "
+        "Factor: real time "
         "over run time.\n",
         table(("pins", "treatment", "gentle, us a step", "factor", "violent, us a step", "factor"), rows),
     ]

@@ -52,7 +52,7 @@ class Halt:
 
 
 def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> Halt:
-    """Full speed in the directions of the study's motion, no farther than it goes; or up to half of it, of `only` one (from 0)."""
+    """Full speed in the directions of the study's motion, no farther than it goes; `only` one cylinder (from 0): up to half."""
     own = motion_of(scene, posture)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     travel = np.where(np.arange(len(full)) == only, 0.5 * full, 0.0) if only is not None else own.travel
