@@ -16,6 +16,7 @@ from boom_twin.study.motion import motion_of
 
 RUNS, STEPS, STEP, ATTEMPTS = 30, 400, 1e-3, 3
 MOST = 1.05
+PLAY_OF_0 = [{"at": at, "pin_radius": 0.02, "radial_clearance": 0.0} for at in ("cylinder_2.rod", "joint_3.link_L")]
 ZERO = {"mass": 0.0, "inertia": 0.0, "com": 0.3}
 
 
@@ -92,6 +93,9 @@ PAIRS = {
     "rods of mass 0": (without("cylinder", "rod"), cylinders(rod=ZERO)),
     "d of 0": (without("cylinder", "d"), cylinders(d=0.0)),
     "beta of 0": (without("sections", "beta"), each("sections", beta=0.0)),
+    "clearance without pins": (both(), lambda spec: spec.update(clearance={})),
+    "contact law for no pins": (both(), lambda spec: spec.update(clearance={"contact": {"law": "hertz"}, "pins": []})),
+    "clearance of 0": (both(), lambda spec: spec.update(clearance={"pins": PLAY_OF_0})),
     "rho_I of 0": (without("sections", "rho_I"), each("sections", rho_I=0.0)),
 }
 ZEROS = [name for name in PAIRS if name.endswith("of 0")]

@@ -1,0 +1,36 @@
+"""A boom at rest on pins with clearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from boom_twin.analysis.rows import first_row, taken_apart
+from boom_twin.analysis.statics import settle
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+
+
+@dataclass(frozen=True)
+class Resting:
+    """tip (complex, m), joints (n,) rad, tension (n,) N, offsets and forces on the bush of all pins (k,), complex, m and N."""
+
+    tip: complex
+    joints: np.ndarray
+    tension: np.ndarray
+    offsets: np.ndarray
+    forces: np.ndarray
+
+
+def resting(scene, posture, longer=0.0):
+    """`Resting` of a scene at a posture's strokes, all cylinders' drives `longer` (m, scalar or (n,))."""
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
+    found = taken_apart(plan, first_row(plan, state)[None])
+    offsets = found.pins[0, :, 0] + 1j * found.pins[0, :, 1]
+    sizes = found.pins[0, :, 2]
+    return Resting(
+        complex(*found.tip[0, 0, :2]), found.joints[0], found.cylinder_forces[0], offsets, sizes * offsets / np.abs(offsets)
+    )

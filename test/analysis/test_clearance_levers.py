@@ -1,0 +1,116 @@
+"""Clearance at rest, predicted: levers and the oracle's pin forces give the tip's shift; rest is the oracle's."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from analysis.resting import resting
+from oracle import booms
+from oracle.clearance import rigid
+from oracle.clearance.free_play import lengthening, tip_shift
+from oracle.clearance.scenes import LINKS, RADII, RODS, with_pins
+
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import Contact, stiffness
+from boom_twin.physics.contact import LEAST_GAP, SMOOTH
+from boom_twin.scene.parts import IDEAL_BELOW
+
+POSTURES = ["horizontal", "arch", "high", "low"]
+DOCUMENT = booms.document()
+BARRELS = tuple(f"cylinder_{i}.barrel" for i in range(1, 5))
+IDEAL = booms.scene_of(DOCUMENT)
+
+
+def bush(pin, clearance):
+    """The oracle's contact at `pin`, with the model's smoothing and cap of the stiffness."""
+    k = stiffness(RADII.get(pin, 0.025), max(clearance, LEAST_GAP), 2.06e11, 0.3)
+    return Contact(k, 0.0, clearance, smoothing=SMOOTH)
+
+
+def held(document, headings, index, tension):
+    """Axis of cylinder `index` (complex, m) and force of the bush on its rod's and on its barrel's pin (complex, N)."""
+    oil = freed(document, headings, index, None).cylinder
+    barrel, rod = geometry.pins(document, headings, index)
+    axis, gravity = rod - barrel, geometry.gravity(document)
+    on_rod = oil.holding(abs(axis), np.angle(axis), tension, gravity)
+    return axis, on_rod, -on_rod - (oil.barrel_mass + oil.rod_mass) * gravity
+
+
+def loaded_lever(posture, index, step=1e-5):
+    """How the resting tip of the ideal boom moves by the length of a drive: complex, m/m."""
+    one = step * (np.arange(4) == index)
+    return (resting(IDEAL, posture, one).tip - resting(IDEAL, posture, -one).tip) / (2.0 * step)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+@pytest.mark.parametrize("pin", RODS + BARRELS)
+def test_tip_shift_is_lever_times_clearance_and_penetration(posture, pin):
+    """Levers of the boom under its load: its beams and its oil give way as the play moves it."""
+    index, ideal = int(pin[9]) - 1, resting(IDEAL, posture)
+    axis, on_rod, on_barrel = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
+    force, axis = (on_rod, axis) if pin.endswith("rod") else (on_barrel, -axis)
+    shift = resting(with_pins(DOCUMENT, [pin]), posture).tip - ideal.tip
+    play = lengthening(bush(pin, 1e-4), force, axis)
+    assert abs(loaded_lever(posture, index) * play - shift) < 0.01 * abs(shift)
+
+
+@pytest.mark.parametrize("posture, index", [*product(POSTURES, range(4))])
+def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
+    """Tip, force and offset of a rod's pin in a boom with one oil spring; levers of its geometry give the shift within 2 %."""
+    document, contact = rigid.document(4, index), bush(RODS[index], 1e-4)
+    headings, pin = np.radians(document["postures"][posture]), f"cylinder_{index + 1}.rod"
+    found, ideal = resting(with_pins(document, [pin]), posture), resting(booms.scene_of(document), posture)
+    drive = geometry.cylinder_length(document, headings, index)
+    expected = freed(document, headings, index, contact).rest(drive, headings[index])
+    smoothed = 0.5 * SMOOTH**2 / 1e-4  # r = sqrt(|delta|^2 + s^2) is longer than |delta| by this
+    assert abs(found.offsets[0] - expected.offset) < 2.0 * smoothed
+    assert abs(found.tip - expected.tip) < 60.0 * smoothed
+    assert found.tension[index] == pytest.approx(expected.tension, rel=1e-5, abs=0.1)
+    assert abs(found.forces[0] + expected.force) < 1e-4 * abs(expected.force) + 1.0
+    if (posture, index) != ("low", 3):  # it carries little but its own cylinder
+        shift = found.tip - ideal.tip
+        estimate = tip_shift(document, np.cumsum(ideal.joints), index, contact, expected.force)
+        assert abs(estimate - shift) < 0.02 * abs(shift)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_the_shift_falls_linearly_down_to_the_switch_to_the_ideal_pin(index):
+    """And jumps there by lever x (1 um + penetration): the penetration stays, for the stiffness is capped."""
+    pin, posture, ideal = RODS[index], "horizontal", resting(IDEAL, "horizontal")
+    axis, force, _ = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
+    lever, clearances = loaded_lever(posture, index), (2e-4, 1e-4, 5e-5, 3e-5, 1e-5, 3e-6, IDEAL_BELOW)
+    for clearance in clearances:
+        shift = resting(with_pins(DOCUMENT, [pin], clearance), posture).tip - ideal.tip
+        play = lengthening(bush(pin, clearance), force, axis)
+        assert abs(lever * play - shift) < 0.02 * abs(shift), clearance
+    beyond = resting(with_pins(DOCUMENT, [pin], 0.99 * IDEAL_BELOW), posture)
+    assert beyond.tip == ideal.tip and not len(beyond.forces)
+    depth = (abs(force) / bush(pin, IDEAL_BELOW).stiffness) ** (2.0 / 3.0)
+    assert abs(shift) == pytest.approx(abs(lever) * (IDEAL_BELOW + depth), rel=0.02)
+
+
+@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("document", [DOCUMENT, rigid.document(4, 0)], ids=["flexible", "rigid"])
+def test_a_reversed_force_moves_the_tip_by_the_free_play(index, document):
+    """A twentieth of the weight, up instead of down: twice the clearance and both penetrations, through the lever."""
+    tips, depths, pins = [], [], [RODS[index]]
+    for weight in (-0.05, 0.05):
+        loaded = document | {"gravity": [0.0, 9.81 * weight]}
+        one, other = resting(with_pins(loaded, pins), "horizontal"), resting(booms.scene_of(loaded), "horizontal")
+        tips.append(one.tip - other.tip)
+        depths.append(abs(one.offsets[0]) - 1e-4)
+    lever = abs(geometry.levers(document, np.zeros(4))[index])
+    assert abs(tips[1] - tips[0]) == pytest.approx(lever * (2e-4 + sum(depths)), rel=0.02)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_play_in_a_joint_moves_no_other_joint(index):
+    """Rigid sections on incompressible cylinders: the other joints follow from their own strokes alone."""
+    document = rigid.document(4, 4)
+    own = [pin for pin in RODS + BARRELS + LINKS if f"_{index + 1}." in pin]
+    found, ideal = (resting(scene, "arch") for scene in (with_pins(document, own), booms.scene_of(document)))
+    moved = np.abs(found.joints - ideal.joints) > 1e-11
+    assert list(moved) == [i == index for i in range(4)]
