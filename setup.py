@@ -50,6 +50,7 @@ setup(
             "ruff>=0.6,<1",
             "mypy>=1.11,<3",
             "import-linter>=2.0,<3",
+            "aiohttp>=3.9,<4",
             "playwright>=1.40,<2",
         ],
         "peers": ["exudyn>=1.13,<2"],

@@ -1,7 +1,7 @@
 """What the live page costs and how soon it shows: frames of one and of four pages, memory, delay, a thousand connections.
 
-``python test/bench/monitor.py [--seconds 120]`` needs Debian's chromium. The feed is made here, 200 rows a second stamped by this
-machine's clock, so the delay is from a row's stamp to its drawing, without node and DDS.
+``python test/bench/monitor.py [--seconds 120]`` needs Debian's chromium. The feed is made here, 200 rows a second stamped by
+this machine's clock, so the delay is from a row's stamp to its drawing, without node and DDS.
 """
 
 from __future__ import annotations
