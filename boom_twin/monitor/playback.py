@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+SLOWEST, FASTEST = 0.1, 10.0
 
 
 class Playback:
@@ -32,6 +32,10 @@ class Playback:
             self.position = min(self.position + self.speed * span, self.end)
             self.is_held = self.position >= self.end
         return self.position
+
+    def pace(self, speed: float) -> None:
+        """Go on at that speed, or the nearest that there is."""
+        self.speed = min(max(speed, SLOWEST), FASTEST)
 
     def seek(self, position: float) -> None:
         """Go there, or to the nearest end."""

@@ -201,7 +201,7 @@ class Viewer:
             play.seek(value)
             self._generation = -1
         elif what == "speed":
-            play.speed = min(max(value, 0.1), 10.0)
+            play.pace(value)
         else:
             if play.position >= play.end and not value:
                 self._steer(play, "seek", 0.0)

@@ -17,7 +17,7 @@ export class Chart {
       width: 300, height: 100,
       pxAlign: 0,
       scales: { x: { time: false, auto: false }, ...scales },
-      axes: [{ ...axis, size: 22, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(show), ...axes[1] }],
+      axes: [{ ...axis, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(show), ...axes[1] }],
       series: [{ label: title, value: (_, v) => v == null ? "" : v.toFixed(3) }, ...series.map(s => ({
         stroke: colour(s.colour), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? null, dash: s.dash, label: s.label,
         value: (_, v) => v == null ? "–" : v.toPrecision(4),

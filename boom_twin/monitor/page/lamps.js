@@ -12,9 +12,8 @@ export class Lamps {
     this.overall = document.getElementById("overall");
     this.groups = document.getElementById("groups");
     this.notice = document.getElementById("notice");
-    link.addEventListener("state", event => { this.state = event.detail; this.grew ??= performance.now(); this.show(event.detail); });
+    link.addEventListener("state", event => { this.state = event.detail; this.show(event.detail); });
     link.addEventListener("alarms", event => this.showAlarms(event.detail.alarms));
-    link.addEventListener("reset", () => { this.grew = performance.now(); });
   }
 
   // What the page itself knows: called often.

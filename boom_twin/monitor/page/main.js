@@ -14,7 +14,8 @@ import { Work } from "./work.js";
 const REST = 2; // least time between two drawings, as a multiple of what one takes
 const get = id => document.getElementById(id);
 
-const link = new Link(), view = new View(link), timeline = new Timeline(link), lamps = new Lamps(link), work = new Work(link, view);
+const link = new Link(), view = new View(link), timeline = new Timeline(link), lamps = new Lamps(link);
+new Work(link, view);
 const spectrum = new SpectrumTab(link, new Sheet("peaks"));
 const tabs = { traces: new Traces(link, view, new Sheet("figures")), spectrum, spectrogram: spectrum, shape: new Shape(link, view), state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now();

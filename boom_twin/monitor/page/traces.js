@@ -55,7 +55,7 @@ export class Traces {
     const options = kind.isBanded ? BANDED : { series: plain() };
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
-      axes: [kind === CHARTS.at(-1) ? {} : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
+      axes: [kind === CHARTS.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
       ...options,
       scales: kind.name === "residuals" ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },
