@@ -17,7 +17,7 @@ Taker = Callable[[Any, float], None]
 JUMP_BACK = 1.0
 """A stamp earlier by more than this (s) begins everything anew."""
 WAITING = 1000
-"""Measured samples that may wait for their residual."""
+"""Measured samples, and residuals, that may wait for each other."""
 GAP = 0.1
 """A longer pause between strokes (s) is told as an alarm."""
 PLANE = ("x_m", "z_m")
@@ -47,6 +47,7 @@ class Catch:
     def __init__(self, store: Store, topics: Topics) -> None:
         self._store, self._intake = store, Intake(1, topics)
         self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
+        self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
         self._forces: list[float] = []
         self._strokes: list[float] = []
         self._scene = ""
@@ -71,10 +72,9 @@ class Catch:
         return {**found, topics.inputs[Stream.IMU].absolute: self._take_measured, topics.events.absolute: self._take_event}
 
     def measure(self, sample: Sample) -> None:
-        """Remember the measured specific force until its residual comes."""
+        """Put the measured specific force beside its residual, whichever comes first."""
         self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
-        if len(self._measured) > WAITING:
-            self._measured.popitem(last=False)
+        self._join(sample.stamp)
 
     def _take_measured(self, msg: Any, now: float) -> None:
         sample = self._intake.put(Stream.IMU, stamp_of(msg), msg)
@@ -99,6 +99,7 @@ class Catch:
             if time < known.newest - JUMP_BACK:
                 store.clear()
                 self._measured.clear()
+                self._residuals.clear()
             elif time - known.newest > GAP:
                 store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
         store.append("displacement", PLANE, stamp, (msg.vector.x, msg.vector.z))
@@ -113,10 +114,20 @@ class Catch:
         if msg.name and msg.name[0].startswith("joint_"):
             columns = [f"{name}_rad" for name in msg.name] + [f"{name}_normalised" for name in msg.name]
             self._store.append("joints", columns, stamp, values + list(msg.velocity))
-        elif (measured := self._measured.pop(stamp, None)) is not None:
+        else:
+            self._residuals[stamp] = (values, sigmas)
+            self._join(stamp)
+
+    def _join(self, stamp: int) -> None:
+        """Make the row of a measurement and its residual, once both are there; forget what has waited long."""
+        if stamp in self._measured and stamp in self._residuals:
+            measured, (values, sigmas) = self._measured.pop(stamp), self._residuals.pop(stamp)
             predicted = [m - v for m, v in zip(measured, values, strict=True)]
             columns = [f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz"]
             self._store.append("force", columns, stamp, [*measured, *predicted, *sigmas])
+        for waiting in (self._measured, self._residuals):
+            if len(waiting) > WAITING:
+                waiting.popitem(last=False)
 
     def _take_shape(self, msg: Any, now: float) -> None:
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
