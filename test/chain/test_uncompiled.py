@@ -1,4 +1,4 @@
-"""The kernels as plain Python, and compiled with bounds checks, give what the compiled ones give, with clearance and without."""
+"""The kernels as plain Python, and compiled with bounds checks, give what the compiled ones give; with clearance too."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.parts import Clearance, ContactLaw, Pin
 scene, count, pins = load_scene(), int(sys.argv[1]), sys.argv[2:]
 if pins:
-    block = Clearance(contact=ContactLaw(friction=0.1), pins=[Pin(at=at, pin_radius=0.025, radial_clearance=1e-4) for at in pins])
-    scene = scene.model_copy(update={"clearance": block})
+    worn = [Pin(at=at, pin_radius=0.025, radial_clearance=1e-4) for at in pins]
+    scene = scene.model_copy(update={"clearance": Clearance(contact=ContactLaw(friction=0.1), pins=worn)})
 found = statics(scene, posture="arch", modes=1)
 times = 2e-3 * np.arange(count + 1)
 strokes = found.strokes + np.outer(times**2, [8.0, -4.0, 6.0, 4.0])

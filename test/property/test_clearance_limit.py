@@ -74,8 +74,8 @@ def test_a_move_goes_to_that_on_ideal_pins(pins):
 
 def values_of(found):
     """All results of a march, a row an instant."""
-    count = len(found.times)
-    return np.hstack([a.reshape(count, -1) for a in (found.tip, found.tip_acceleration, found.joints, found.cylinder_forces, found.pins)])
+    blocks = (found.tip, found.tip_acceleration, found.joints, found.cylinder_forces, found.pins)
+    return np.hstack([block.reshape(len(found.times), -1) for block in blocks])
 
 
 @pytest.mark.parametrize("clearance", [1e-6, 1e-5, 1e-4, 1e-3])
