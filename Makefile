@@ -16,7 +16,7 @@ help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
-	@echo "make study       error against run time, stability, what every part costs: docs/study (20 minutes)"
+	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make soak        10 minutes of the live node, a hold of 24 simulated hours"
 	@echo "make session     make the bundled session anew on the virtual rig"
 	@echo "make figures     make the pictures of the documentation anew"
@@ -50,7 +50,7 @@ test-extra: $(READY) $(COLCON_READY) ament client
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
 study: warm
-	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study || exit 1; done
+	for kind in error stability parts clearance; do $(BIN)/boom_twin study $$kind --out out/study || exit 1; done
 	mkdir -p docs/study && cp out/study/*.md out/study/*.png docs/study/
 
 soak: warm

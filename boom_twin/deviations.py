@@ -10,7 +10,7 @@ from .analysis.noise import StrokeNoise, stroke_noise
 from .chain.program import State
 from .estimate.follower import copy_state
 from .physics.linkage import cylinder_length
-from .plan.compile import Plan
+from .plan.plan import Plan
 from .records import Array, Prediction
 from .settings import Settings
 

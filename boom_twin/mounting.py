@@ -8,7 +8,7 @@ import numpy as np
 
 from .chain.program import JOINT_A, JOINT_B, State
 from .errors import UsageError
-from .plan.compile import Plan
+from .plan.plan import Plan
 from .records import Array, Mount
 
 TURN = 2.0 * np.pi

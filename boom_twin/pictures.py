@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from .deviations import specific_force
+from .plan.compile import compile_scene
 from .records import Array, Residuals, Stream
 from .replay import Recording, Replay
 from .scene.kinematics import gravity_in_base
 from .scene.parts import Scene
 from .truth import TipTruth
 from .view import History, ImuTrace, Truth, replay_pictures
+from .view.orbits import Orbits
 
 NANO = 1e-9
 
@@ -52,7 +54,15 @@ def history_of(recording: Recording, scene: Scene) -> History:
         imu=_imu(force, stamps, felt, first),
         shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
+        orbits=_orbits(scene, stamps, recording),
     )
+
+
+def _orbits(scene: Scene, stamps: Array, recording: Recording) -> Orbits | None:
+    plan = compile_scene(scene)
+    if not plan.pins:
+        return None
+    return Orbits(stamps, plan.pins, plan.tables.clearances.gap, recording.clearances(), recording.lost_contacts())
 
 
 def _seconds(stamps: list[int], first: int) -> Array:

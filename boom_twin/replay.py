@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import BagError
 from .io.ahead import Ahead
@@ -58,6 +59,16 @@ class Recording:
     def of(self, stream: Stream) -> list[Residuals]:
         """Residuals of one stream."""
         return [residuals for residuals in self.residuals if residuals.stream is stream]
+
+    def clearances(self) -> Array:
+        """Of all pins with clearance offset x, y (m), force (N) and contact, shape (predictions, k, 4)."""
+        found = [prediction.clearances for prediction in self.predictions if prediction.clearances is not None]
+        return np.array(found).reshape(len(found), -1, 4)
+
+    def lost_contacts(self) -> NDArray[np.int64]:
+        """How often each pin with clearance touched at one prediction and not at the next, shape (k,)."""
+        parted = np.diff(self.clearances()[:, :, 3], axis=0) < 0.0
+        return np.asarray(parted.sum(axis=0))
 
 
 @dataclass(frozen=True)
@@ -220,6 +231,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         "joint_residual_normalised_mean": _mean(normalised),
         "joint_residual_normalised_std": _std(normalised),
         "tip_acceleration_max_m_s2": float(acceleration.max()),
+        **_pins(recording, twin),
         "output_sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
         "alarms": [
             {
@@ -232,6 +244,13 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
             for start, end in recording.gaps
         ],
     }
+
+
+def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
+    """How often each pin with clearance lost contact from one sample to the next; nothing without such pins."""
+    if not twin.plan.pins:
+        return {}
+    return {"lost_contacts": dict(zip(twin.plan.pins, recording.lost_contacts().tolist(), strict=True))}
 
 
 def _stacked(rows: list[Array], columns: int) -> Array:

@@ -8,24 +8,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .analysis.statics import outline, settle
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
 from .errors import BoomTwinError, UsageError
-from .estimate.follower import Tuning, follow, new_track
+from .following import Following
 from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
-from .physics.linkage import cylinder_length
-from .plan.compile import compile_scene
 from .recent import Recent
-from .records import Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream
+from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream
 from .requests import Requests
-from .scene.kinematics import joint_angles_of_strokes, stroke_curve
+from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
 from .stray import Strays
-from .undeflected import Undeflected
 from .zeros import Zeros, channels_of
 
 EVENTS = {
@@ -99,13 +95,8 @@ class Twin:
     def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
         self.scene, self.settings = scene, settings or Settings()
         self.counts: Counter[str] = Counter()
-        tuned = self.settings
-        self._tuning = Tuning(
-            tuned.stroke_variance, tuned.jerk_density, tuned.lag, tuned.step, tuned.look_step, tuned.rho
-        )
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
-        self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
         self._channels = channels_of(self.plan.joints)
         self._strays = Strays(self.settings)
         self._run: _Run | None = None
@@ -141,21 +132,14 @@ class Twin:
             raise UsageError(f"{told}. Set the zero of {sensor} in the mapping.")
         if self._run is None:
             raise UsageError(f"{sensor}: nothing is predicted yet. Let the strokes come first.")
-        found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._slope)
+        found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._boom.slope)
         self.requests.zero(found)
         return found
 
-    def _slope(self, joint: int) -> float:
-        """Stroke over angle, m/rad, by rigid geometry at the newest strokes."""
-        return float(cylinder_length(self.plan.tables.linkages[joint], self._track.angles[joint])[1])
-
     def _build(self) -> None:
         """The model under the present load."""
-        self.plan = compile_scene(loaded(self.scene, *self.settings.load))
-        lengths = np.array([section.length for section in self.scene.sections])
-        self._anchor, self._live, self._work = self.plan.state(), self.plan.state(), self.plan.work()
-        self._undeflected = Undeflected(self.scene, self.plan)
-        self._track = new_track(self.plan, lengths)
+        self._boom = Following(loaded(self.scene, *self.settings.load), self.settings)
+        self.plan = self._boom.plan
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -235,74 +219,30 @@ class Twin:
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
-            angles = joint_angles_of_strokes(self.scene, sample.values)
-            settle(self.plan, self._anchor, self._work, sample.values, angles)
+            self._boom.start(sample.values)
         except BoomTwinError as error:
             return self._refuse(sample, "model", *events, status=str(error))
-        self._track.angles[:] = angles
-        self._track.nodes[0] = 0
         self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp))
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
-        time = (sample.stamp - run.epoch) * NANO
-        status = follow(
-            self.plan.tables, self._anchor, self._live, self._work, self._track, self._tuning, time, sample.values, self._row
-        )
-        return self._finish(run, sample, events, status)
-
-    def _finish(self, run: _Run, sample: Sample, events: list[str], status: int) -> Report:
+        status = self._boom.step((sample.stamp - run.epoch) * NANO, sample.values)
         if status != OK:
             self.reset()
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
         span = (sample.stamp - run.newest) * NANO
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
-        run.newest = sample.stamp
-        prediction = self._prediction(run, sample.stamp)
+        before, run.newest, run.slot = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD
+        prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         self._remember(run, prediction)
         self.counts.update(events)
-        passes = int(self._track.passes[0])
-        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=passes)
-
-    def _prediction(self, run: _Run, stamp: int) -> Prediction:
-        n, row = self.plan.joints, self._row.copy()
-        tip = row[2 * n : 2 * n + 9]
-        shape, undeflected, pins = self._lines(run, stamp)
-        return Prediction(
-            stamp=stamp,
-            tip_position=tip[0:2],
-            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
-            tip_velocity=tip[3:5],
-            tip_acceleration=tip[6:8],
-            tip_angle=float(tip[2]),
-            tip_angular_velocity=float(tip[5]),
-            tip_angular_acceleration=float(tip[8]),
-            joints=row[:n],
-            strokes=row[2 * n + 9 : 3 * n + 9],
-            cylinder_forces=row[n : 2 * n],
-            shape=shape,
-            undeflected=undeflected,
-            pins=pins,
-            clearances=row[4 * n + 11 :].reshape(-1, 4),
-        )
-
-    def _lines(self, run: _Run, stamp: int) -> tuple[Array, Array, Array] | tuple[None, None, None]:
-        """Centre line, the undeflected one, and cylinder pins, at the first stamp of its slot of time.
-
-        A rule of the stamps only, indifferent to jitter.
-        """
-        before, run.slot = run.slot, stamp // SHAPE_PERIOD
-        if run.slot == before:
-            return None, None, None
-        line, straight = outline(self.plan, self._live, self._work.position), self._undeflected.at(self._track.angles)
-        return line, straight, self._live.pins.copy()
+        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=self._boom.passes)
 
     def _remember(self, run: _Run, prediction: Prediction) -> None:
         """Keep what residuals need."""
-        n, interval = self.plan.joints, run.interval or self.settings.step
-        variances = self._row[3 * n + 9 : 4 * n + 9]
-        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, variances, self._live, self._track.angles)
-        angles = self._mounting.expected(prediction.joints, self._live)
+        boom, interval = self._boom, run.interval or self.settings.step
+        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, boom.variances, boom.live, boom.angles)
+        angles = self._mounting.expected(prediction.joints, boom.live)
         angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
         force = specific_force(prediction, self.plan.tables.gravity)
         run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas))

@@ -9,7 +9,7 @@ import numpy as np
 from .analysis.posture import set_undeformed
 from .analysis.statics import outline
 from .chain.place import place
-from .plan.compile import Plan
+from .plan.plan import Plan
 from .records import Array
 from .scene.parts import Scene
 

@@ -14,7 +14,7 @@ from ..chain.batch import run_each
 from ..chain.status import OK, SENTENCES
 from ..errors import UsageError
 from ..physics.integrators import GENERALISED_ALPHA
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 from .rows import first_row, row_width
 from .simulate import PASSES, RHO, TOLERANCE

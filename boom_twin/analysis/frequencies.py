@@ -20,7 +20,7 @@ from ..chain.program import Motion, State, Work
 from ..chain.status import OK
 from ..chain.step import observe
 from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 
 HIGHEST = 1e7  # rad/s; no mode is looked for above

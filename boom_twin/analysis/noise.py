@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..chain.program import State, Work
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 from .frequencies import Mode, joint_increments, natural_modes
 

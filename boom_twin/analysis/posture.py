@@ -7,7 +7,7 @@ import numpy as np
 from ..chain.program import State
 from ..physics.integrators import X
 from ..physics.linkage import link_angles
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.parts import Scene
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..chain.program import State
 from ..chain.step import observe, observe_pins
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 
 TIP = 9  # x, v, a of tip x, y, angle

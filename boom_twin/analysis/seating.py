@@ -10,7 +10,7 @@ from ..chain.clearance import axis_of
 from ..chain.program import State
 from ..physics.contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..physics.integrators import X
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 
 CLAMP = 1e12  # N/m, a pin that is as good as ideal
 

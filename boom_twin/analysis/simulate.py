@@ -13,7 +13,8 @@ from ..chain.step import run
 from ..errors import SolverError, UsageError
 from ..physics.contact import LOST
 from ..physics.integrators import GENERALISED_ALPHA
-from ..plan.compile import Plan, compile_scene
+from ..plan.compile import compile_scene
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene

@@ -11,7 +11,8 @@ from ..chain.status import OK
 from ..chain.step import advance, observe
 from ..errors import SolverError, UsageError
 from ..physics.integrators import REST, prepare
-from ..plan.compile import Plan, compile_scene
+from ..plan.compile import compile_scene
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
 from ..scene.parts import Scene

@@ -9,14 +9,10 @@ the place where C sits. With P the pivot, L the vector of link L from D to Q, an
 
 B1, B2, B3 differ in the numbers of the rod pin only (see `physics.linkage`).
 
-A pivot or link pin with clearance has its journal's offset as two more unknowns, behind the six: it moves all that hangs on it,
-as the head's pivot would. So its rows are those of the head's pivot as far as they come from these parts, which are therefore
-assembled in turn: link L, link R, section i.
+Pivots and link pins with clearance: `chain.loop_pins`.
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from ..physics.algebra import solve
 from ..physics.contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
@@ -24,13 +20,9 @@ from ..physics.cylinder import cylinder_terms
 from ..physics.jit import inner
 from ..physics.linkage import LINK_L, LINK_R
 from ..physics.rotation import rotated
-from .clearance import add_turning, condense_ends, move_ends, torque_of
+from .clearance import condense_ends, move_ends, torque_of
+from .loop_pins import ALPHA_L, ALPHA_R, FORCE, HEAD, INNER, LAMBDA, PIN_C, SECTION, SIZE, free_pins, keep_rows, take_rows
 from .place import link_frame
-
-# places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
-HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
-INNER = np.int64(6)  # typed, because numba compiles once more for every literal
-MOST_INNER = 14  # with the offsets of all four pins of a joint
 
 
 @inner
@@ -157,63 +149,6 @@ def _add_cut(work, m, behind, g, h):
 
 
 @inner
-def _keep(apart, g, h, size):
-    """Keep force and tangent of the head's pivot, as assembled so far."""
-    for i in range(2):
-        apart[i, size] = g[i]
-        for j in range(size):
-            apart[i, j] = h[max(i, j), min(i, j)]
-
-
-@inner
-def _take(t, work, joint, place, size, g, h):
-    """Rows of the offset of pin `place`: those of the head's pivot less the kept ones, and the pin's own force."""
-    apart = work.apart
-    for k in range(joint.clearances):
-        row = joint.first_clearance + k
-        if t.clearances[row].place != place:
-            continue
-        at, hold = SIZE + 2 * k, work.hold[row]
-        for i in range(2):
-            g[at + i] += g[i] - apart[i, size] + hold[i]
-            for j in range(size):
-                value = h[max(i, j), min(i, j)] - apart[i, j]
-                if j < at:
-                    h[at + i, j] += value
-                elif j > at + 1:
-                    h[j, at + i] += value
-            for j in range(i + 1):
-                h[at + i, at + j] += h[i, j] - apart[i, j] + hold[2 + i + j]
-
-
-@inner
-def _free_pins(t, state, work, joint, g, h):
-    """Closure of pin Q with all offsets, the force of pin Q's own, and friction in all four pins."""
-    lx, ly = state.z[joint.z + 3], state.z[joint.z + 4]
-    for k in range(joint.clearances):
-        row = joint.first_clearance + k
-        place, hold, at = t.clearances[row].place, work.hold[row], SIZE + 2 * k
-        sign = 1.0 if place in (LINK_L_PIN, Q_PIN) else -1.0
-        g[at] += sign * lx
-        g[at + 1] += sign * ly
-        dx, dy = state.z[t.clearances[row].z], state.z[t.clearances[row].z + 1]
-        g[LAMBDA] += sign * dx
-        g[LAMBDA + 1] += sign * dy
-        h[at, LAMBDA] += sign
-        h[at + 1, LAMBDA + 1] += sign
-        if place == Q_PIN:
-            for i in range(2):
-                g[at + i] += hold[i]
-                for j in range(i + 1):
-                    h[at + i, at + j] += hold[2 + i + j]
-        journal = SECTION if place == PIVOT else ALPHA_L if place == LINK_L_PIN else ALPHA_R
-        bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
-        g[journal] += hold[5]
-        g[bush] -= hold[5]
-        add_turning(hold, h, at, journal, bush)
-
-
-@inner
 def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
     """Condense joint B `index`: the cut of section i (m slots) becomes the cut at the head, pin C carried as slots 3 and 4.
 
@@ -232,16 +167,16 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
         _add_cut(work, m, behind, g, h)
         _add_closure(joint, linkage, state.z, turns, g, h)
         return _condense_loop(work, index, operation, INNER, size)
-    _keep(work.apart, g, h, size)
+    keep_rows(work.apart, g, h, size)
     _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
-    _take(t, work, joint, LINK_L_PIN, size, g, h)
-    _keep(work.apart, g, h, size)
+    take_rows(t, work, joint, LINK_L_PIN, size, g, h)
+    keep_rows(work.apart, g, h, size)
     _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
-    _take(t, work, joint, LINK_R_PIN, size, g, h)
+    take_rows(t, work, joint, LINK_R_PIN, size, g, h)
     _add_cut(work, m, behind, g, h)
-    _take(t, work, joint, PIVOT, size, g, h)
+    take_rows(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, g, h)
-    _free_pins(t, state, work, joint, g, h)
+    free_pins(t, state, work, joint, g, h)
     return _condense_loop(work, index, operation, behind - 5, size)
 
 

@@ -42,7 +42,7 @@ def run(args: Namespace) -> int:
 
         pictures = draw(result, scene, Path(args.out))
     if args.json:
-        print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms")})
+        print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
         return 0
     print("\n".join(as_text(result.summary)))
     for path in [Path(args.out) / "summary.json", Path(args.out) / "bag", *pictures]:
@@ -78,5 +78,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
             f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
             f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
         ]
+    for name, count in summary.get("lost_contacts", {}).items():
+        lines.append(f"{name:18s} lost contact between two samples {count} times")
     alarms = len(summary["alarms"])
     return [*lines, f"alarms             {alarms or 'none'}"]

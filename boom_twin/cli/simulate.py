@@ -24,13 +24,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
+    parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
 
 
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
     from ..analysis.simulate import simulate
+    from ..plan.compile import compile_scene
 
     scene = open_scene(args.scene)
+    if args.orbits and not compile_scene(scene).pins:
+        raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles)
@@ -41,6 +45,14 @@ def run(args: Namespace) -> int:
     with Path(args.out).open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(columns) + "\n")
         np.savetxt(file, table, fmt="%.12g", delimiter=",")
+    for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
+        print(f"{name}: contact lost {lost} times")
+    if args.orbits:
+        from ..view.orbits import Orbits, orbits_picture  # with the plotting library
+
+        gaps = compile_scene(scene).tables.clearances.gap
+        orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
+        orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
     return 0
 
 

@@ -17,6 +17,7 @@ KINDS: dict[str, tuple[str, str]] = {
     "error": ("error", "error against run time of all methods, beside two other programs"),
     "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
+    "clearance": ("clearance", "play in the pins: the tip after a stop and at rest, convergence, what a pin costs"),
 }
 
 

@@ -19,7 +19,7 @@ from ..chain.step import LONGEST_INCREMENT, advance, observe, observe_pins
 from ..physics.integrators import GENERALISED_ALPHA, REST, prepare
 from ..physics.jit import inner, kernel
 from ..physics.linkage import angle_of_length
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 from .smoother import add_node, drive_between, measure, start_node
 

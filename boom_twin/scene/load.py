@@ -18,7 +18,16 @@ DEFAULT_NAME = "default scene"
 
 def default_text() -> str:
     """Text of the package's default scene."""
-    return (files("boom_twin") / "msg_config" / "scene.yaml").read_text(encoding="utf-8")
+    return _text("scene.yaml")
+
+
+def clearance_text() -> str:
+    """Text of the package's block `clearance`, which can follow the default scene."""
+    return _text("clearance.yaml")
+
+
+def _text(name: str) -> str:
+    return (files("boom_twin") / "msg_config" / name).read_text(encoding="utf-8")
 
 
 def load_scene(source: str | Path | None = None) -> Scene:

@@ -10,7 +10,8 @@ from ..analysis.frequencies import natural_modes
 from ..analysis.march import march
 from ..analysis.statics import settle
 from ..errors import SolverError
-from ..plan.compile import Plan, compile_scene
+from ..plan.compile import compile_scene
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import posture_angles, strokes_of_posture
 from ..scene.parts import Scene

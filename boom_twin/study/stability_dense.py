@@ -18,7 +18,7 @@ import numpy as np
 from ..chain.program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
 from ..physics.cylinder import BARREL
 from ..physics.linkage import LINK_L
-from ..plan.compile import Plan
+from ..plan.plan import Plan
 from ..records import Array
 
 Long = np.longdouble

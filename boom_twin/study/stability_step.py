@@ -18,7 +18,8 @@ from ..chain.program import Motion, State, Work
 from ..chain.status import OK
 from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..physics.integrators import prepare
-from ..plan.compile import Plan, compile_scene
+from ..plan.compile import compile_scene
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.parts import Scene
 from .stability_dense import Kinematics, Long

@@ -134,6 +134,8 @@ def variants(scene: Scene) -> tuple[Variant, ...]:
     wheres: list[Sequence[int]] = [everywhere, *([i] for i in everywhere if len(everywhere) > 1)]
     found = [without(scene, kind, where) for kind in KINDS for where in (wheres if kind.singly else wheres[:1])]
     found += [with_modes(scene, count, where) for where in wheres for count in range(1, MOST_MODES + 1)]
+    if scene.clearance is not None and scene.clearance.pins:
+        found.insert(0, Variant("all pins ideal", "clearance", (Edit(("clearance",), None),)))
     return tuple(_distinct(variant for variant in found if variant is not None))
 
 

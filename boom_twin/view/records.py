@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..records import Array
+from .orbits import Orbits
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,8 @@ class History:
         Deflected centre lines from the base pivot to the tip, m, and when.
     gaps : list of (float, float)
         From and to, s, where strokes were missing.
+    orbits : Orbits or None
+        Of the pins with clearance, if there are any.
     """
 
     stamps_s: Array
@@ -76,3 +79,4 @@ class History:
     imu: ImuTrace | None = None
     shapes: list[tuple[float, Array]] = field(default_factory=list)
     gaps: list[tuple[float, float]] = field(default_factory=list)
+    orbits: Orbits | None = None

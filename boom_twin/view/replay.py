@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .orbits import orbits_picture
 from .posture import posture_picture
 from .records import History, Truth
 from .residuals import residual_picture
@@ -32,7 +33,8 @@ def replay_pictures(
     -------
     list of Path
         ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-        (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes.
+        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same
+        arrays give the same bytes.
     """
     if len(history.stamps_s) == 0:
         return []
@@ -48,4 +50,7 @@ def replay_pictures(
     if has_spectrum(history):
         written.append(directory / "spectrum.png")
         spectrum_picture(written[-1], session, history, note)
+    if history.orbits is not None:
+        written.append(directory / "orbits.png")
+        orbits_picture(written[-1], f"{session}: journals in their bushes", history.orbits, note)
     return written

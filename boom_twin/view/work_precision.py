@@ -25,6 +25,9 @@ FAMILIES: dict[str, tuple[str, dict[str, Any], tuple[float, float]]] = {
     "default": ("boom_twin, default method", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
     "exudyn": ("Exudyn, by elements a section", {"color": ORANGE, "linewidth": 1.6, "marker": "s"}, (7, -4)),
     "scipy": ("SciPy's Radau, by segments", {"color": GREEN, "linewidth": 1.6, "marker": "^", "markersize": 7}, (7, 3)),
+    "elastic": ("boom_twin, all rods' pins, elastic boom", {"color": SKY, "linewidth": 1.6, "marker": "D"}, (7, 3)),
+    "play": ("boom_twin, one pin, rigid boom", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
+    "events": ("SciPy cut at contacts, one pin, rigid boom", {"color": GREEN, "linewidth": 1.6, "marker": "^"}, (7, 3)),
 }
 
 
@@ -150,7 +153,8 @@ def _legend(panel: Panel) -> list[Any]:
     found: list[Any] = [Line2D([], [], label=text, **look) for name, (text, look, _) in FAMILIES.items() if name in used]
     if panel.chosen:
         found.append(Line2D([], [], label="the default, step 1 ms", **STAR | {"markersize": 15}))
-    found.append(Line2D([], [], color=INK, linestyle=(0, (2, 2)), label="Pareto front", **RING))
+    if panel.front:
+        found.append(Line2D([], [], color=INK, linestyle=(0, (2, 2)), label="Pareto front", **RING))
     if panel.floor:
         found.append(Patch(color=PALE, alpha=0.5, label="less than the references differ"))
     return found

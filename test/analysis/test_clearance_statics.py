@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms
-from oracle.clearance import geometry, rigid
-from oracle.clearance.booms import freed
-from oracle.clearance.contact import HYSTERESIS, Contact
+from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
 from boom_twin.analysis.statics import settle, statics
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import HYSTERESIS, Contact
 from boom_twin.physics.contact import LEAST_GAP, SMOOTH
 from boom_twin.plan.compile import compile_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture

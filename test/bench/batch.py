@@ -16,7 +16,8 @@ import numpy as np
 
 from boom_twin.analysis.batch import Batch
 from boom_twin.analysis.march import march
-from boom_twin.plan.compile import Plan, compile_scene
+from boom_twin.plan.compile import compile_scene
+from boom_twin.plan.plan import Plan
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 

@@ -12,7 +12,8 @@ from boom_twin.chain.place import place
 from boom_twin.chain.program import State, Work
 from boom_twin.chain.step import advance, observe, run
 from boom_twin.physics.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
-from boom_twin.plan.compile import Plan, compile_scene
+from boom_twin.plan.compile import compile_scene
+from boom_twin.plan.plan import Plan
 
 INSTANT = 1e-4  # s, over which accelerations at rest are found; their relative error is about its square
 TOLERANCE = 1e-11  # rad in the last pass of a step

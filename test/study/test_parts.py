@@ -12,6 +12,7 @@ import pytest
 from boom_twin.analysis.statics import statics
 from boom_twin.scene import Scene
 from boom_twin.study import deviation, parts
+from boom_twin.study.clearance_scenes import with_play
 from boom_twin.study.edits import Edit
 from boom_twin.study.variants import KINDS, Variant, variants, without
 
@@ -53,6 +54,13 @@ def test_a_part_that_is_not_there_cannot_be_left_out(two_sections: Scene) -> Non
         variant = without(two_sections, kind, [0, 1])
         assert variant is not None
         assert without(variant.of(two_sections), kind, [0, 1]) is None
+
+
+def test_pins_with_play_can_be_made_ideal(two_sections: Scene) -> None:
+    worn = with_play(two_sections)
+    made = next(variant for variant in variants(worn) if variant.kind == "clearance")
+    assert made.of(worn) == two_sections and str(made.edits[0]) == "remove clearance"
+    assert all(variant.kind != "clearance" for variant in variants(two_sections))
 
 
 def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, monkeypatch: pytest.MonkeyPatch) -> None:

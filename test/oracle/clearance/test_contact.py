@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from oracle.clearance.contact import HYSTERESIS, LEAST_SPEED, Contact, stiffness
+
+from boom_twin.peers.play.contact import HYSTERESIS, LEAST_SPEED, Contact, stiffness
 
 STEEL = stiffness(0.025, 1e-4, 2.06e11, 0.3)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from oracle.clearance.contact import HYSTERESIS, Contact, stiffness
 from oracle.clearance.drop import rebound, restitution
+
+from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 PUBLISHED = [

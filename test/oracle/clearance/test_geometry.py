@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms, segments
-from oracle.clearance import geometry
-from oracle.clearance.booms import freed
+
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms, lagrange
-from oracle.clearance import geometry, rigid
-from oracle.clearance.booms import freed
-from oracle.clearance.contact import HYSTERESIS, Contact, stiffness
+from oracle.clearance import rigid
+
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 HEADINGS = np.array([0.5, -0.3])

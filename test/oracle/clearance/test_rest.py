@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms, segments
-from oracle.clearance import geometry, rigid
-from oracle.clearance.booms import freed
-from oracle.clearance.contact import HYSTERESIS, Contact, stiffness
+from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, loaded_lever, tip_shift
+
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
 
 RADII = (0.030, 0.025, 0.025, 0.020)
 POSTURES = ["horizontal", "arch", "high", "low"]

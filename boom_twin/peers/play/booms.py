@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from cmath import exp
+from collections.abc import Sequence
 
+from ...records import Array
 from . import geometry
+from .contact import Contact
 from .cylinder import Cylinder
+from .moving import Document
 from .parts import Lever, SixBar
 from .pinned_boom import PinnedBoom
 
 
-def freed(document, headings, index, contact):
+def freed(document: Document, headings: Sequence[float] | Array, index: int, contact: Contact | None) -> PinnedBoom:
     """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
 
     Parameters
@@ -25,6 +29,7 @@ def freed(document, headings, index, contact):
     joint, places = document["joints"][index], geometry.pivots(document, headings)
     body = geometry.outboard(document, headings, index)
     tip = (places[-1] - places[index]) * exp(-1j * headings[index])
+    part: Lever | SixBar
     if index == 0:
         part = Lever(places[0], body, complex(*document["sections"][0]["rod_pin"]), tip)
     else:

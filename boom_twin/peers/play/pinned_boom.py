@@ -13,33 +13,42 @@ J(phi) and P(phi) are the part's (`parts`), I(l) the cylinder's. The mass matrix
 from __future__ import annotations
 
 from cmath import exp
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import UsageError
+from ...records import Array
 from .contact import Contact
 from .cylinder import Cylinder
-from .equilibrium import equilibrium
-from .impacts import Episode, follow
-from .moving import dot
+from .equilibrium import Rest, equilibrium
+from .impacts import Episode, Motion, follow
+from .moving import Point, dot
+from .parts import Lever, SixBar
+
+Drive = Callable[[float], tuple[float, float]]
 
 LONGEST = 1e-2  # s, step
 
 
 @dataclass(frozen=True)
 class Followed:
-    """A motion in m rows: tip, offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
+    """A motion in m rows.
+
+    Tip (m), its acceleration (m/s^2), offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
 
     `phi`, `tension` (N, of the oil) and `energy` (J, oil, weight and motion, without that of the contact): (m,).
     """
 
-    times: np.ndarray
-    tip: np.ndarray
-    offset: np.ndarray
-    force: np.ndarray
-    phi: np.ndarray
-    tension: np.ndarray
-    energy: np.ndarray
+    times: Array
+    tip: Array
+    acceleration: Array
+    offset: Array
+    force: Array
+    phi: Array
+    tension: Array
+    energy: Array
     episodes: list[Episode]
 
 
@@ -47,16 +56,25 @@ class Followed:
 class PinnedBoom:
     """`part`: a `Lever` or `SixBar`; `contact` None: an ideal pin, for `rest` only; gravity complex, m/s^2."""
 
-    part: object
+    part: Lever | SixBar
     cylinder: Cylinder
     contact: Contact | None
     gravity: complex
 
-    def rest(self, drive, phi):
+    def rest(self, drive: float, phi: float) -> Rest:
         """See `equilibrium`."""
         return equilibrium(self, drive, phi)
 
-    def follow(self, drive, rest, times, breaks=(), tolerance=1e-8, method="LSODA", rate=0.0):
+    def follow(
+        self,
+        drive: Drive,
+        rest: Rest,
+        times: Array,
+        breaks: Sequence[float] = (),
+        tolerance: float = 1e-8,
+        method: str = "LSODA",
+        rate: float = 0.0,
+    ) -> Followed:
         """Motion from an equilibrium, as `Followed`.
 
         Parameters
@@ -81,11 +99,11 @@ class PinnedBoom:
         )  # fmt: skip
         return self._rows(drive, found, zero + found.states)
 
-    def rates(self, drive, state, entry):
+    def rates(self, drive: tuple[float, float], state: Array, entry: float | None) -> list[float]:
         """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         c, g, u, placed = self.cylinder, self.gravity, exp(1j * psi), self.part.at(phi)
-        force = self.contact.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
+        force = self._bush.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
         arm = length - c.rod_com
         moment = dot(g, placed.moments) - dot(force, placed.pin.first) - 0.5 * placed.slope * turn**2
         pull = dot(force, u) - c.tension(length, speed, drive)
@@ -93,29 +111,37 @@ class PinnedBoom:
         bends = moment / placed.inertia, pull / c.rod_mass + dot(g, u) + arm * swing**2, tilt / c.inertia(length)
         return [turn, speed, swing, *bends]
 
-    def gap(self, state):
+    def gap(self, state: Array) -> tuple[float, float]:
         """Gap (m, positive in contact) and its rate (m/s)."""
         offset, rate = self.pin(state)
         distance = abs(offset)
-        return self.contact.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
+        return self._bush.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
 
-    def pin(self, state):
+    def pin(self, state: Array) -> tuple[complex, complex]:
         """Offset (m) of the pin in the bush and its rate (m/s), complex."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
 
-    def energy(self, drive, state):
+    def energy(self, drive: float, state: Array) -> float:
         """Of motion, weight and oil, J; not of the contact."""
         phi, length, psi, turn, speed, swing = state
         placed = self.part.at(phi)
         own = 0.5 * placed.inertia * turn**2 - dot(self.gravity, placed.height)
-        return own + self.cylinder.energy(length, psi, speed, swing, drive, self.gravity)
+        return float(own + self.cylinder.energy(length, psi, speed, swing, drive, self.gravity))
 
-    def _pin(self, length, u, turn, speed, swing, bush):
+    @property
+    def _bush(self) -> Contact:
+        if self.contact is None:
+            raise UsageError("contact = None: an ideal pin has an equilibrium but no motion here. Give a `Contact`.")
+        return self.contact
+
+    def _pin(
+        self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point
+    ) -> tuple[complex, complex]:
         rate = (speed + 1j * length * swing) * u - bush.first * turn
         return self.cylinder.pin + length * u - bush.value, rate
 
-    def _rows(self, drive, found, states):
+    def _rows(self, drive: Drive, found: Motion, states: Array) -> Followed:
         pins = [self.pin(state) for state in states]
         entries = [None if np.isnan(entry) else entry for entry in found.entries]
         drives = [drive(time) for time in found.times]
@@ -123,15 +149,20 @@ class PinnedBoom:
         return Followed(
             found.times,
             _pairs([self.part.tip_at(state[0]) for state in states]),
+            _pairs([self._tip_acceleration(*row) for row in zip(drives, states, entries, strict=True)]),
             _pairs([offset for offset, _ in pins]),
-            _pairs([self.contact.force(*pin, entry) for pin, entry in zip(pins, entries, strict=True)]),
+            _pairs([self._bush.force(*pin, entry) for pin, entry in zip(pins, entries, strict=True)]),
             states[:, 0],
             np.array([self.cylinder.tension(state[1], state[4], at) for state, at in both]),
             np.array([self.energy(at[0], state) for state, at in both]),
             found.episodes,
         )
 
+    def _tip_acceleration(self, drive: tuple[float, float], state: Array, entry: float | None) -> complex:
+        arm = self.part.tip_at(state[0]) - self.part.pivot
+        return complex((1j * self.rates(drive, state, entry)[3] - state[3] ** 2) * arm)
 
-def _pairs(values):
-    values = np.array(values)
-    return np.column_stack([values.real, values.imag])
+
+def _pairs(values: Sequence[complex]) -> Array:
+    both = np.array(values)
+    return np.column_stack([both.real, both.imag])

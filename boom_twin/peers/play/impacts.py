@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ...records import Array
+
 MOST = 20_000  # pieces of a motion
+
+Rates = Callable[[float, Array, float | None], Sequence[float] | Array]
+Gap = Callable[[float, Array], tuple[float, float]]
+Piece = tuple[Any, float | None]
 
 
 @dataclass(frozen=True)
@@ -40,13 +48,23 @@ class Episode:
 class Motion:
     """States (m, n) at times (m,), the entry speed that held at each (nan in flight), and the episodes of contact."""
 
-    times: np.ndarray
-    states: np.ndarray
-    entries: np.ndarray
+    times: Array
+    states: Array
+    entries: Array
     episodes: list[Episode]
 
 
-def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=np.inf, method="Radau"):
+def follow(
+    rates: Rates,
+    gap: Gap,
+    start: Sequence[float] | Array,
+    times: Array,
+    rtol: float = 1e-8,
+    atol: float | Array = 1e-10,
+    breaks: Sequence[float] = (),
+    longest: float = np.inf,
+    method: str = "Radau",
+) -> Motion:
     """Follow a motion with one contact.
 
     Parameters
@@ -74,7 +92,9 @@ def follow(rates, gap, start, times, rtol=1e-8, atol=1e-10, breaks=(), longest=n
     return Motion(times, states, entries, _episodes(pieces, gap))
 
 
-def _pieces(rates, gap, now, state, stops, options):
+def _pieces(
+    rates: Rates, gap: Gap, now: float, state: Array, stops: Sequence[float], options: dict[str, Any]
+) -> Iterator[Piece]:
     """Solutions between touches, releases and stops, each with the entry speed that held."""
     depth, rate = gap(now, state)
     entry = max(rate, 0.0) if depth >= 0.0 else None
@@ -92,28 +112,28 @@ def _pieces(rates, gap, now, state, stops, options):
                 entry = abs(gap(now, state)[1]) if entry is None else None
 
 
-def _events(gap, touching):
+def _events(gap: Gap, touching: bool) -> tuple[Any, Any]:
     """Of the gap's change of sign, which ends a piece, and of its maxima."""
-    last = {}
+    last: dict[float, tuple[float, float]] = {}
 
-    def once(time, state):
+    def once(time: float, state: Array) -> tuple[float, float]:
         if time not in last:
             last.clear()
             last[time] = gap(time, state)
         return last[time]
 
-    def crossing(time, state, entry):
+    def crossing(time: float, state: Array, entry: float | None) -> float:
         return once(time, state)[0]
 
-    def turning(time, state, entry):
+    def turning(time: float, state: Array, entry: float | None) -> float:
         return once(time, state)[1]
 
-    crossing.terminal, crossing.direction = True, -1.0 if touching else 1.0
-    turning.direction = -1.0
-    return crossing, turning
+    end, top = cast(Any, crossing), cast(Any, turning)
+    end.terminal, end.direction, top.direction = True, -1.0 if touching else 1.0, -1.0
+    return end, top
 
 
-def _rows(pieces, times):
+def _rows(pieces: Sequence[Piece], times: Array) -> tuple[Array, Array]:
     """States and entry speeds at given times; a touch belongs to what follows it."""
     which = np.searchsorted([found.t[0] for found, _ in pieces], times, side="right") - 1
     states = [pieces[k][0].sol(time) for k, time in zip(which, times, strict=True)]
@@ -121,8 +141,10 @@ def _rows(pieces, times):
     return np.array(states), np.array(entries)
 
 
-def _episodes(pieces, gap):
-    episodes, begun, tops = [], None, []
+def _episodes(pieces: Sequence[Piece], gap: Gap) -> list[Episode]:
+    episodes: list[Episode] = []
+    tops: list[float] = []
+    begun: float | None = None
     for found, entry in pieces:
         if entry is None:
             continue

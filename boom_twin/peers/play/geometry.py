@@ -6,20 +6,26 @@
 from __future__ import annotations
 
 from cmath import exp
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...records import Array
 from .linkage import links, on_left, on_right, rod_pin
-from .moving import Mass, lumped
+from .moving import Document, Mass, lumped
+
+Headings = Sequence[float] | Array
+Complexes = NDArray[np.complex128]
 
 
-def pivots(document, headings):
+def pivots(document: Document, headings: Headings) -> Complexes:
     """Pivots of all sections and, last, the tip; complex, m."""
     steps = [s["length"] * exp(1j * h) for s, h in zip(document["sections"], headings, strict=True)]
-    return complex(*document["base"]["pivot"]) + np.concatenate([[0.0], np.cumsum(steps)])
+    return np.asarray(complex(*document["base"]["pivot"]) + np.concatenate([[0.0], np.cumsum(steps)]))
 
 
-def pins(document, headings, index):
+def pins(document: Document, headings: Headings, index: int) -> tuple[complex, complex]:
     """Barrel pin and rod pin of cylinder `index`, complex, m."""
     pivot, joint = pivots(document, headings)[index], document["joints"][index]
     if index == 0:
@@ -31,13 +37,13 @@ def pins(document, headings, index):
     return pivot + complex(*joint["C"]) * exp(1j * before), rod
 
 
-def cylinder_length(document, headings, index):
+def cylinder_length(document: Document, headings: Headings, index: int) -> float:
     """Pin to pin, m."""
     barrel, rod = pins(document, headings, index)
     return abs(rod - barrel)
 
 
-def levers(document, headings, step=1e-5):
+def levers(document: Document, headings: Headings, step: float = 1e-5) -> Complexes:
     """How the tip moves per metre of each cylinder, the others held: complex, shape (n,), by central differences.
 
     To first order this times (clearance + penetration) is the tip's shift by the play of a pin that lies on its side: a
@@ -54,9 +60,10 @@ def levers(document, headings, step=1e-5):
     return np.array(found)
 
 
-def outboard(document, headings, index):
+def outboard(document: Document, headings: Headings, index: int) -> Mass:
     """All that turns with section `index` as one body, in that section's axes; without the links of its own joint."""
-    places, masses = pivots(document, headings), []
+    places = pivots(document, headings)
+    masses: list[Mass] = []
     for i in range(index, len(headings)):
         masses += _turned(_section(document, i), places[i], headings[i])
         if i > index:
@@ -65,17 +72,17 @@ def outboard(document, headings, index):
     return lumped(_turned(masses, -places[index], 0.0, -headings[index]))
 
 
-def gravity(document):
+def gravity(document: Document) -> complex:
     """In the base's axes, complex, m/s^2."""
     return complex(*document["gravity"]) * exp(-1j * document["base"].get("inclination", 0.0))
 
 
-def _turned(masses, origin, heading, after=0.0):
+def _turned(masses: Sequence[Mass], origin: complex, heading: float, after: float = 0.0) -> list[Mass]:
     turn, all_over = exp(1j * heading), exp(1j * after)
     return [Mass(body.mass, body.inertia, (origin + turn * body.at) * all_over) for body in masses]
 
 
-def _section(document, index):
+def _section(document: Document, index: int) -> list[Mass]:
     """Rigid parts, the beam as a rod, the filled line."""
     section = document["sections"][index]
     found = [Mass(p["mass"], p["inertia"], complex(*p["com"])) for p in (section.get("root"), section.get("head")) if p]
@@ -85,12 +92,12 @@ def _section(document, index):
     return [*found, _rod(document.get("line_fill", 0.0), 0.0, section["length"], 0.0)]
 
 
-def _rod(per_metre, x0, x1, turning_per_metre):
+def _rod(per_metre: float, x0: float, x1: float, turning_per_metre: float) -> Mass:
     long = x1 - x0
     return Mass(per_metre * long, per_metre * long**3 / 12.0 + turning_per_metre * long, complex(0.5 * (x0 + x1)))
 
 
-def _joint(document, headings, index, pivot):
+def _joint(document: Document, headings: Headings, index: int, pivot: complex) -> list[Mass]:
     """Links, barrel and rod of a six-bar."""
     joint, before = document["joints"][index], headings[index - 1]
     phi = headings[index] - before

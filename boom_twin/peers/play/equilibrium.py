@@ -9,10 +9,14 @@ from __future__ import annotations
 
 from cmath import phase
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from scipy.optimize import brentq
 
 from .moving import dot
+
+if TYPE_CHECKING:
+    from .pinned_boom import PinnedBoom
 
 NEAR = 0.05  # rad, about the guess
 PASSES = 40
@@ -32,7 +36,7 @@ class Rest:
     tension: float
 
 
-def equilibrium(boom, drive, phi):
+def equilibrium(boom: PinnedBoom, drive: float, phi: float) -> Rest:
     """`Rest` of a `PinnedBoom` at a length of the drive (m), within `NEAR` of heading `phi` (rad)."""
     offset = 0j
     for _ in range(PASSES):
@@ -44,10 +48,10 @@ def equilibrium(boom, drive, phi):
     raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
 
 
-def _held(boom, drive, phi, offset):
+def _held(boom: PinnedBoom, drive: float, phi: float, offset: complex) -> Rest:
     """With the pin at `offset`."""
 
-    def at(angle):
+    def at(angle: float) -> tuple[float, Rest]:
         placed = boom.part.at(angle)
         axis = placed.pin.value + offset - boom.cylinder.pin
         length, psi = abs(axis), phase(axis)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from cmath import exp, phase
 from math import sqrt
 
-from .moving import Point, Turn
+from .moving import Document, Point, Turn
 
 
-def links(joint, phi):
+def links(joint: Document, phi: float) -> tuple[Turn, Turn]:
     """Headings of links L and R (`Turn`) at a joint angle phi; `joint` as in a scene's file. Pin Q is left of D->E."""
     d, e, long, short = complex(*joint["D"]), complex(*joint["E"]) * exp(1j * phi), joint["lL"], joint["lR"]
     gap = e - d
@@ -25,24 +25,24 @@ def links(joint, phi):
     return Turn(phase(a), first[0], second[0]), Turn(phase(b), first[1], second[1])
 
 
-def rod_pin(joint, phi, left, right):
+def rod_pin(joint: Document, phi: float, left: Turn, right: Turn) -> Point:
     """Where the rod is pinned, a `Point` over phi, given the links there."""
     if joint["kind"] == "B3":
         return on_right(joint, phi, right, joint["lR"] - complex(*joint["R"]))
     return on_left(joint, left, complex(*joint["R"]) if joint["kind"] == "B2" else joint["lL"])
 
 
-def on_left(joint, left, local):
+def on_left(joint: Document, left: Turn, local: complex) -> Point:
     """A point carried by link L, `local` from D along and to the left of it."""
     return Point(complex(*joint["D"]), 0j, 0j) + left.arm(local)
 
 
-def on_right(joint, phi, right, local):
+def on_right(joint: Document, phi: float, right: Turn, local: complex) -> Point:
     """A point carried by link R, `local` from E along and to the left of it."""
     return Turn(phi, 1.0, 0.0).arm(complex(*joint["E"])) + right.arm(local)
 
 
-def _solved(a, b, wanted):
+def _solved(a: complex, b: complex, wanted: complex) -> tuple[float, float]:
     """Real x, y with a x - b y = wanted."""
     area = (b.conjugate() * a).imag
     return (b.conjugate() * wanted).imag / area, (a.conjugate() * wanted).imag / area

@@ -6,10 +6,11 @@ on phi:     2 T = J phi'^2 ,     J = sum m |z'|^2 + I t'^2 .
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .linkage import links, on_left, on_right, rod_pin
-from .moving import Mass, Point, Turn
+from .moving import Document, Mass, Point, Turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +45,13 @@ class Lever:
     pin: complex
     tip: complex
 
-    def at(self, phi):
+    def at(self, phi: float) -> Placed:
         """See `Placed`."""
         turn = Turn(phi, 1.0, 0.0)
         bodies = [(self.body, Point(self.pivot, 0j, 0j) + turn.arm(self.body.at), turn)]
         return _placed(bodies, Point(self.pivot, 0j, 0j) + turn.arm(self.pin))
 
-    def tip_at(self, phi):
+    def tip_at(self, phi: float) -> complex:
         """Complex, m."""
         return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
 
@@ -61,11 +62,11 @@ class SixBar:
 
     pivot: complex
     body: Mass
-    joint: dict
+    joint: Document
     before: float
     tip: complex
 
-    def at(self, phi):
+    def at(self, phi: float) -> Placed:
         """See `Placed`."""
         joint, angle, turn = self.joint, phi - self.before, Turn(phi, 1.0, 0.0)
         left, right = links(joint, angle)
@@ -78,15 +79,15 @@ class SixBar:
         ]
         return _placed(bodies, self._fixed(rod_pin(joint, angle, left, right)))
 
-    def tip_at(self, phi):
+    def tip_at(self, phi: float) -> complex:
         """Complex, m."""
         return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
 
-    def _fixed(self, point):
+    def _fixed(self, point: Point) -> Point:
         return point.seen_from(self.pivot, self.before)
 
 
-def _placed(bodies, pin):
+def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> Placed:
     """`bodies`: mass, place and turn of each."""
     return Placed(
         sum(b.mass * abs(z.first) ** 2 + b.inertia * t.first**2 for b, z, t in bodies),

@@ -9,12 +9,13 @@ chi: Lankarani and Nikravesh (1990); Flores et al. (2011); Hunt and Crossley (19
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, sqrt, tanh
 
 LEAST_SPEED = 1e-3  # m/s, of approach at entry
 
-HYSTERESIS = {
+HYSTERESIS: dict[str, Callable[[float], float]] = {
     "hertz": lambda e: 0.0,
     "lankarani-nikravesh": lambda e: 3.0 * (1.0 - e**2) / 4.0,
     "flores": lambda e: 8.0 * (1.0 - e) / (5.0 * e),
@@ -23,7 +24,7 @@ HYSTERESIS = {
 """chi over the restitution that the law is meant to give."""
 
 
-def stiffness(pin_radius, clearance, young, poisson):
+def stiffness(pin_radius: float, clearance: float, young: float, poisson: float) -> float:
     """K (N/m^1.5) of pin and bush of one material; m, Pa."""
     softness = 2.0 * (1.0 - poisson**2) / young
     return 4.0 / (3.0 * softness) * sqrt(pin_radius * (pin_radius + clearance) / clearance)
@@ -58,26 +59,26 @@ class Contact:
     friction: float = 0.0
     slip: float = 1e-2
 
-    def gap(self, offset):
+    def gap(self, offset: complex) -> float:
         """|offset| - c, m: negative in flight."""
         return abs(offset) - self.clearance
 
-    def penetration(self, gap):
+    def penetration(self, gap: float) -> float:
         """d, m."""
         if self.smoothing == 0.0:
             return max(gap, 0.0)
         long = hypot(gap, self.smoothing)
         return 0.5 * (gap + long) if gap > 0.0 else 0.5 * self.smoothing**2 / (long - gap)
 
-    def normal(self, gap, gap_rate, entry):
+    def normal(self, gap: float, gap_rate: float, entry: float | None) -> float:
         """F, N. `entry`: approach speed (m/s) when the pin touched, or None in flight, where nothing is damped."""
         depth = self.penetration(gap)
-        elastic = self.stiffness * depth**self.exponent
+        elastic = float(self.stiffness * depth**self.exponent)
         if entry is None or depth == 0.0:
             return elastic
         return max(elastic * (1.0 + self.hysteresis * gap_rate / max(entry, LEAST_SPEED)), 0.0)
 
-    def force(self, offset, rate, entry):
+    def force(self, offset: complex, rate: complex, entry: float | None) -> complex:
         """Force (N) of the bush on the pin, complex; offset (m) and rate (m/s) of the pin against the bush."""
         distance = abs(offset)
         if distance == 0.0:
@@ -85,15 +86,15 @@ class Contact:
         outward = offset / distance
         along = rate * outward.conjugate()
         pressure = self.normal(distance - self.clearance, along.real, entry)
-        return -pressure * outward * (1.0 + 1j * self.friction * tanh(along.imag / self.slip))
+        return complex(-pressure * outward * (1.0 + 1j * self.friction * tanh(along.imag / self.slip)))
 
-    def resting_offset(self, force):
+    def resting_offset(self, force: complex) -> complex:
         """Where a pin lies still that presses on the bush with `force` (N, complex, not 0): along it, m."""
         size = abs(force)
         depth = (size / self.stiffness) ** (1.0 / self.exponent)
-        return (self.clearance + depth - 0.25 * self.smoothing**2 / depth) * force / size
+        return complex((self.clearance + depth - 0.25 * self.smoothing**2 / depth) * force / size)
 
-    def stored(self, gap):
+    def stored(self, gap: float) -> float:
         """Energy (J) of a sharp contact."""
         n = self.exponent
-        return self.stiffness * max(gap, 0.0) ** (n + 1.0) / (n + 1.0)
+        return float(self.stiffness * max(gap, 0.0) ** (n + 1.0) / (n + 1.0))

@@ -1,0 +1,105 @@
+"""The compiled boom under one load, as it follows strokes: from a sample's strokes to a `Prediction`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .analysis.statics import outline, settle
+from .chain.program import State
+from .estimate.follower import Tuning, follow, new_track
+from .physics.linkage import cylinder_length
+from .plan.compile import compile_scene
+from .records import Array, Prediction
+from .scene.kinematics import joint_angles_of_strokes
+from .scene.parts import Scene
+from .settings import Settings
+from .undeflected import Undeflected
+
+
+class Following:
+    """A boom that remembers how it moved.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    settings : Settings
+        Noise of the strokes, tuning of the estimator.
+
+    Attributes
+    ----------
+    plan : Plan
+    live : State
+        The boom as predicted by the newest sample.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self._scene, self.plan = scene, compile_scene(scene)
+        self.live: State = self.plan.state()
+        self._anchor, self._work = self.plan.state(), self.plan.work()
+        self._undeflected = Undeflected(scene, self.plan)
+        self._track = new_track(self.plan, np.array([section.length for section in scene.sections]))
+        self._tuning = Tuning(
+            settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
+        )
+        self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
+
+    @property
+    def angles(self) -> Array:
+        """Joint angles (rad) of the rigid boom at the newest strokes, shape (n,)."""
+        return self._track.angles
+
+    @property
+    def variances(self) -> Array:
+        """Of the newest strokes' estimates, m^2, shape (n,)."""
+        n = self.plan.joints
+        return self._row[3 * n + 9 : 4 * n + 9]
+
+    @property
+    def passes(self) -> int:
+        """Newton passes that the newest sample took."""
+        return int(self._track.passes[0])
+
+    def slope(self, joint: int) -> float:
+        """Stroke over angle of joint `joint` (0-based), m/rad, by rigid geometry at the newest strokes."""
+        return float(cylinder_length(self.plan.tables.linkages[joint], self._track.angles[joint])[1])
+
+    def start(self, strokes: Array) -> None:
+        """Forget all; at rest in equilibrium at `strokes` (m), shape (n,).
+
+        Raises
+        ------
+        UsageError, SolverError
+            Strokes out of reach; no equilibrium there.
+        """
+        angles = joint_angles_of_strokes(self._scene, strokes)
+        settle(self.plan, self._anchor, self._work, strokes, angles)
+        self._track.angles[:] = angles
+        self._track.nodes[0] = 0
+
+    def step(self, time: float, strokes: Array) -> int:
+        """Go on to strokes (m; NaN = missing) measured at `time` (s since the start); a status of `chain.status`."""
+        tables, work = self.plan.tables, self._work
+        return int(follow(tables, self._anchor, self.live, work, self._track, self._tuning, time, strokes, self._row))
+
+    def prediction(self, stamp: int, shaped: bool) -> Prediction:
+        """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
+        n, row = self.plan.joints, self._row.copy()
+        tip = row[2 * n : 2 * n + 9]
+        return Prediction(
+            stamp=stamp,
+            tip_position=tip[0:2],
+            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
+            tip_velocity=tip[3:5],
+            tip_acceleration=tip[6:8],
+            tip_angle=float(tip[2]),
+            tip_angular_velocity=float(tip[5]),
+            tip_angular_acceleration=float(tip[8]),
+            joints=row[:n],
+            strokes=row[2 * n + 9 : 3 * n + 9],
+            cylinder_forces=row[n : 2 * n],
+            shape=outline(self.plan, self.live, self._work.position) if shaped else None,
+            undeflected=self._undeflected.at(self.angles) if shaped else None,
+            pins=self.live.pins.copy() if shaped else None,
+            clearances=row[4 * n + 11 :].reshape(-1, 4),
+        )

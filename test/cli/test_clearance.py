@@ -1,0 +1,60 @@
+"""Commands on scenes with play in their pins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.cli.main import main
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.load import clearance_text, default_text
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    assert main(["scene", "--clearance"]) == 0
+    path = tmp_path / "play.yaml"
+    path.write_text(capsys.readouterr().out)
+    return path
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    strokes = strokes_of_posture(load_scene(), "arch")
+    rows = np.column_stack([np.linspace(0.0, 0.05, 6), np.tile(strokes, (6, 1))])
+    path = tmp_path / "drive.csv"
+    np.savetxt(path, rows, delimiter=",", header="t_s," + ",".join(f"stroke_{i + 1}_m" for i in range(4)), comments="")
+    return path
+
+
+def test_the_printed_scene_is_whole(scene_file: Path) -> None:
+    scene = load_scene(scene_file)
+    assert scene.clearance is not None
+    assert [pin.at for pin in scene.clearance.pins] == [f"cylinder_{i}.rod" for i in range(1, 5)]
+    assert scene.model_copy(update={"clearance": None}) == load_scene()
+    assert scene_file.read_text() == default_text() + "\n" + clearance_text()
+
+
+def test_simulate_tells_lost_contacts_and_draws_orbits(
+    scene_file: Path, drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, picture = tmp_path / "out.csv", tmp_path / "orbits.png"
+    given = ["simulate", str(scene_file), "--posture", "arch", "--drive", str(drive), "--out", str(out)]
+    assert main([*given, "--orbits", str(picture)]) == 0
+    assert capsys.readouterr().out.splitlines() == [f"cylinder_{i}.rod: contact lost 0 times" for i in range(1, 5)]
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    header, *rows = out.read_text().splitlines()
+    names = [f"cylinder_{i}_rod_{what}" for i in range(1, 5) for what in ("dx_m", "dy_m", "force_N", "contact")]
+    assert header.split(",")[-16:] == names and len(rows) == 6
+    still = dict(zip(header.split(","), map(float, rows[-1].split(",")), strict=True))
+    assert still["cylinder_1_rod_contact"] == 1.0
+    assert np.hypot(still["cylinder_1_rod_dx_m"], still["cylinder_1_rod_dy_m"]) > 1e-4
+
+
+def test_orbits_need_a_pin(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = ["simulate", "--posture", "arch", "--drive", str(drive), "--out", str(tmp_path / "out.csv")]
+    assert main([*given, "--orbits", str(tmp_path / "orbits.png")]) == 1
+    assert "no pin with clearance" in capsys.readouterr().err

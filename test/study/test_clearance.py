@@ -1,0 +1,87 @@
+"""The study of play in the pins: its scenes, its drive, its measures, its files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.scene import Scene, load_scene
+from boom_twin.scene.parts import IDEAL_BELOW
+from boom_twin.study import clearance
+from boom_twin.study.clearance_convergence import Track, convergence, errors, one_pin
+from boom_twin.study.clearance_scenes import ideal, pins_of, rods_and_joints, treated, with_play
+from boom_twin.study.clearance_static import shifts
+from boom_twin.study.clearance_stop import main_frequency, swings
+from boom_twin.study.halt import halt
+
+
+def test_a_scene_without_play_gets_the_package_s_pins(two_sections: Scene) -> None:
+    scene = with_play(two_sections)
+    assert [pin.at for pin in pins_of(scene).pins] == ["cylinder_1.rod", "cylinder_2.rod"]
+    assert with_play(scene) == scene and ideal(scene) == two_sections
+    assert pins_of(treated(scene, "spring-damper")).treatment == "spring-damper"
+    assert len(rods_and_joints(load_scene())) == 17
+
+
+@pytest.mark.parametrize("brake", [0.1, 0.01])
+def test_a_halt_is_smooth_and_ends_where_it_says(two_sections: Scene, brake: float) -> None:
+    drive = halt(two_sections, "arch", brake)
+    times = np.linspace(0.0, 1.5, 150_001)
+    strokes, rates = drive(times)
+    assert np.gradient(strokes, times, axis=0)[1:-1] == pytest.approx(rates[1:-1], abs=1e-6)
+    assert strokes[0] == pytest.approx(drive.first) and strokes[-1] == pytest.approx(drive.last)
+    assert not rates[0].any() and np.abs(rates[-1]).max() < 1e-15
+    assert np.abs(rates).max(axis=0) == pytest.approx(np.abs(drive.speed))
+
+
+def test_play_at_rest_follows_the_lever_down_to_the_switch(two_sections: Scene) -> None:
+    found = shifts(with_play(two_sections), ("low",), 4)
+    assert [own.pin for own in found] == ["cylinder_1.rod", "cylinder_2.rod"]
+    for own in found:
+        assert own.clearances[-1] == IDEAL_BELOW and np.all(np.diff(own.shifts) < 0.0)
+        assert own.ratios == pytest.approx(1.0, abs=0.01)
+        assert own.loaded == pytest.approx(own.lever, rel=0.05)
+        assert own.jump == own.shifts[-1] > 0.0
+
+
+def test_swings_of_a_stop(two_sections: Scene) -> None:
+    found = {own.model: own for own in swings(with_play(two_sections), ("arch",), 0.3)}
+    assert list(found) == ["ideal", "contact", "spring-damper"]
+    assert found["ideal"].rest == 0.0 and found["contact"].rest == found["spring-damper"].rest < 0.0
+    assert all(own.peak > own.rms > 0.0 and own.top > own.effective > 0.0 for own in found.values())
+
+
+def test_main_frequency() -> None:
+    times = 1e-3 * np.arange(4000)
+    values = np.sin(2.0 * np.pi * 1.37 * times) + 0.3 * np.sin(40.0 * times)
+    assert main_frequency(values, 1e-3) == pytest.approx(1.37, abs=0.011)
+
+
+def test_errors_are_shares_of_what_is_right() -> None:
+    right = Track(np.ones((5, 2)), np.full((5, 2), 2.0), np.full((5, 1), 4.0))
+    wrong = Track(np.ones((5, 2)) + 1e-3, np.full((5, 2), 2.2), np.full((5, 1), 5.0))
+    assert errors([wrong], right)[0] == pytest.approx([1.0, 10.0, 25.0])
+
+
+def test_the_independent_model_agrees(two_sections: Scene) -> None:
+    found = convergence(with_play(two_sections), "arch", quick=True)
+    assert [(line.program, line.against) for line in found.lines] == [
+        ("boom_twin", "own"), ("boom_twin", "own"), ("boom_twin", "independent"), ("SciPy", "independent"),
+    ]  # fmt: skip
+    against = found.lines[2]
+    assert against.errors[-1, 0] < 0.01 and against.errors[-1, 2] < 1.0
+    assert not one_pin(with_play(two_sections), 0).is_flexible(0)
+
+
+def test_the_files(two_sections: Scene, tmp_path: Path) -> None:
+    written = clearance.write(two_sections, tmp_path / "out", quick=True)
+    assert sorted(written) == sorted((tmp_path / "out").iterdir())
+    values = json.loads(written[0].read_text())
+    assert len(values["stops"]) == 6 and len(values["rests"]) == 4 and values["costs"][0]["pins"] == 0
+    text = written[1].read_text()
+    assert all(title in text for title in ("## After a stop", "## At rest", "## Convergence", "## What a pin costs"))
+    assert "nan" not in text and "surrogate" in text
+    assert all(path.read_bytes()[:4] == b"\x89PNG" for path in written[2:])
