@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms
-from oracle.clearance import geometry, rigid
-from oracle.clearance.booms import freed
-from oracle.clearance.contact import Contact, stiffness
+from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 
 from boom_twin.analysis.statics import statics
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import Contact, stiffness
 from boom_twin.physics.contact import SMOOTH
 
 CLEARANCE, STEP = 1e-4, 1e-9

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from analysis.resting import resting
 from oracle import booms
-from oracle.clearance import geometry, rigid
-from oracle.clearance.booms import freed
-from oracle.clearance.contact import Contact, stiffness
+from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, tip_shift
 from oracle.clearance.scenes import LINKS, RADII, RODS, with_pins
 
+from boom_twin.peers.play import geometry
+from boom_twin.peers.play.booms import freed
+from boom_twin.peers.play.contact import Contact, stiffness
 from boom_twin.physics.contact import LEAST_GAP, SMOOTH
 from boom_twin.scene.parts import IDEAL_BELOW
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle.clearance.drop import restitution
-from oracle.clearance.impacts import follow
 from physics.journal import Journal, bearing, memory, row
 
+from boom_twin.peers.play.impacts import follow
 from boom_twin.physics import contact
 
 WITHIN = 0.005  # of a coefficient of restitution
