@@ -10,10 +10,11 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo test lint test-extra ament client study soak session figures clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
+	@echo "make demo-live   the same in a browser: node, recorder and monitor, until Ctrl-C"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
@@ -26,7 +27,7 @@ setup: $(READY)
 $(READY): setup.py
 	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers]"
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor]"
 	@touch $@
 
 # Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
@@ -36,6 +37,9 @@ warm: $(READY)
 
 demo: warm
 	$(BIN)/python -m boom_twin.ros.demo --out out/demo
+
+demo-live: warm
+	$(BIN)/python -m boom_twin.ros.demo_live --out out/demo_live
 
 test: lint
 	$(BIN)/python -m pytest -m "not slow"

@@ -21,7 +21,7 @@ setup(
     license="Apache-2.0",
     author="boom_twin developers",
     packages=find_packages(include=["boom_twin", "boom_twin.*"]),
-    package_data={"boom_twin": ["py.typed", "msg_config/*.yaml"]},
+    package_data={"boom_twin": ["py.typed", "msg_config/*.yaml", "monitor/page/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["msg_config/resource/boom_twin"]),
         ("share/boom_twin", ["package.xml"]),
@@ -50,8 +50,11 @@ setup(
             "ruff>=0.6,<1",
             "mypy>=1.11,<3",
             "import-linter>=2.0,<3",
+            "aiohttp>=3.9,<4",
+            "playwright>=1.40,<2",
         ],
         "peers": ["exudyn>=1.13,<2"],
+        "monitor": ["aiohttp>=3.9,<4"],
     },
     # where `ros2 run` looks; pip puts scripts into bin/ all the same
     options={"install": {"install_scripts": "$base/lib/boom_twin"}, "develop": {"script_dir": "$base/lib/boom_twin"}},

@@ -22,6 +22,7 @@ from ..errors import BoomTwinError
 COMMANDS: dict[str, tuple[str, str]] = {
     "check": ("check", "validate a scene and tell what its model consists of"),
     "info": ("info", "what a recorded session holds and what it lacks"),
+    "monitor": ("monitor", "the live page, of the topics or of a recorded session"),
     "play": ("play", "publish a recorded session over ROS 2"),
     "record": ("record", "record the session topics from ROS 2"),
     "recover": ("recover", "save what is whole of a damaged session"),

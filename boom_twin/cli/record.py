@@ -114,7 +114,7 @@ def _wanted(args: Namespace) -> list[Wanted]:
 
     known = load_mapping(args.mapping)
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
-    outputs = {topic.absolute: topic for topic in known.outputs.values()}
+    outputs = {topic.absolute: topic for topic in [*known.outputs.values(), known.events]}
     if args.topics:
         return wanted_of(args.topics, inputs | outputs)
     chosen = {**({} if args.only == "outputs" else inputs), **({} if args.only == "inputs" else outputs)}

@@ -173,7 +173,7 @@ def _model_at(place: list[str]) -> type[BaseModel]:
 def _name_faults(topics: Topics) -> Iterator[Fault]:
     """Names that two topics have; only strokes and angles may, if their QoS is the same."""
     present: dict[str, Topic] = {f"inputs.{stream.value}": topic for stream, topic in topics.inputs.items()}
-    present |= {f"outputs.{key.value}": topic for key, topic in topics.outputs.items()}
+    present |= {f"outputs.{key.value}": topic for key, topic in topics.outputs.items()} | {"events": topics.events}
     users: dict[str, str] = {}
     for place, topic in present.items():
         first = users.setdefault(topic.absolute, place)

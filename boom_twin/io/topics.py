@@ -77,11 +77,18 @@ class Topic(_Entry):
         return self.name if self.name.startswith("/") else f"/{self.name}"
 
 
+class EventTopic(Topic):
+    """Where an operator's marks go."""
+
+    type: Literal["rcl_interfaces/msg/Log"]
+
+
 class Topics(_Entry):
     """All topics by role, and the sensors that are not as usual by channel; see `boom_twin.io.mapping` for how it is read."""
 
     inputs: dict[Stream, Topic]
     outputs: dict[Output, Topic]
+    events: EventTopic
     sensors: dict[str, Sensor] = {}
 
     @property

@@ -48,10 +48,10 @@ def main() -> int:
     args = _arguments()
     try:
         require_rclpy()
-        _isolate()
+        isolate()
         session = scan(args.bag)
         recorded = args.out / "recorded"
-        _make_room(args.out, recorded)
+        make_room(args.out, recorded)
         sent = _run(session, args, recorded)
         if (args.bag / TRUTH).is_file():
             shutil.copy(args.bag / TRUTH, recorded)
@@ -61,6 +61,7 @@ def main() -> int:
         print("\n".join(card.as_text(about, sent[Stream.STROKES.value], _equal(card, again))))
         for path in [recorded, *draw(again, scene, args.out)]:
             print(path)
+        print(f"see it in a browser: {sys.executable} -m boom_twin.cli.main monitor --bag {recorded}")
         return 0
     except BoomTwinError as error:
         print(f"demo: {error}", file=sys.stderr)
@@ -77,13 +78,13 @@ def _arguments() -> Namespace:
     return parser.parse_args()
 
 
-def _isolate() -> None:
+def isolate() -> None:
     """Keep this process and its children out of any other ROS 2 traffic."""
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 
-def _make_room(out: Path, recorded: Path) -> None:
+def make_room(out: Path, recorded: Path) -> None:
     """The folder of the results, without the recording of an earlier run."""
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -97,8 +98,8 @@ def _run(session: Session, args: Namespace, recorded: Path) -> dict[str, int]:
     """Play with node and recorder running; gives the messages sent by topic."""
     recorder = [*RECORDER, "--out", str(recorded), "--origin", f"live run of: {_origin(session)}"]
     with (
-        _child(NODE, args.out / "node.log", signal.SIGTERM) as node,
-        _child(recorder, args.out / "recorder.log", signal.SIGINT) as record,
+        child(NODE, args.out / "node.log", signal.SIGTERM) as node,
+        child(recorder, args.out / "recorder.log", signal.SIGINT) as record,
     ):
         return _play(session, args.duration, node, record)
 
@@ -107,7 +108,7 @@ def _origin(session: Session) -> str:
     return session.notes.get("origin", "origin not noted")
 
 
-def _play(session: Session, duration: float, node: _Child, recorder: _Child) -> dict[str, int]:
+def _play(session: Session, duration: float, node: Child, recorder: Child) -> dict[str, int]:
     """Wait until all three have found each other, then play."""
     from .context import ros
     from .player import Player
@@ -134,7 +135,7 @@ def _play(session: Session, duration: float, node: _Child, recorder: _Child) -> 
     return player.played.sent
 
 
-class _Child:
+class Child:
     """A running process whose words go into a log."""
 
     def __init__(self, arguments: list[str], log: Path) -> None:
@@ -153,9 +154,9 @@ class _Child:
 
 
 @contextmanager
-def _child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator[_Child]:
+def child(arguments: list[str], log: Path, parting: signal.Signals) -> Iterator[Child]:
     """A Python process, ended by the signal `parting`."""
-    child = _Child(arguments, log)
+    child = Child(arguments, log)
     try:
         yield child
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from math import nan
 
 import numpy as np
@@ -12,12 +13,14 @@ from .channel import NANO, Channel, Figures
 
 
 class StreamWatch:
-    """Counts messages as they come, and works out figures when asked; times in s of `time.monotonic`, stamps in ns.
+    """Counts messages as they come, and works out figures when asked; times in s, stamps in ns.
 
     Parameters
     ----------
     low, high : ndarray, shape (n,)
         Range of each channel, in the sensor's unit.
+    monotonic : callable
+        The time, s, of a clock that only goes forward.
 
     Attributes
     ----------
@@ -30,10 +33,11 @@ class StreamWatch:
         messages. Differences of two streams' lags tell how their clocks are apart.
     """
 
-    def __init__(self, low: Array, high: Array) -> None:
+    def __init__(self, low: Array, high: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._monotonic = monotonic
         self._channels = [Channel(*bounds) for bounds in zip(low.tolist(), high.tolist(), strict=True)]
         self.count = 0
-        self.begin(time.monotonic())
+        self.begin(monotonic())
 
     def begin(self, now: float) -> None:
         """Listening begins; everything but the count is forgotten."""
@@ -47,7 +51,7 @@ class StreamWatch:
         """A message came."""
         self.count += 1
         self.newest = stamp
-        self._heard = now = time.monotonic()
+        self._heard = now = self._monotonic()
         lag = now - stamp * NANO
         if not lag >= self._least:
             self._least = lag

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -30,22 +30,29 @@ class TwinWatch:
         Names of the input topics.
     thresholds : Thresholds
         May be replaced while it runs.
+    monotonic : callable
+        The time, s, of a clock that only goes forward.
     """
 
-    def __init__(self, sensors: Mapping[Stream, Sequence[Sensor]], names: Mapping[Stream, str], thresholds: Thresholds) -> None:
+    def __init__(
+        self,
+        sensors: Mapping[Stream, Sequence[Sensor]],
+        names: Mapping[Stream, str],
+        thresholds: Thresholds,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._monotonic = monotonic
         self.thresholds = thresholds
         self._sensors = {stream: [SensorJudge(sensor) for sensor in each] for stream, each in sensors.items()}
         self._topics = {stream: TopicJudge(names[stream], each[0].required) for stream, each in sensors.items()}
-        self._streams = {
-            stream: StreamWatch(np.array([sensor.low for sensor in each]), np.array([sensor.high for sensor in each]))
-            for stream, each in sensors.items()
-        }
+        ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]).T for stream, each in sensors.items()}
+        self._streams = {stream: StreamWatch(low, high, monotonic) for stream, (low, high) in ranges.items()}
         self._model, self._outputs = ModelWatch(), OutputsJudge()
         self.begin()
 
     def begin(self) -> None:
         """Listening begins."""
-        now = time.monotonic()
+        now = self._monotonic()
         for stream in self._streams.values():
             stream.begin(now)
         self._model.begin(now)
@@ -79,7 +86,7 @@ class TwinWatch:
 
     def is_urgent(self) -> bool:
         """Whether the model failed, or a stream fell silent or is heard again: worth a look out of turn."""
-        now = time.monotonic()
+        now = self._monotonic()
         before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
         return self._model.has_failed or before != self._silent
 
@@ -106,7 +113,7 @@ class TwinWatch:
         clock : float
             Time that people know, s.
         """
-        now = time.monotonic()
+        now = self._monotonic()
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], now)
         found = [self._model.status(counts, is_active, is_fed, self.thresholds, now, clock)]
         if not is_active:

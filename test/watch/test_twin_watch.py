@@ -25,12 +25,10 @@ JOINTS = ("joint_1", "joint_2", "joint_3", "joint_4")
 class Rig:
     """A watch whose time is set here, fed by made-up sensors."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self) -> None:
         self.now, self.random = 100.0, np.random.default_rng(5)
-        for name in ("twin", "stream"):
-            monkeypatch.setattr(f"boom_twin.watch.{name}.time.monotonic", lambda: self.now)
         sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
-        self.watch = TwinWatch(sensors, NAMES, Thresholds())
+        self.watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: self.now)
         self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
         self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
         self.behind = dict.fromkeys(Stream, 0.0)
@@ -61,8 +59,8 @@ class Rig:
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Rig:
-    return Rig(monkeypatch)
+def rig() -> Rig:
+    return Rig()
 
 
 def after(rig: Rig, seconds: int, **changes: Any) -> dict[str, Status]:

@@ -1,0 +1,126 @@
+"""`boom_twin monitor`: the live page, of the twin's topics or of a recorded session."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import BoomTwinError, UsageError
+from .common import add_scene, open_scene
+
+if TYPE_CHECKING:
+    from ..monitor.feed import Feed
+
+PORT = 8420
+ACTS = ("mark", "acknowledge", "record")
+NICE = 5
+"""By how much it gives way to the node on the same machine."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What is shown, to whom, and what may be done."""
+    parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
+    add_scene(parser, option=True)
+    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
+    parser.add_argument("--port", type=int, default=PORT, help=f"({PORT}; 0: any that is free)")
+    parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
+    parser.add_argument(
+        "--allow",
+        nargs="*",
+        choices=ACTS,
+        default=["mark", "acknowledge"],
+        metavar="ACT",
+        help="what viewers may do: mark events, acknowledge alarms, start and stop a record(ing) (mark acknowledge)",
+    )
+    parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
+
+
+def run(args: Namespace) -> int:
+    """Serve until Ctrl-C or SIGTERM."""
+    if find_spec("aiohttp") is None:
+        raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
+    from ..monitor.desk import Desk
+    from ..monitor.recording import Recording
+
+    os.nice(NICE)
+    recording = Recording(args.record_into) if "record" in args.allow and args.bag is None else None
+    try:
+        with _feed(args) as feed:
+            _serve(args, feed, Desk(feed, frozenset(args.allow), recording))
+    finally:
+        if recording is not None:
+            recording.close()
+    return 0
+
+
+@contextmanager
+def _feed(args: Namespace) -> Iterator[Feed]:
+    """Of a session, or live."""
+    if args.bag is not None:
+        from ..monitor.bag import bag_feed
+        from ..settings import load_settings
+
+        print("reading the session (compiles for up to a minute the first time) ..", file=sys.stderr)
+        yield bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), _progress, args.mapping)
+        return
+    from ..ros.require import require_rclpy
+
+    require_rclpy()
+    from ..io.mapping import load_mapping
+    from ..ros.context import ros
+    from ..ros.monitor import TopicFeed
+
+    with ros([]):
+        feed = TopicFeed(load_mapping(args.mapping), open_scene(args.scene) if args.scene else None)
+        try:
+            yield feed
+        finally:
+            feed.close()
+
+
+def _serve(args: Namespace, feed: Feed, desk: Any) -> None:
+    import asyncio
+
+    from ..monitor.door import Door
+    from ..monitor.server import Server
+
+    door = Door(args.host)
+    try:
+        asyncio.run(_run(args, Server(feed, desk, door), door.token))
+    except OSError as error:
+        raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
+
+
+async def _run(args: Namespace, server: Any, token: str) -> None:
+    import asyncio
+    import signal
+
+    from aiohttp import web
+
+    stopped = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
+    await runner.setup()
+    try:
+        site = web.TCPSite(runner, args.host, args.port)
+        await site.start()
+        port = runner.addresses[0][1]
+        address = f"http://{args.host}:{port}/" + (f"?token={token}" if token else "")
+        print(f"open {address}   (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        await stopped.wait()
+    finally:
+        await runner.cleanup()
+
+
+def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
+    from tqdm import tqdm
+
+    return iter(tqdm(messages, total=total, unit="msg", desc="reading", disable=None, mininterval=0.2))

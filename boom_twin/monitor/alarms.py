@@ -1,0 +1,88 @@
+"""What was not well, from when to when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .lamps import Board, Level
+
+MOST = 500
+"""Alarms that are kept."""
+
+
+@dataclass(slots=True)
+class Alarm:
+    """A lamp that was not well.
+
+    Attributes
+    ----------
+    number : int
+        By which it is acknowledged.
+    name, reason : str
+        The reason is that of the worst level.
+    level : Level
+        The worst.
+    begin : float
+        Session time, s.
+    end : float or None
+        None while it lasts.
+    is_acknowledged : bool
+    """
+
+    number: int
+    name: str
+    level: Level
+    reason: str
+    begin: float
+    end: float | None = None
+    is_acknowledged: bool = False
+
+
+class Alarms:
+    """Follows the lamps from well to not well and back.
+
+    Attributes
+    ----------
+    all : list of Alarm
+        The newest `MOST` of them, by their begin.
+    """
+
+    def __init__(self) -> None:
+        self.all: list[Alarm] = []
+        self._open: dict[str, Alarm] = {}
+        self._number = 0
+
+    def follow(self, time: float, board: Board) -> None:
+        """The lamps at `time` (s)."""
+        lamps = {f"{node}: {lamp.name}": lamp for node, (_, lamps) in board.nodes.items() for lamp in lamps}
+        for key in [key for key in self._open if key not in lamps or lamps[key].level <= Level.OK]:
+            self._open.pop(key).end = time
+        for key, lamp in lamps.items():
+            if lamp.level > Level.OK:
+                self._raise(key, lamp.name, lamp.level, lamp.reason, time)
+
+    def add(self, name: str, level: Level, reason: str, begin: float, end: float) -> None:
+        """An alarm that is over, such as a gap."""
+        self._keep(Alarm(self._next(), name, level, reason, begin, end))
+
+    def acknowledge(self, number: int) -> Alarm | None:
+        """Note that somebody has seen it; None if there is none of that number."""
+        alarm = next((each for each in self.all if each.number == number), None)
+        if alarm is not None:
+            alarm.is_acknowledged = True
+        return alarm
+
+    def _raise(self, key: str, name: str, level: Level, reason: str, time: float) -> None:
+        alarm = self._open.get(key)
+        if alarm is None:
+            self._open[key] = self._keep(Alarm(self._next(), name, level, reason, time))
+        elif level > alarm.level:
+            alarm.level, alarm.reason, alarm.is_acknowledged = level, reason, False
+
+    def _next(self) -> int:
+        self._number += 1
+        return self._number
+
+    def _keep(self, alarm: Alarm) -> Alarm:
+        self.all = [*self.all[-MOST + 1 :], alarm]
+        return alarm

@@ -1,0 +1,70 @@
+"""What a viewer may do beyond looking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .feed import Feed
+from .recording import Recording
+
+LONGEST = 500
+"""Characters of a note."""
+ACTS = ("mark", "acknowledge", "record")
+
+
+class Desk:
+    """Carries out what was permitted at start, and nothing else.
+
+    Parameters
+    ----------
+    feed : Feed
+    permitted : set of str
+        Of `ACTS`.
+    recording : Recording, optional
+        What ``record`` starts and stops.
+    """
+
+    def __init__(self, feed: Feed, permitted: frozenset[str], recording: Recording | None = None) -> None:
+        self._feed, self._recording = feed, recording
+        self.permitted = permitted if recording is not None else permitted - {"record"}
+        if feed.end is not None:
+            self.permitted -= {"mark", "record"}
+        self._acts: dict[str, Callable[[dict[str, Any]], str]] = {
+            "mark": self._mark,
+            "acknowledge": self._acknowledge,
+            "record": self._record,
+        }
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording that was started here runs."""
+        return self._recording is not None and self._recording.is_running
+
+    def act(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Do it; gives the answer to the page. Raises ValueError if the request is none of `ACTS`."""
+        name = request.get("do")
+        if name not in self._acts:
+            raise ValueError("unknown request")
+        if name not in self.permitted:
+            return {"kind": "answer", "do": name, "done": False, "words": "not permitted when the monitor was started"}
+        return {"kind": "answer", "do": name, "done": True, "words": self._acts[name](request)}
+
+    def _mark(self, request: dict[str, Any]) -> str:
+        note = request.get("note")
+        if not isinstance(note, str) or len(note) > LONGEST:
+            raise ValueError(f"a note is a text of at most {LONGEST} characters")
+        self._feed.publish(f"mark: {note}")
+        return f"marked: {note}"
+
+    def _acknowledge(self, request: dict[str, Any]) -> str:
+        alarm = self._feed.store.alarms.acknowledge(int(request["number"]))
+        if alarm is None:
+            return "that alarm is not kept any more"
+        if self._feed.end is None:
+            self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
+        return f"acknowledged: {alarm.name}"
+
+    def _record(self, request: dict[str, Any]) -> str:
+        assert self._recording is not None
+        return self._recording.start() if request.get("on") is True else self._recording.stop()

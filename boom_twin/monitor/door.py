@@ -1,0 +1,70 @@
+"""Who may come in."""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+from ipaddress import ip_address
+
+from aiohttp import web
+
+COOKIE = "boom_twin_monitor"
+SOURCES = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; frame-ancestors 'none'"
+POLICY = {
+    "Content-Security-Policy": SOURCES,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+LOCAL = ("localhost", "127.0.0.1", "[::1]")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only programs of this machine reach `host`."""
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Door:
+    """Checks every request.
+
+    On loopback the ``Host`` must be a name of this machine, so that no page of another name that resolves to it gets in.
+    Elsewhere a token is needed: once in the address (``/?token=..``), from then on in a cookie. A WebSocket must come from a
+    page of this server (``Origin``).
+
+    Parameters
+    ----------
+    host : str
+        That the server listens on.
+
+    Attributes
+    ----------
+    token : str
+        Empty on loopback.
+    """
+
+    def __init__(self, host: str) -> None:
+        self.token = "" if is_loopback(host) else secrets.token_urlsafe(24)
+
+    def check(self, request: web.Request) -> None:
+        """Raise HTTPForbidden, or HTTPFound where a token is to be put into a cookie."""
+        if self.token:
+            self._check_token(request)
+        elif request.host.rpartition(":")[0] not in LOCAL and request.host not in LOCAL:
+            raise web.HTTPForbidden(text="this monitor answers to localhost only")
+        if request.path == "/socket" and request.headers.get("Origin") != f"{request.scheme}://{request.host}":
+            raise web.HTTPForbidden(text="only a page of this monitor may connect")
+
+    def _check_token(self, request: web.Request) -> None:
+        if self._fits(request.cookies.get(COOKIE, "")):
+            return
+        if not self._fits(request.query.get("token", "")):
+            raise web.HTTPForbidden(text="open the address that the monitor printed; it holds the token")
+        found = web.HTTPFound(request.path)
+        found.set_cookie(COOKIE, self.token, httponly=True, samesite="Strict")
+        raise found
+
+    def _fits(self, token: str) -> bool:
+        return hmac.compare_digest(token.encode(), self.token.encode())

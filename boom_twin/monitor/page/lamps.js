@@ -1,0 +1,87 @@
+// The first glance: how everything is, and each group; then every lamp and alarm in tables.
+
+import { escape, show } from "./sheet.js";
+
+const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
+const OVERALL = { OK: "ALL WELL", WARN: "WARNING", ERROR: "FAULT", STALE: "STALE" };
+const SILENCE = 2000; // ms without a word from the monitor after which nothing here is known
+
+export class Lamps {
+  constructor(link) {
+    this.link = link;
+    this.overall = document.getElementById("overall");
+    this.groups = document.getElementById("groups");
+    this.notice = document.getElementById("notice");
+    link.addEventListener("state", event => { this.state = event.detail; this.show(event.detail); });
+    link.addEventListener("alarms", event => this.showAlarms(event.detail.alarms));
+  }
+
+  // What the page itself knows: called often.
+  watch(isReplay) {
+    const now = performance.now(), silence = now - this.link.heard;
+    let words = "";
+    if (silence > SILENCE) words = Number.isFinite(silence) ? `NO CONNECTION to the monitor for ${Math.round(silence / 1000)} s: nothing here is current` : "NO CONNECTION to the monitor";
+    else if (!isReplay && now - this.link.grown > SILENCE) words = Number.isFinite(this.link.grown) ? `NO DATA for ${Math.round((now - this.link.grown) / 1000)} s: the traces are old` : "NO DATA yet: is the node active, and do strokes come?";
+    if (this.notice.textContent !== words) this.notice.textContent = words;
+    this.notice.hidden = !words;
+    document.querySelector("main").classList.toggle("old", Boolean(words));
+    if (silence > SILENCE && this.isShown !== "lost") { this.isShown = "lost"; this.showLost(); }
+  }
+
+  showLost() {
+    put(this.overall, "STALE", "STALE", "no connection to the monitor");
+    for (const lamp of this.groups.children) put(lamp, "STALE", "STALE", "not known");
+  }
+
+  show(state) {
+    this.isShown = "state";
+    put(this.overall, state.level, OVERALL[state.level], state.reason);
+    for (const group of state.groups) {
+      let lamp = document.getElementById(`group-${group.name}`);
+      if (!lamp) {
+        lamp = document.createElement("div");
+        lamp.id = `group-${group.name}`;
+        lamp.className = "lamp";
+        lamp.innerHTML = '<span class="name"></span><span class="sign"></span><b class="word"></b><span class="reason"></span><span class="detail"></span>';
+        lamp.querySelector(".name").textContent = group.name;
+        this.groups.append(lamp);
+      }
+      put(lamp, group.level, group.level, group.reason, detail(worst(group)));
+    }
+    this.fillTable(state);
+  }
+
+  fillTable(state) {
+    const table = document.getElementById("lamps");
+    if (!table.offsetParent) return;
+    table.innerHTML = "<tr><th>group<th class=text>of<th class=text>state<th class=text>reason<th class=text>judged<th>value<th>limit<th>for, s</tr>" +
+      state.groups.flatMap(group => group.lamps.map(lamp => `<tr><td>${group.name}<td class=text>${escape(lamp.name)}<td class=text data-level=${lamp.level}>${SIGNS[lamp.level]} ${lamp.level}` +
+        `<td class=text>${escape(lamp.reason)}<td class=text>${escape(lamp.quantity)}<td>${show(lamp.value ?? NaN)}<td>${show(lamp.limit ?? NaN)}<td>${show(lamp.age === null ? NaN : Math.round(lamp.age))}</tr>`)).join("");
+  }
+
+  showAlarms(alarms) {
+    const table = document.getElementById("alarms");
+    table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th>from, s<th>to, s<th></tr>" : "") +
+      alarms.slice(-50).reverse().map(alarm => `<tr><td>${escape(alarm.name)}<td class=text data-level=${alarm.level}>${SIGNS[alarm.level]} ${alarm.level}<td class=text>${escape(alarm.reason)}` +
+        `<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
+  }
+}
+
+export const RANKS = ["OFF", "OK", "WARN", "STALE", "ERROR"];
+const worst = group => group.lamps.reduce((found, lamp) => !found || RANKS.indexOf(lamp.level) > RANKS.indexOf(found.level) ? lamp : found, null);
+
+function detail(lamp) {
+  if (!lamp) return "";
+  const judged = lamp.quantity && lamp.value !== null ? `${lamp.quantity.replaceAll("_", " ")} ${show(lamp.value)}, limit ${show(lamp.limit ?? NaN)}` : "";
+  return [judged, lamp.age === null ? "" : `for ${span(lamp.age)}`].filter(Boolean).join(", ");
+}
+
+const span = seconds => seconds < 120 ? `${Math.round(seconds)} s` : seconds < 7200 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 3600)} h`;
+
+function put(lamp, level, word, reason, detail = "") {
+  lamp.dataset.level = level;
+  for (const [name, text] of Object.entries({ sign: SIGNS[level], word, reason, detail })) {
+    const place = lamp.querySelector(`.${name}`);
+    if (place && place.textContent !== text) place.textContent = text;
+  }
+}

@@ -1,0 +1,100 @@
+// Puts the page together: link, lamps, tabs, keys, and the loop that draws.
+
+import { theme } from "./colours.js";
+import { Lamps } from "./lamps.js";
+import { Link } from "./link.js";
+import { Shape } from "./shape.js";
+import { Sheet } from "./sheet.js";
+import { SpectrumTab } from "./spectrum.js";
+import { Timeline } from "./timeline.js";
+import { Traces } from "./traces.js";
+import { View } from "./view.js";
+import { Work } from "./work.js";
+
+const REST = 2; // least time between two drawings, as a multiple of what one takes
+const get = id => document.getElementById(id);
+
+const link = new Link(), view = new View(link), timeline = new Timeline(link), lamps = new Lamps(link);
+new Work(link, view);
+const spectrum = new SpectrumTab(link, new Sheet("peaks"));
+const tabs = { traces: new Traces(link, view, new Sheet("figures")), spectrum, spectrogram: spectrum, shape: new Shape(link, view), state: null };
+let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now();
+const delays = []; // s from the newest stamp to its drawing, live, if the clocks agree
+
+// -- what is chosen ---------------------------------------------------------------------------------------------------
+
+function choose(tab) {
+  open = tab;
+  for (const section of document.querySelectorAll(".tab")) section.classList.toggle("open", section.id === tab);
+  for (const button of document.querySelectorAll("#tabs button")) button.setAttribute("aria-selected", button.dataset.tab === tab);
+  spectrum.isNew = true;
+  view.version++;
+  if (tab === "state" && lamps.state) lamps.fillTable(lamps.state);
+}
+
+function dress(name) {
+  document.documentElement.dataset.theme = name;
+  localStorage.setItem("theme", name);
+  get("theme").textContent = name === "dark" ? "Light" : "Dark";
+  tabs.traces.rebuild();
+  spectrum.rebuild();
+  view.version++;
+}
+
+function pause() {
+  if (timeline.isReplay) timeline.hold(!timeline.isHeld);
+  else { view.hold(!view.isHeld); get("pause").textContent = view.isHeld ? "Go on" : "Pause"; }
+}
+
+for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => choose(button.dataset.tab);
+get("window").onchange = event => view.set({ window: Number(event.target.value), zoom: null });
+get("pause").onclick = pause;
+get("all").onclick = () => view.set({ zoom: null });
+get("theme").onclick = () => dress(theme() === "dark" ? "light" : "dark");
+
+const KEYS = { " ": pause, z: () => get("all").click(), m: () => get("mark").click(), p: () => get("picture").click(), c: () => get("csv").click(), t: () => get("theme").click(),
+  ",": () => timeline.jump(-1), ".": () => timeline.jump(1), ArrowLeft: () => timeline.isReplay && timeline.seek(timeline.position - 5), ArrowRight: () => timeline.isReplay && timeline.seek(timeline.position + 5) };
+addEventListener("keydown", event => {
+  if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|DIALOG/.test(event.target.tagName) || get("note").open) return;
+  const tab = document.querySelectorAll("#tabs button")[Number(event.key) - 1];
+  if (event.key === " " && event.target.tagName === "BUTTON" && event.target.id !== "pause") return;
+  if (tab) tab.click();
+  else if (KEYS[event.key]) { event.preventDefault(); KEYS[event.key](); }
+});
+
+link.addEventListener("hello", event => {
+  get("title").textContent = event.detail.title;
+  get("pause").hidden = timeline.isReplay;
+  view.set({ end: null, zoom: null });
+});
+link.addEventListener("reset", () => { tabs.traces.rebuild(); if (view.zoom || view.isHeld) view.set({ zoom: null, end: null }); });
+
+// -- what is drawn ----------------------------------------------------------------------------------------------------
+
+function draw(now) {
+  requestAnimationFrame(draw);
+  frames++;
+  if (now - second > 1000) tellRate(now);
+  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : link.grown} ${spectrum.isNew}`;
+  if (now < due || state === drawn || document.hidden) return;
+  const began = performance.now();
+  tabs[open]?.draw(open);
+  drawn = state;
+  due = now + REST * (performance.now() - began);
+  if (!timeline.isReplay && link.epoch) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - view.newest);
+}
+
+function tellRate(now) {
+  get("fps").textContent = `${Math.round(1000 * frames / (now - second))} frames/s`;
+  frames = 0;
+  second = now;
+  lamps.watch(timeline.isReplay);
+  const sorted = delays.splice(0).sort((a, b) => a - b), delay = sorted[sorted.length >> 1];
+  get("link").textContent = !link.isOpen ? "not connected" : timeline.isReplay ? "recorded session" : delay > -0.5 && delay < 60 ? `live, ${Math.round(1000 * delay)} ms behind the sensors` : "live";
+}
+
+setInterval(() => lamps.watch(timeline.isReplay), 500);
+dress(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+choose("traces");
+requestAnimationFrame(draw);
+Object.assign(window, { twin: { link, view, timeline, delays } }); // for tests and for the curious

@@ -1,0 +1,61 @@
+// Where one is in a recorded session: scrubber, speed, marks.
+
+import { RANKS } from "./lamps.js";
+
+export class Timeline {
+  constructor(link) {
+    this.link = link;
+    this.times = [];
+    this.scrubber = document.getElementById("scrubber");
+    this.play = document.getElementById("play");
+    this.scrubber.oninput = () => this.seek(Number(this.scrubber.value));
+    this.play.onclick = () => this.hold(!this.isHeld);
+    document.getElementById("speed").onchange = event => link.ask({ do: "speed", value: Number(event.target.value) });
+    document.getElementById("before").onclick = () => this.jump(-1);
+    document.getElementById("after").onclick = () => this.jump(1);
+    link.addEventListener("hello", event => this.greet(event.detail));
+    link.addEventListener("state", event => this.follow(event.detail));
+    link.addEventListener("alarms", event => this.mark(event.detail.alarms));
+  }
+
+  get isReplay() { return this.end !== null && this.end !== undefined; }
+
+  greet({ end }) {
+    this.end = end;
+    document.getElementById("timeline").hidden = end === null;
+    if (this.isReplay) this.scrubber.max = end;
+    if (this.isReplay) this.link.ask({ do: "speed", value: Number(document.getElementById("speed").value) });
+  }
+
+  follow({ position, is_held: isHeld }) {
+    if (!this.isReplay) return;
+    this.isHeld = isHeld;
+    this.position = position;
+    this.play.textContent = isHeld ? "Play" : "Pause";
+    if (document.activeElement !== this.scrubber || !this.scrubber.matches(":active")) this.scrubber.value = position;
+    document.getElementById("position").textContent = `${position.toFixed(2)} of ${this.end.toFixed(2)} s`;
+  }
+
+  mark(alarms) {
+    if (!this.isReplay) return;
+    this.times = [...new Set(alarms.map(alarm => alarm.begin))].sort((a, b) => a - b);
+    document.getElementById("marks").replaceChildren(...alarms.toSorted((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level)).map(alarm => {
+      const mark = document.createElement("i"), end = alarm.end ?? this.end;
+      mark.dataset.level = alarm.level;
+      mark.title = `${alarm.name}: ${alarm.reason}, ${alarm.begin.toFixed(2)} s`;
+      mark.style.left = `${100 * alarm.begin / this.end}%`;
+      mark.style.width = `${100 * (end - alarm.begin) / this.end}%`;
+      return mark;
+    }));
+  }
+
+  hold(isHeld) { this.link.ask({ do: "hold", value: isHeld ? 1 : 0 }); }
+  seek(value) { this.link.ask({ do: "seek", value }); }
+
+  // To the mark before (-1) or after (1) the present position.
+  jump(direction) {
+    const near = this.position + (direction > 0 ? 0.01 : -0.6);
+    const target = direction > 0 ? this.times.find(time => time > near) : this.times.findLast(time => time < near);
+    if (target !== undefined) this.seek(target + 0.001);
+  }
+}

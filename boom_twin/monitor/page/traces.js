@@ -1,0 +1,118 @@
+// What the tip does and how far it is from what was measured, against time.
+
+import { Chart } from "./chart.js";
+import { figures, thin } from "./thin.js";
+
+const BAND = 2; // deviations that are shaded
+const TELL = 500; // ms between two looks at the figures
+const NAMES = { x: "forward", z: "up" };
+
+// Every chart: table, columns (a function of the table), their labels, a factor of the unit.
+const CHARTS = [
+  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
+  { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
+  { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
+  { name: "residuals", table: "joints", title: "residual, σ", factor: 1, columns: table => range(table.columns.length / 2, table.columns.length),
+    labels: table => table.columns.slice(table.columns.length / 2).map(name => name.replace("_normalised", "")) },
+];
+
+export class Traces {
+  constructor(link, view, sheet) {
+    this.link = link;
+    this.view = view;
+    this.sheet = sheet;
+    this.charts = new Map();
+    setInterval(() => this.tell(), TELL);
+    for (const { name } of CHARTS) {
+      const element = document.createElement("div");
+      element.className = "chart";
+      element.id = `chart-${name}`;
+      document.getElementById("charts").append(element);
+    }
+  }
+
+  rebuild() {
+    for (const chart of this.charts.values()) chart.close();
+    this.charts.clear();
+  }
+
+  draw() {
+    const [from, to] = this.view.span;
+    if (!Number.isFinite(to)) return;
+    for (const kind of CHARTS) {
+      const table = this.link.table(kind.table);
+      if (!table?.count) continue;
+      if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
+      const chart = this.charts.get(kind.name);
+      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth));
+      chart.draw([times, ...(kind.isBanded ? banded(values) : kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor)))], from, to);
+    }
+  }
+
+  build(kind, table) {
+    const labels = typeof kind.labels === "function" ? kind.labels(table) : kind.labels;
+    const plain = () => labels.map((label, i) => ({ label, colour: i }));
+    const options = kind.isBanded ? BANDED : { series: plain() };
+    return new Chart(document.getElementById(`chart-${kind.name}`), {
+      title: kind.title,
+      axes: [kind === CHARTS.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
+      ...options,
+      scales: kind.name === "residuals" ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
+      cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },
+      hooks: {
+        setSelect: [plot => {
+          const { left, width } = plot.select;
+          if (width > 5) this.view.set({ zoom: [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] });
+          plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+        }],
+        draw: kind.name === "residuals" ? [shadeExpected] : [],
+      },
+    });
+  }
+
+  // The table of figures of what is shown.
+  tell() {
+    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown}`;
+    if (told === this.told || !Number.isFinite(to) || !this.sheet.element.offsetParent) return;
+    this.told = told;
+    const rows = [];
+    for (const [name, unit, factor, label] of [["displacement", "mm", 1000, "displ."], ["acceleration", "m/s²", 1, "accel."], ["force", "m/s²", 1, "IMU"], ["joints", "mrad", 1000, ""]]) {
+      const table = this.link.table(name);
+      if (!table?.count) continue;
+      const count = name === "force" ? 4 : name === "joints" ? table.columns.length / 2 : 2;
+      for (let column = 0; column < count; column++) {
+        const found = figures(table, column, from, to);
+        const words = name === "joints" ? `resid. ${table.columns[column].replace("_rad", "")}` : name === "force" ? `IMU ${table.columns[column].replace("_m_s2", "").replace("_", " ")}` : `${label} ${NAMES[table.columns[column][0]]}`;
+        rows.push([`${words}, ${unit}`, ...["mean", "rms", "peak", "range"].map(key => found[key] * factor), found.crest]);
+      }
+    }
+    this.sheet.fill(["", "mean", "rms", "peak", "p-p", "crest"], rows, `of the ${(to - from).toFixed(1)} s shown; rms and peak about the mean`);
+  }
+}
+
+const range = (from, to) => Array.from({ length: to - from }, (_, i) => from + i);
+
+const BANDED = {
+  series: [
+    { label: "measured z", colour: "soft", width: 1 }, { label: "predicted z", colour: 0, width: 1 },
+    { label: "+2σ", colour: 0, width: 0, class: "quiet" }, { label: "−2σ", colour: 0, width: 0, class: "quiet" },
+    { label: "measured x", colour: "soft", width: 1, show: false }, { label: "predicted x", colour: 1, width: 1, show: false },
+  ],
+  bands: [[3, 4, 0]],
+};
+
+// From measured, predicted, deviation of z, then of x, to what is drawn.
+function banded([measuredZ, predictedZ, sigmaZ, measuredX, predictedX]) {
+  const beside = sign => predictedZ.map((value, i) => value === null || sigmaZ[i] === null ? null : value + sign * BAND * sigmaZ[i]);
+  return [measuredZ, predictedZ, beside(1), beside(-1), measuredX, predictedX];
+}
+
+// Residuals over their deviation are mostly within 2.
+function shadeExpected(plot) {
+  const { ctx, bbox } = plot, top = plot.valToPos(BAND, "y", true), bottom = plot.valToPos(-BAND, "y", true);
+  ctx.save();
+  ctx.globalAlpha = 0.12;
+  ctx.fillStyle = "#808890";
+  ctx.fillRect(bbox.left, top, bbox.width, bottom - top);
+  ctx.restore();
+}

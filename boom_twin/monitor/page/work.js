@@ -1,0 +1,74 @@
+// What one does with the page: mark, acknowledge, record, export.
+
+import { paint } from "./colours.js";
+
+const TABLES = ["displacement", "position", "acceleration", "force", "joints"];
+
+export class Work {
+  constructor(link, view) {
+    this.link = link;
+    this.view = view;
+    this.answer = document.getElementById("answer");
+    this.record = document.getElementById("record");
+    const mark = document.getElementById("mark"), dialog = document.getElementById("note"), text = document.getElementById("note-text");
+    mark.onclick = () => { text.value = ""; dialog.showModal(); };
+    dialog.onclose = () => { if (dialog.returnValue === "ok") link.ask({ do: "mark", note: text.value }); dialog.returnValue = ""; };
+    this.record.onclick = () => link.ask({ do: "record", on: !this.isRecording });
+    document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) link.ask({ do: "acknowledge", number: Number(event.target.dataset.number) }); };
+    document.getElementById("picture").onclick = () => this.savePicture();
+    document.getElementById("csv").onclick = () => this.saveTable();
+    link.addEventListener("hello", event => this.permit(event.detail.permitted));
+    link.addEventListener("answer", event => { this.answer.textContent = event.detail.words; });
+    link.addEventListener("state", event => {
+      this.isRecording = event.detail.is_recording;
+      this.record.textContent = this.isRecording ? "■ Stop recording" : "● Record";
+    });
+  }
+
+  permit(permitted) {
+    document.getElementById("mark").disabled = !permitted.includes("mark");
+    this.record.hidden = !permitted.includes("record");
+    document.getElementById("alarms").classList.toggle("locked", !permitted.includes("acknowledge"));
+  }
+
+  // All canvases of the open tab below each other.
+  savePicture() {
+    const canvases = [...document.querySelectorAll(".tab.open canvas")].filter(each => each.width && each.height);
+    const picture = document.createElement("canvas"), context = picture.getContext("2d");
+    picture.width = Math.max(...canvases.map(each => each.width));
+    picture.height = 30 + canvases.reduce((sum, each) => sum + each.height, 0);
+    context.fillStyle = paint("ground");
+    context.fillRect(0, 0, picture.width, picture.height);
+    context.fillStyle = paint("ink");
+    context.font = "15px system-ui";
+    context.fillText(`${document.getElementById("title").textContent}, ${this.view.span.map(t => t.toFixed(2)).join(" to ")} s, ${document.querySelector("#overall .word").textContent}`, 8, 20);
+    let y = 30;
+    for (const each of canvases) { context.drawImage(each, 0, y); y += each.height; }
+    picture.toBlob(blob => save(blob, "boom_twin.png"));
+  }
+
+  // Every row of the span that is shown, by stamp; empty where a table has none at that stamp.
+  saveTable() {
+    const [from, to] = this.view.span, rows = new Map(), heads = ["t_s"];
+    for (const table of TABLES.map(name => this.link.table(name)).filter(Boolean)) {
+      const start = heads.length;
+      heads.push(...table.columns.map(column => `${table.name}_${column}`));
+      for (let row = table.from(from); row < table.count && table.time(row) <= to; row++) {
+        const time = table.time(row).toFixed(6);
+        if (!rows.has(time)) rows.set(time, []);
+        table.columns.forEach((_, c) => { rows.get(time)[start - 1 + c] = table.at(c, row); });
+      }
+    }
+    const line = ([time, values]) => [time, ...Array.from({ length: heads.length - 1 }, (_, i) => values[i] === undefined || Number.isNaN(values[i]) ? "" : Number(values[i].toPrecision(8)))].join(",");
+    const sorted = [...rows].sort(([a], [b]) => a - b);
+    save(new Blob([[heads.join(","), ...sorted.map(line)].join("\n") + "\n"], { type: "text/csv" }), "boom_twin.csv");
+  }
+}
+
+function save(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}

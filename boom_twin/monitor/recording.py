@@ -1,0 +1,56 @@
+"""A recording started and stopped from the page: ``boom_twin record`` as a process of its own."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+PARTING = 10.0
+"""Seconds that it may take to complete its files."""
+
+
+class Recording:
+    """Runs one recorder at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        Every recording gets a directory in it, named by its time (UTC).
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a recorder runs."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> str:
+        """Start one, unless it runs already; gives what was done."""
+        if self.is_running:
+            return "recording already"
+        out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
+        command = ["-m", "boom_twin.cli.main", "record", "--out", str(out), "--note", "started from the monitor"]
+        self._process = subprocess.Popen([sys.executable, *command], stdin=subprocess.DEVNULL)
+        return f"recording into {out}"
+
+    def stop(self) -> str:
+        """Stop it, without waiting for its end; gives what was done."""
+        if not self.is_running or self._process is None:
+            return "not recording"
+        self._process.send_signal(signal.SIGINT)
+        return "recording stopped"
+
+    def close(self) -> None:
+        """Stop it and wait until its files are complete."""
+        if self._process is not None:
+            self.stop()
+            try:
+                self._process.wait(PARTING)
+            except subprocess.TimeoutExpired:
+                self._process.kill()

@@ -1,0 +1,99 @@
+"""The server of the page: static files and one WebSocket for each viewer."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import suppress
+from pathlib import Path
+
+from aiohttp import web
+
+from .analyst import Analyst
+from .desk import Desk
+from .door import POLICY, Door
+from .feed import Feed
+from .viewer import Viewer
+
+PAGE = Path(__file__).parent / "page"
+MOST_VIEWERS = 16
+LONGEST = 4096
+"""Bytes of a request of the page."""
+POLL = 1.0 / 60.0
+"""Seconds between looks at what has come."""
+HEARTBEAT = 60.0
+"""Seconds without an answer after which a viewer is taken to have gone."""
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Server:
+    """Serves one feed.
+
+    Parameters
+    ----------
+    feed : Feed
+    desk : Desk
+    door : Door
+    """
+
+    def __init__(self, feed: Feed, desk: Desk, door: Door) -> None:
+        self._feed, self._desk, self._door = feed, desk, door
+        self._viewers: set[web.WebSocketResponse] = set()
+
+    def application(self) -> web.Application:
+        """The application, for `aiohttp.web`."""
+        application = web.Application(middlewares=[self._guard], client_max_size=LONGEST)
+        application.add_routes([web.get("/", self._index), web.get("/socket", self._connect), web.static("/page", PAGE)])
+        application.cleanup_ctx.append(self._run)
+        application.on_shutdown.append(self._part)
+        return application
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        self._door.check(request)
+        response = await handler(request)
+        if not response.prepared:
+            response.headers.update(POLICY)
+        return response
+
+    async def _index(self, request: web.Request) -> web.FileResponse:
+        return web.FileResponse(PAGE / "index.html")
+
+    async def _connect(self, request: web.Request) -> web.StreamResponse:
+        if len(self._viewers) >= MOST_VIEWERS:
+            raise web.HTTPServiceUnavailable(text=f"{MOST_VIEWERS} pages are open already; close one")
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=LONGEST, compress=False)
+        self._viewers.add(socket)
+        try:
+            await socket.prepare(request)
+            await Viewer(socket, self._feed, self._desk, self._analyst).serve()
+        finally:
+            self._viewers.discard(socket)
+        return socket
+
+    async def _run(self, application: web.Application) -> AsyncIterator[None]:
+        """Let the feed take what comes, as long as the server runs."""
+        self._analyst = Analyst(self._feed)
+        task = asyncio.create_task(self._poll())
+        task.add_done_callback(_stop_on_fault)
+        yield
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+    async def _poll(self) -> None:
+        while True:
+            self._feed.poll()
+            await asyncio.sleep(POLL)
+
+    async def _part(self, application: web.Application) -> None:
+        for socket in set(self._viewers):
+            await socket.close()
+
+
+def _stop_on_fault(task: asyncio.Task[None]) -> None:
+    """A feed that fails ends the monitor: a page without data that says nothing would be worse."""
+    if not task.cancelled() and (error := task.exception()) is not None:
+        asyncio.get_running_loop().call_exception_handler({"message": "the feed failed", "exception": error})
+        raise web.GracefulExit

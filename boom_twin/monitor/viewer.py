@@ -1,0 +1,208 @@
+"""One open page: what it is sent and what it asks for.
+
+Nothing is queued for it. What it is owed follows from what it has got: rows by their numbers, lamps and alarms by their newest
+state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from math import isfinite
+from typing import Any
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from .analyst import Analyst
+from .desk import Desk
+from .feed import Feed
+from .frames import ROWS, pack
+from .playback import Playback
+from .table import Table
+from .words import alarms, dump, layout, state
+
+PERIOD = 1.0 / 30.0
+"""Seconds between two messages of rows."""
+STATE_PERIOD = 0.5
+SPECTRUM_PERIOD = 1.0
+CHUNK = 8000
+"""Rows of one block at most."""
+BEHIND = 5.0
+"""Seconds by which a page may be behind before it is skipped to the newest rows."""
+HISTORY = 600.0
+"""Seconds that a page is given when it is opened, or goes elsewhere in a session."""
+SINGLE = frozenset({"shape"})
+"""Tables of which the newest row is enough."""
+MOST_REQUESTS = 40
+"""Requests of a page in a second."""
+
+
+class Viewer:
+    """Serves one WebSocket until it is closed.
+
+    Parameters
+    ----------
+    socket : WebSocketResponse
+        Prepared.
+    feed, desk, analyst
+        Common to all viewers.
+    """
+
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: Desk, analyst: Analyst) -> None:
+        self._socket, self._feed, self._desk, self._analyst = socket, feed, desk, analyst
+        self._playback = None if feed.end is None else Playback(feed.end)
+        self._sent: dict[str, int] = {}
+        self._generation = -1
+        self._tables = 0
+        self._alarms = ""
+
+    async def serve(self) -> None:
+        """Send and hear, until one of the two ends."""
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectrum, self._hear)]
+        _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in others:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # -- out ----------------------------------------------------------------------------------------------------------
+
+    async def _send(self) -> None:
+        feed, told = self._feed, -STATE_PERIOD
+        await self._say(
+            {
+                "kind": "hello",
+                "title": feed.title,
+                "end": feed.end,
+                "permitted": sorted(self._desk.permitted),
+                "history": HISTORY,
+            }
+        )
+        last = time.monotonic()
+        board = None
+        while not self._socket.closed:
+            now = time.monotonic()
+            position = self._advance(now - last)
+            last = now
+            await self._restart_if_cleared()
+            newest = feed.store.board(position)
+            if newest is not board or now - told >= STATE_PERIOD:
+                board, told = newest, now
+                await self._say_state(position)
+            await self._send_rows(position)
+            await asyncio.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
+
+    def _advance(self, span: float) -> float:
+        """The session's time up to which the page is to know everything."""
+        return self._feed.store.newest if self._playback is None else self._playback.advance(span)
+
+    async def _restart_if_cleared(self) -> None:
+        store = self._feed.store
+        if store.generation != self._generation:
+            self._generation, self._tables, self._sent = store.generation, 0, {}
+            await self._say({"kind": "reset"})
+        if len(store.tables) != self._tables:
+            self._tables = len(store.tables)
+            await self._say(layout(store))
+
+    async def _say_state(self, position: float) -> None:
+        feed, play = self._feed, self._playback
+        now = feed.now() if play is None else position
+        message = state(feed.store.board(now), now, position)
+        if play is not None:
+            message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
+        await self._say({**message, "is_recording": self._desk.is_recording})
+        told = dump(alarms(feed.store.alarms.all))
+        if told != self._alarms:
+            self._alarms = told
+            await self._socket.send_str(told)
+
+    async def _send_rows(self, position: float) -> None:
+        """All rows that are owed now, in messages of bounded size; what comes meanwhile waits for the lamps' next turn."""
+        tables = list(self._feed.store.tables.values())[: self._tables]
+        owed = {number: self._owed(table, position) for number, table in enumerate(tables)}
+        while owed:
+            blocks = []
+            for number, (first, end) in list(owed.items()):
+                last = min(end, first + CHUNK)
+                if last > first:
+                    blocks.append(pack(ROWS, number, *tables[number].rows(first, last)))
+                self._sent[tables[number].name] = last
+                owed[number] = (last, end)
+                if last == end:
+                    del owed[number]
+            if blocks:
+                await self._socket.send_bytes(b"".join(blocks))
+
+    def _owed(self, table: Table, position: float) -> tuple[int, int]:
+        """Numbers of the first row to send and of the one after the last."""
+        end = table.count if self._playback is None else table.until(position)
+        first = self._sent.get(table.name)
+        if first is None:
+            first = table.until(position - HISTORY)
+        elif end - first > CHUNK or (table.count and position - self._time_of(table, first) > BEHIND):
+            first = table.until(position - BEHIND) if self._playback is None else first
+        if table.name in SINGLE:
+            first = max(first, end - 1)
+        return max(first, table.first), end
+
+    @staticmethod
+    def _time_of(table: Table, row: int) -> float:
+        times = table.rows(row, row + 1)[0]
+        return float(times[0]) if len(times) else float("inf")
+
+    async def _send_spectrum(self) -> None:
+        while not self._socket.closed:
+            position = self._feed.store.newest if self._playback is None else self._playback.position
+            found = await self._analyst.look(position)
+            if found is not None and self._tables:
+                lines, block = found
+                await self._say(lines)
+                await self._socket.send_bytes(block)
+            await asyncio.sleep(SPECTRUM_PERIOD)
+
+    async def _say(self, message: dict[str, Any]) -> None:
+        await self._socket.send_str(dump(message))
+
+    # -- in -----------------------------------------------------------------------------------------------------------
+
+    async def _hear(self) -> None:
+        """Carry out requests; a page that sends anything else is sent away."""
+        second, count = 0.0, 0
+        async for message in self._socket:
+            now = time.monotonic()
+            second, count = (now, 1) if now - second > 1.0 else (second, count + 1)
+            try:
+                if count > MOST_REQUESTS or message.type is not WSMsgType.TEXT:
+                    raise ValueError("too many requests, or not text")
+                answer = self._do(json.loads(message.data))
+            except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
+                await self._socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"not a request of this page")
+                return
+            if answer is not None:
+                await self._say(answer)
+
+    def _do(self, request: Any) -> dict[str, Any] | None:
+        if not isinstance(request, dict):
+            raise ValueError("not a request")
+        play = self._playback
+        if request.get("do") in ("seek", "speed", "hold"):
+            if play is None:
+                raise ValueError("not a recorded session")
+            value = float(request["value"])
+            if not isfinite(value):
+                raise ValueError("not a number")
+            self._steer(play, request["do"], value)
+            return None
+        return self._desk.act(request)
+
+    def _steer(self, play: Playback, what: str, value: float) -> None:
+        if what == "seek":
+            play.seek(value)
+            self._generation = -1
+        elif what == "speed":
+            play.pace(value)
+        else:
+            if play.position >= play.end and not value:
+                self._steer(play, "seek", 0.0)
+            play.is_held = bool(value)

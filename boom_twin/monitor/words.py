@@ -1,0 +1,54 @@
+"""The text messages to the page: plain values for JSON, where a number that is not known is null."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from .alarms import Alarm
+from .lamps import Board, Lamp, Level, overall, worst
+from .store import Store
+
+
+def state(board: Board, now: float, time: float) -> dict[str, Any]:
+    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s)."""
+    groups = board.groups(now)
+    level, reason = overall(groups)
+    told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
+    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told}
+
+
+def layout(store: Store) -> dict[str, Any]:
+    """The tables that there are."""
+    tables = [{"name": table.name, "columns": table.columns} for table in store.tables.values()]
+    return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
+
+
+def alarms(found: list[Alarm]) -> dict[str, Any]:
+    """All alarms, oldest first."""
+    return {"kind": "alarms", "alarms": [{**asdict(alarm), "level": alarm.level.name} for alarm in found]}
+
+
+def dump(message: Any) -> str:
+    """As JSON."""
+    return json.dumps(_plain(message), allow_nan=False, separators=(",", ":"))
+
+
+def _group(lamps: list[Lamp]) -> dict[str, Any]:
+    lamp = worst(lamps)
+    if lamp is None:
+        return {"level": Level.OFF.name, "reason": "not there", "lamps": []}
+    reason = f"{len(lamps)} as expected" if lamp.level == Level.OK and len(lamps) > 1 else lamp.reason
+    return {"level": lamp.level.name, "reason": reason, "lamps": [{**asdict(each), "level": each.level.name} for each in lamps]}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value

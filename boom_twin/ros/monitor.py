@@ -1,0 +1,92 @@
+"""The twin's topics as a feed of the live page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import Log
+from rclpy.subscription import Subscription
+
+from ..io.topics import Topics
+from ..io.typestore import jazzy
+from ..monitor.feed import Feed
+from ..monitor.store import Store
+from ..records import Stream
+from ..scene.parts import Scene
+from .qos import qos_profile
+from .types import message_class
+
+NAME = "boom_twin_monitor"
+DEPTH = 1000
+"""Messages that may wait for the next look, for every topic: seconds of a session."""
+CAPACITY = 150_000
+"""Rows kept of every table: twelve minutes at 200 Hz."""
+MOST = 400
+"""Messages of one topic taken in one look, so that a flood of them leaves time for the pages."""
+NANO = 1_000_000_000
+
+Taker = Callable[[Any, float], None]
+
+
+class TopicFeed(Feed):
+    """Listens to the twin; needs an initialised rclpy.
+
+    Its messages are taken when it is looked at, not by an executor: that would wake up for each of a thousand in a second.
+
+    Parameters
+    ----------
+    topics : Topics
+    scene : Scene, optional
+        By default that which the node names on ``/diagnostics``.
+    """
+
+    def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
+        super().__init__("live", Store(CAPACITY), topics, scene)
+        self._node = rclpy.create_node(NAME)
+        shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
+        self._heard: list[tuple[Subscription[Any], str, Taker]] = []
+        for topic in shown:
+            if (take := self.catch.takers.get(topic.absolute)) is not None:
+                kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
+                heard = self._node.create_subscription(kind, topic.absolute, lambda _: None, qos, raw=True)
+                self._heard.append((heard, topic.type, take))
+        events = topics.events
+        self._events = self._node.create_publisher(Log, events.absolute, qos_profile(events.qos))
+
+    def poll(self) -> None:
+        """Take what has come."""
+        now = time.monotonic()
+        for subscription, kind, take in self._heard:
+            with subscription.handle:
+                receive = partial(subscription.handle.take_message, subscription.msg_type, True)
+                for data, _ in _until_none(receive):
+                    take(jazzy().deserialize_cdr(data, kind), now)
+
+    def now(self) -> float:
+        """Of a clock that only goes forward."""
+        return time.monotonic()
+
+    def publish(self, words: str) -> None:
+        """Publish an event with the stamp of the newest sample."""
+        store = self.store
+        message = Log(level=Log.INFO, name=NAME, msg=words)
+        stamp = store.epoch + round(store.newest * NANO)
+        message.stamp.sec, message.stamp.nanosec = divmod(stamp, NANO)
+        self._events.publish(message)
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._node.destroy_node()
+
+
+def _until_none(receive: Callable[[], tuple[bytes, Any] | None]) -> Any:
+    """What `receive` gives, at most `MOST` times."""
+    for _ in range(MOST):
+        found = receive()
+        if found is None:
+            return
+        yield found

@@ -1,0 +1,122 @@
+"""What the live page costs and how soon it shows: frames of one and of four pages, memory, delay, a thousand connections.
+
+``python test/bench/monitor.py [--seconds 120]`` needs Debian's chromium. The feed is made here, 200 rows a second stamped by
+this machine's clock, so the delay is from a row's stamp to its drawing, without node and DDS.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+import time
+from argparse import ArgumentParser
+from concurrent.futures import ThreadPoolExecutor
+from math import sin
+from statistics import median
+from typing import Any
+
+from aiohttp import ClientSession, web
+from playwright.sync_api import sync_playwright
+
+from boom_twin.io.topics import load_topics
+from boom_twin.monitor.desk import Desk
+from boom_twin.monitor.door import Door
+from boom_twin.monitor.feed import Feed
+from boom_twin.monitor.server import Server
+from boom_twin.monitor.store import Store
+
+RATE = 200
+COUNT = "window.counted ??= (requestAnimationFrame(function step() { window.counted++; requestAnimationFrame(step); }), 0)"
+
+
+class Waves(Feed):
+    """Displacement, acceleration and specific force: six traces, the band of one more."""
+
+    def __init__(self) -> None:
+        super().__init__("waves", Store(150_000), load_topics())
+        self._next = time.time_ns()
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def poll(self) -> None:
+        while self._next <= time.time_ns():
+            phase = (self._next % 10**12) * 1e-9 * 6.3
+            wave = [sin(phase), sin(2.3 * phase), sin(phase), sin(2.3 * phase), 0.1, 0.1]
+            for name, columns in (("displacement", 2), ("acceleration", 2), ("force", 6)):
+                self.store.append(name, [f"{i}_m_s2" for i in range(columns)], self._next, wave[:columns])
+            self._next += 10**9 // RATE
+
+
+def serve(feed: Feed, ready: threading.Event, port: list[int]) -> None:
+    """In a thread, for ever."""
+
+    async def run() -> None:
+        runner = web.AppRunner(Server(feed, Desk(feed, frozenset()), Door("127.0.0.1")).application(), access_log=None)
+        await runner.setup()
+        await web.TCPSite(runner, "127.0.0.1", 0).start()
+        port.append(runner.addresses[0][1])
+        ready.set()
+        await asyncio.Event().wait()
+
+    asyncio.run(run())
+
+
+def watch(pages: list[Any], seconds: int) -> list[list[int]]:
+    """Frames of every page in every second."""
+    for page in pages:
+        page.evaluate(COUNT)
+    found: list[list[int]] = [[] for _ in pages]
+    last, began = [0] * len(pages), time.monotonic()
+    for second in range(seconds):
+        time.sleep(max(0.0, began + second + 1 - time.monotonic()))
+        for i, page in enumerate(pages):
+            count = page.evaluate("window.counted")
+            found[i].append(count - last[i])
+            last[i] = count
+    return [each[1:] for each in found]
+
+
+async def hostile(url: str) -> int:
+    """A thousand connections at once; how many were taken."""
+    headers = {"Origin": url.rstrip("/")}
+    async with ClientSession() as session:
+        tries = (session.ws_connect(f"{url}socket", headers=headers) for _ in range(1000))
+        opened = await asyncio.gather(*tries, return_exceptions=True)
+        return sum(not isinstance(each, BaseException) for each in opened)
+
+
+def main() -> None:
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=int, default=120)
+    seconds = parser.parse_args().seconds
+    ready, port = threading.Event(), list[int]()
+    threading.Thread(target=serve, args=(Waves(), ready, port), daemon=True).start()
+    ready.wait()
+    url = f"http://127.0.0.1:{port[0]}/"
+    print(f"load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    with sync_playwright() as playwright:
+        options = ["--no-sandbox", "--enable-precise-memory-info"]
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=options)
+        first = browser.new_page(viewport={"width": 1280, "height": 720})
+        first.goto(url)
+        time.sleep(5)
+        for _ in range(2):
+            (frames,) = watch([first], seconds // 2)
+            heap, words = first.evaluate("performance.memory.usedJSHeapSize") / 2**20, first.locator("#link").inner_text()
+            print(f"one page: {median(frames):.0f} frames/s median, {min(frames)} worst second; {words}; heap {heap:.1f} MiB")
+        with ThreadPoolExecutor(1) as pool:  # playwright has an event loop in this thread
+            taken = pool.submit(asyncio.run, hostile(url)).result()
+        print(f"a thousand connections: {taken} taken; then {watch([first], 5)[0]} frames/s")
+        others = [browser.new_page(viewport={"width": 1280, "height": 720}) for _ in range(3)]
+        for page in others:
+            page.goto(url)
+        for frames in watch([first, *others], max(10, seconds // 4)):
+            print(f"of four pages: {median(frames):.0f} frames/s median, {min(frames)} worst second")
+        browser.close()
+    print(f"load of the machine after: {os.getloadavg()[0]:.1f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""A session with faults in it, and what a replay says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.io.intake import Intake, stamp_of
+from boom_twin.io.reader import read, scan
+from boom_twin.io.session import write_session
+from boom_twin.io.topics import load_topics
+from boom_twin.monitor.bag import bag_feed
+from boom_twin.monitor.feed import Feed
+from boom_twin.records import Stream
+from boom_twin.replay import replay
+from boom_twin.scene import load_scene
+from boom_twin.settings import Settings
+
+BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
+SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
+OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
+
+
+@pytest.fixture(scope="session")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
+    topics, intake = load_topics().inputs, Intake(4)
+    values: dict[Stream, list[Any]] = {stream: [] for stream in Stream}
+    names = {topic.absolute: stream for stream, topic in topics.items()}
+    stamps = []
+    for name, _, message in read(scan(BUNDLED), {topic.absolute: topic.type for topic in topics.values()}):
+        sample = intake.put(names[name], stamp_of(message), message)
+        assert sample is not None
+        values[names[name]].append(sample.values)
+        if names[name] is Stream.STROKES:
+            stamps.append(sample.stamp)
+    stamps_ns = np.array(stamps)
+    time = (stamps_ns - stamps_ns[0]) * 1e-9
+    kept = (time < SECONDS) & ((time < GAP[0]) | (time > GAP[1]))
+    joints = np.array(values[Stream.ANGLES])
+    joints[time >= WRONG_FROM, 2] += OFFSET
+    path = tmp_path_factory.mktemp("faulty") / "faulty_session"
+    arrays = (np.array(values[Stream.STROKES])[kept], joints[kept], np.array(values[Stream.IMU])[kept])
+    write_session(path, stamps_ns[kept], *arrays, {"origin": "synthetic, encoder 3 made wrong"})
+    return path
+
+
+@pytest.fixture(scope="session")
+def feed(faulty: Path) -> Feed:
+    """That session through the twin."""
+    return bag_feed(faulty, load_scene(), Settings())
+
+
+@pytest.fixture(scope="session")
+def replayed(faulty: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its replay's folder, with ``summary.json`` and ``bag/``."""
+    out = tmp_path_factory.mktemp("replayed")
+    replay(faulty, load_scene(), out)
+    return out

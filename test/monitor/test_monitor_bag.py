@@ -1,0 +1,72 @@
+"""What the page is given of a session is what a replay of it says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.errors import BagError
+from boom_twin.io.reader import read, scan
+from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.monitor.bag import bag_feed
+from boom_twin.monitor.feed import Feed
+from boom_twin.monitor.lamps import Level, overall
+from boom_twin.scene import load_scene
+from boom_twin.settings import Settings
+
+
+def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
+    topic = load_topics().outputs[Output.TIP_ACCELERATION].absolute
+    messages = [message for _, _, message in read(scan(replayed / "bag"), {topic: TYPES[Output.TIP_ACCELERATION]})]
+    times, values = feed.store.tables["acceleration"].rows(0, len(messages))
+    told = np.array([(m.accel.linear.x, m.accel.linear.z) for m in messages])
+    stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages])
+    assert values == pytest.approx(told, rel=1e-6)
+    assert np.abs(np.round(times * 1e9).astype(np.int64) + feed.store.epoch - stamps).max() <= 1
+
+
+def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:
+    summary = json.loads((replayed / "summary.json").read_text())
+    tables = feed.store.tables
+    assert tables["acceleration"].count == summary["samples"] and feed.end == pytest.approx(summary["duration_s"])
+    acceleration = tables["acceleration"].rows(0, 10**6)[1].astype(float)
+    assert np.hypot(*acceleration.T).max() == pytest.approx(summary["tip_acceleration_max_m_s2"], rel=1e-6)
+    joints = tables["joints"].rows(0, 10**6)[1][:, :4].astype(float)
+    assert np.sqrt((joints**2).mean(axis=0)) == pytest.approx(summary["joint_residual_rms_rad"], rel=1e-5)
+    gaps = [(alarm.begin, alarm.end) for alarm in feed.store.alarms.all if alarm.name == "cylinder_strokes"]
+    assert gaps == [pytest.approx((alarm["from_s"], alarm["to_s"])) for alarm in summary["alarms"] if alarm["kind"] == "gap"]
+
+
+def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
+    level, reason = overall(feed.store.board(14.0).groups(14.0))
+    assert level == Level.OK
+    level, reason = overall(feed.store.board(25.0).groups(25.0))
+    assert level == Level.ERROR and reason.startswith("residual joint_3")
+    alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
+    assert 15.0 < alarm.begin < 20.0 and alarm.level == Level.ERROR
+
+
+def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replayed: Path) -> None:
+    topic = load_topics().outputs[Output.RESIDUALS].absolute
+    told = [m.position for _, _, m in read(scan(replayed / "bag"), {topic: TYPES[Output.RESIDUALS]}) if "tip_imu_x" in m.name]
+    values = feed.store.tables["force"].rows(0, 10**6)[1]
+    assert values[:, :2] - values[:, 2:4] == pytest.approx(np.array(told), abs=1e-5)
+
+
+def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -> None:
+    published = bag_feed(replayed / "bag", load_scene(), Settings())
+    for name in ("displacement", "position", "acceleration", "shape", "joints"):
+        rows = [each.store.tables[name].rows(0, 10**6) for each in (feed, published)]
+        for ours, theirs in zip(*rows, strict=True):
+            assert ours == pytest.approx(theirs), name
+    assert published.strokes(20.0) == pytest.approx(feed.strokes(20.0)) and len(published.strokes(20.0)) == 4
+    level, reason = overall(published.store.board(20.0).groups(20.0))
+    assert (level, reason) == (Level.STALE, "no word from the twin")
+
+
+def test_a_session_without_anything_to_show_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BagError):
+        bag_feed(tmp_path, load_scene(), Settings())

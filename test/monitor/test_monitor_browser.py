@@ -1,0 +1,315 @@
+"""The page itself, in Debian's Chromium: every element by its name, and its numbers against those of the session."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin.monitor.feed import Feed
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
+CHROMIUM = Path("/usr/bin/chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)"),
+]
+PATIENCE = 8_000  # ms
+FAULT = 25.0  # s, where encoder 3 is known to be wrong
+
+
+class Monitor:
+    """``boom_twin monitor`` as a process."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "boom_twin.cli.main", "monitor", "--port", "0", *arguments]
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            if found := re.search(r"open (http\S+)", line):
+                self.url = found[1]
+                return
+        raise AssertionError("the monitor did not start")
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def monitor(faulty: Path) -> Iterator[Monitor]:
+    """Of the faulty session."""
+    monitor = Monitor("--bag", str(faulty))
+    yield monitor
+    monitor.process.kill()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: Any, monitor: Monitor) -> Iterator[Any]:
+    """At the fault, held."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.asked, page.errors = [], []
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.goto(monitor.url)
+    wait(page, "twin.link.table('displacement')?.count > 0")
+    go(page, FAULT)
+    yield page
+    assert not page.errors
+    context.close()
+
+
+def wait(page: Any, condition: str) -> None:
+    """Until `condition` holds; by evaluation from outside, because the page's policy allows no evaluation within."""
+    end = time.monotonic() + PATIENCE / 1000
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, condition
+        page.wait_for_timeout(50)
+
+
+def go(page: Any, moment: float) -> None:
+    """Hold, and go there."""
+    page.evaluate(f"twin.timeline.hold(true); twin.timeline.seek({moment})")
+    wait(page, f"twin.timeline.isHeld && Math.abs(twin.view.newest - {moment}) < 0.1")
+    page.wait_for_timeout(1200)  # lamps and figures come twice a second
+
+
+def cells(page: Any, selector: str) -> list[list[str]]:
+    return [[cell.strip() for cell in row.split("\t")] for row in page.locator(f"{selector} tr").all_inner_texts()]
+
+
+def test_the_first_glance_says_what_is_wrong_in_word_shape_and_reason(page: Any) -> None:
+    overall = page.locator("#overall")
+    assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "FAULT"
+    assert overall.locator(".sign").inner_text() == "✖" and "joint_3" in overall.locator(".reason").inner_text()
+    expected = {"sensors": "OK", "model": "OK", "residuals": "ERROR", "timing": "OK", "recorder": "OFF"}
+    assert {name: page.locator(f"#group-{name}").get_attribute("data-level") for name in expected} == expected
+    detail = page.locator("#group-residuals .detail").inner_text()
+    assert re.fullmatch(r"rms normalised [\d.]+, limit 4, for \d+ s", detail)
+    go(page, 10.0)
+    assert overall.locator(".word").inner_text() == "ALL WELL"
+
+
+def test_the_figures_are_those_of_the_rows(page: Any, feed: Feed) -> None:
+    page.wait_for_timeout(600)
+    shown = {row[0]: [float(cell) for cell in row[1:]] for row in cells(page, "#figures")[1:]}
+    low, high = page.evaluate("twin.view.span")
+    names = {
+        "accel. forward, m/s²": ("acceleration", 0, 1.0),
+        "displ. up, mm": ("displacement", 1, 1e3),
+        "resid. joint_3, mrad": ("joints", 2, 1e3),
+        "IMU measured z, m/s²": ("force", 1, 1.0),
+        "IMU predicted x, m/s²": ("force", 2, 1.0),
+    }
+    for name, (table, column, factor) in names.items():
+        times, values = feed.store.tables[table].rows(0, 10**6)
+        chosen = factor * values[(times >= low) & (times < high), column].astype(float)
+        rms, peak = chosen.std(), np.abs(chosen - chosen.mean()).max()
+        expected = [chosen.mean(), rms, peak, np.ptp(chosen), peak / rms]
+        assert shown[name][1:] == pytest.approx(expected[1:], rel=2e-3), name
+        assert shown[name][0] == pytest.approx(expected[0], rel=2e-3, abs=0.1 * rms), name
+
+
+def test_the_exported_table_holds_every_row_that_is_shown(page: Any, feed: Feed) -> None:
+    with page.expect_download() as download:
+        page.keyboard.press("c")
+    rows = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
+    low, high = page.evaluate("twin.view.span")
+    times, values = feed.store.tables["acceleration"].rows(0, 10**6)
+    chosen = (times >= low) & (times <= high)
+    told = [(float(row["t_s"]), float(row["acceleration_z_m_s2"])) for row in rows if row["acceleration_z_m_s2"]]
+    assert np.array(told) == pytest.approx(np.stack([times, values[:, 1]], axis=1)[chosen], rel=1e-6, abs=1e-6)
+    assert any(row["force_sigma_z_m_s2"] for row in rows) and any(row["joints_joint_3_normalised"] for row in rows)
+
+
+def test_the_exported_picture_is_one(page: Any) -> None:
+    with page.expect_download() as download:
+        page.locator("#picture").click()
+    assert Path(download.value.path()).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize("name", ["displacement", "acceleration", "force", "residuals"])
+def test_every_chart_shows_its_traces_with_a_read_out(page: Any, name: str) -> None:
+    chart = page.locator(f"#chart-{name}")
+    data = page.evaluate("name => document.querySelectorAll(`#chart-${name} canvas`).length", name)
+    assert data == 1
+    box = chart.locator(".u-over").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    values = chart.locator(".u-series:not(.quiet):not(.u-off) .u-value").all_inner_texts()
+    assert all(math.isfinite(float(value)) for value in values) and len(values) >= 3
+    assert float(values[0]) == pytest.approx(sum(page.evaluate("twin.view.span")) / 2, abs=1.0)
+
+
+def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
+    box = page.locator("#chart-acceleration .u-over").bounding_box()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 20, steps=5)
+    page.mouse.up()
+    low, high = page.evaluate("twin.view.span")
+    assert high - low == pytest.approx(6.0, abs=0.2)
+    page.locator("#all").click()
+    assert page.evaluate("twin.view.zoom") is None
+
+
+def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
+    go(page, 35.0)
+    broken = page.evaluate("import('/page/thin.js').then(m => m.thin(twin.link.table('displacement'), [0, 1], 29, 32, 2000))")
+    times, values = np.array(broken[0]), broken[1]
+    place = values.index(None)
+    assert times[place - 1] == pytest.approx(30.0, abs=0.02) and times[place] == pytest.approx(30.6, abs=0.02)
+
+
+@pytest.mark.parametrize("seconds", ["10", "30", "60", "180", "600"])
+def test_the_span_that_is_shown_can_be_chosen(page: Any, seconds: str) -> None:
+    page.locator("#window").select_option(seconds)
+    low, high = page.evaluate("twin.view.span")
+    assert high - low == pytest.approx(float(seconds))
+
+
+def test_spectrum_and_spectrogram(page: Any) -> None:
+    page.keyboard.press("2")
+    wait(page, "document.querySelectorAll('#peaks tr').length > 2")
+    rows = cells(page, "#peaks")[1:]
+    natural = sorted(float(row[3]) for row in rows if row[3][0].isdigit())
+    assert len(natural) == 6 and natural[0] == pytest.approx(1.06, abs=0.05)
+    first = next(row for row in rows if row[2] == "1")
+    assert float(first[0]) == pytest.approx(natural[0], rel=0.2) and 0.0 < float(first[1]) < 20.0
+    assert page.locator("#density canvas").count() == 1
+    page.keyboard.press("3")
+    page.wait_for_timeout(1500)
+    assert "dB" in page.locator("#waterfall-words").inner_text() and is_drawn(page, "#waterfall")
+
+
+def is_drawn(page: Any, canvas: str) -> bool:
+    """Whether anything but one colour is on it."""
+    pixels = "c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer"
+    script = f"id => {{ const c = document.querySelector(id); return new Set(new Uint32Array({pixels})).size }}"
+    return bool(page.evaluate(script, canvas) > 3)
+
+
+def test_the_shape_states_exaggeration_reach_height_and_forces(page: Any, feed: Feed) -> None:
+    page.keyboard.press("4")
+    page.wait_for_timeout(300)
+    table = feed.store.tables["shape"]
+    row = table.until(FAULT)
+    values = dict(zip(table.columns, table.rows(row - 1, row)[1][0].tolist(), strict=True))
+    last = max(int(name.split("_")[1]) for name in values if name.startswith("line_"))
+    for factor in (1, 10, 50):
+        page.locator(f"#factors button[data-factor='{factor}']").click()
+        page.wait_for_timeout(200)
+        assert f"x{factor};" in page.locator("#exaggeration").inner_text() and is_drawn(page, "#boom")
+    assert page.locator("#reach").inner_text() == f"reach {values[f'line_{last}_x_m']:.3f} m"
+    assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
+    strongest = max(abs(value) for name, value in values.items() if name.startswith("force_"))
+    assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
+
+
+def test_every_lamp_and_alarm_is_listed_and_can_be_acknowledged(page: Any, feed: Feed) -> None:
+    page.keyboard.press("5")
+    page.wait_for_timeout(1200)
+    lamps = cells(page, "#lamps")
+    groups = feed.store.board(FAULT).groups(FAULT).values()
+    assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group}
+    wrong = next(row for row in lamps if row[1] == "residual joint_3")
+    assert wrong[2] == "✖ ERROR" and float(wrong[5]) > float(wrong[6]) == 4.0
+    alarms = page.locator("#alarms tr", has_text="residual joint_3")
+    alarms.locator("button").click()
+    alarms.get_by_text("acknowledged").wait_for()
+    assert page.locator("#answer").inner_text() == "acknowledged: residual joint_3"
+
+
+def test_the_time_line_shows_alarms_and_gaps_and_jumps_between_them(page: Any, replayed: Path) -> None:
+    gap = json.loads((replayed / "summary.json").read_text())["alarms"][0]
+    titles = page.locator("#marks i").evaluate_all("marks => marks.map(mark => mark.title)")
+    assert any("residual joint_3" in title for title in titles)
+    assert any(title.startswith("cylinder_strokes: gap of 0.6") and f"{gap['from_s']:.2f} s" in title for title in titles)
+    page.evaluate("twin.timeline.seek(20)")
+    page.wait_for_timeout(1000)
+    page.locator("#after").click()
+    wait(page, f"Math.abs(twin.timeline.position - {gap['from_s']}) < 0.1")
+    page.keyboard.press(",")
+    wait(page, "twin.timeline.position < 20")
+
+
+def test_scrubber_speed_and_play(page: Any) -> None:
+    page.locator("#scrubber").fill("12")
+    wait(page, "Math.abs(twin.timeline.position - 12) < 0.1")
+    page.locator("#speed").select_option("5")
+    page.locator("#play").click()
+    wait(page, "twin.timeline.position > 18")
+    page.keyboard.press(" ")
+    wait(page, "twin.timeline.isHeld")
+    assert page.locator("#play").inner_text() == "Play"
+    assert re.fullmatch(r"[\d.]+ of 40\.00 s", page.locator("#position").inner_text())
+
+
+def test_what_is_not_permitted_cannot_be_pressed(page: Any) -> None:
+    assert page.locator("#mark").is_disabled() and page.locator("#record").is_hidden() and page.locator("#pause").is_hidden()
+
+
+def test_dark_and_light_by_key_kept_over_a_reload(page: Any) -> None:
+    def themes() -> tuple[str, str]:
+        return page.evaluate("[document.documentElement.dataset.theme, getComputedStyle(document.body).backgroundColor]")
+
+    before = themes()
+    page.keyboard.press("t")
+    after = themes()
+    assert before[0] != after[0] and before[1] != after[1]
+    page.reload()
+    assert themes()[0] == after[0]
+    assert page.locator("#theme").inner_text() == ("Light" if after[0] == "dark" else "Dark")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (1180, 820)])
+@pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5"])
+def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: str) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.keyboard.press(tab)
+    page.wait_for_timeout(400)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for selector in ("#overall", "#group-recorder", "#tabs", "#theme", "#timeline"):
+        box = page.locator(selector).bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["height"] > 20, selector
+
+
+def test_everything_comes_from_this_server(page: Any, monitor: Monitor) -> None:
+    assert len(page.asked) > 10 and all(url.startswith((monitor.url, "data:", "ws://127.0.0.1")) for url in page.asked)
+
+
+def test_the_page_itself_says_that_the_monitor_is_gone_and_comes_back(browser: Any, replayed: Path) -> None:
+    monitor = Monitor("--bag", str(replayed / "bag"))
+    page = browser.new_page()
+    page.goto(monitor.url)
+    wait(page, "twin.link.table('displacement')?.count > 0")
+    assert page.locator("#notice").is_hidden()
+    assert page.locator("#overall .word").inner_text() == "STALE"  # no node is in a result bag
+    assert monitor.stop() == 0
+    page.locator("#notice", has_text="NO CONNECTION").wait_for(timeout=5000)
+    assert {lamp.get_attribute("data-level") for lamp in page.locator(".lamp").all()} == {"STALE"}
+    again = Monitor("--bag", str(replayed / "bag"), "--port", monitor.url.rsplit(":", 1)[1].strip("/"))
+    page.locator("#notice").wait_for(state="hidden", timeout=10_000)
+    again.stop()
+    page.close()

@@ -1,0 +1,286 @@
+"""Who comes in, what they get, what they may do, and what a hostile one is worth."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType, WSServerHandshakeError
+from aiohttp.test_utils import TestServer
+from monitor.test_monitor_lamps import ERROR, OK, status
+
+from boom_twin.io.topics import load_topics
+from boom_twin.monitor.desk import Desk
+from boom_twin.monitor.door import Door, is_loopback
+from boom_twin.monitor.feed import Feed
+from boom_twin.monitor.server import MOST_VIEWERS, Server
+from boom_twin.monitor.store import Store
+from boom_twin.scene import load_scene
+
+Talk = Callable[[ClientSession, str], Awaitable[None]]
+
+
+class Made(Feed):
+    """A live feed of made-up rows, 200 a second of two columns."""
+
+    def __init__(self, end: float | None = None) -> None:
+        super().__init__("made", Store(20_000, keeps_boards=end is not None), load_topics(), load_scene(), end)
+        self.published: list[str] = []
+        self.rows(2000)
+        self.tell(OK)
+
+    def rows(self, count: int) -> None:
+        table = self.store.tables.get("acceleration")
+        first = table.count if table else 0
+        for row in range(first, first + count):
+            self.store.append("acceleration", ["x_m_s2", "z_m_s2"], 10**18 + row * 5_000_000, (row, -row))
+
+    def tell(self, level: int) -> None:
+        statuses = [status("boom_twin: model"), status("boom_twin: sensor joint_1", level, "frozen")]
+        self.store.light(self.now(), self.store.board(self.now()).told(self.now(), statuses, 0.0))
+
+    def now(self) -> float:
+        return self.store.newest if self.end is not None else 0.0
+
+    def publish(self, words: str) -> None:
+        self.published.append(words)
+
+
+def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), host: str = "127.0.0.1") -> None:
+    """Run `talk` with a session and the address of a server of `feed`."""
+
+    async def run() -> None:
+        door = Door(host)
+        application = Server(feed, Desk(feed, frozenset(permitted)), door).application()
+        async with TestServer(application) as server, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
+            await asyncio.wait_for(talk(session, str(server.make_url("/"))), 60.0)
+
+    asyncio.run(run())
+
+
+def connect(session: ClientSession, url: str, **more: Any) -> Any:
+    headers = {"Origin": url.rstrip("/"), **more.pop("headers", {})}
+    return session.ws_connect(f"{url}socket", headers=headers, max_msg_size=0, **more)
+
+
+async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
+    """The next message of a kind; ``rows`` and ``density`` have head and times of their first block."""
+    while True:
+        message = await socket.receive()
+        assert message.type in (WSMsgType.TEXT, WSMsgType.BINARY), message
+        if message.type is WSMsgType.TEXT:
+            found = json.loads(message.data)
+        else:
+            head = struct.unpack_from("<BBHI", message.data)
+            times = np.frombuffer(message.data, "<f8", head[3], 8)
+            found = {"kind": ("rows", "density")[head[0] - 1], "head": head, "times": times}
+        if found["kind"] == kind and accept(found):
+            return found
+
+
+def test_a_viewer_gets_layout_state_history_and_what_comes() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            assert (await until(socket, "hello"))["end"] is None
+            layout = await until(socket, "layout")
+            assert layout["tables"] == [{"name": "acceleration", "columns": ["x_m_s2", "z_m_s2"]}]
+            assert (await until(socket, "state"))["level"] == "OK"
+            assert (await until(socket, "rows"))["head"] == (1, 0, 2, 2000)
+            feed.rows(10)
+            rows = await until(socket, "rows")
+            assert rows["head"][3] == 10 and rows["times"][0] == pytest.approx(10.0)
+
+    feed = Made()
+    serve(feed, talk)
+
+
+def test_a_spectrum_with_the_models_frequencies_comes_too() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            lines = await until(socket, "lines")
+            assert lines["natural"] == []  # the strokes are not known
+            assert (await until(socket, "density"))["head"][2] == 2
+
+    serve(Made(), talk)
+
+
+def test_one_that_does_not_read_loses_rows_but_never_a_lamp() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            await until(socket, "rows")
+            transport = socket._response.connection.transport  # type: ignore[union-attr]
+            transport.pause_reading()
+            for _ in range(50):
+                feed.rows(2000)
+                await asyncio.sleep(0.01)
+            feed.tell(ERROR)
+            feed.rows(15_000)
+            await asyncio.sleep(0.3)
+            transport.resume_reading()
+            assert (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["level"] == "ERROR"
+            assert (await until(socket, "state", lambda state: state["level"] == "ERROR"))["time"] == feed.store.newest
+            feed.rows(1)
+            rows = await until(socket, "rows", lambda rows: rows["times"][-1] == feed.store.newest)
+            assert rows["head"][3] < 2000
+
+    feed = Made()
+    serve(feed, talk)
+
+
+REQUESTS = ['{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}']
+
+
+@pytest.mark.parametrize("garbage", ["", "{", "[]", "null", *REQUESTS, "x" * 5000, b"\0", "[" * 4000])
+def test_garbage_is_shown_out_and_the_others_stay(garbage: str | bytes) -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as good, connect(session, url) as bad:
+            await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
+            while (await bad.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                pass
+            assert bad.close_code in (1008, 1009)
+            await until(good, "state")
+
+    serve(Made(), talk, permitted=("acknowledge",))
+
+
+def test_a_flood_of_requests_is_shown_out() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            for _ in range(200):
+                await socket.send_str('{"do": "mark", "note": "x"}')
+            while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                pass
+            assert socket.close_code == 1008 and len(feed.published) <= 50
+
+    feed = Made()
+    serve(feed, talk, permitted=("mark",))
+
+
+def test_a_thousand_connections_leave_room_for_nobody_more_and_harm_nobody() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as good:
+            opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
+            sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
+            refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
+            assert len(sockets) == MOST_VIEWERS - 1 and {each.status for each in refused} == {503}
+            await until(good, "state")
+            await asyncio.gather(*(each.close() for each in sockets))
+            async with connect(session, url) as another:
+                await until(another, "state")
+
+    serve(Made(), talk)
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "http://127.0.0.1"])
+def test_a_page_of_another_origin_may_not_connect(origin: str) -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        with pytest.raises(WSServerHandshakeError) as caught:
+            await connect(session, url, headers={"Origin": origin})
+        assert caught.value.status == 403
+
+    serve(Made(), talk)
+
+
+def test_another_name_that_resolves_to_this_machine_is_refused() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        for host, expected in (("evil.example:80", 403), ("localhost:80", 200), ("[::1]:80", 200)):
+            async with session.get(url, headers={"Host": host}) as response:
+                assert response.status == expected, host
+
+    serve(Made(), talk)
+
+
+def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
+    assert not Door("127.0.0.1").token and not Door("::1").token and len(Door("0.0.0.0").token) >= 32
+    assert not is_loopback("rig.local")
+
+    async def run() -> None:
+        door, feed = Door("0.0.0.0"), Made()
+        async with TestServer(Server(feed, Desk(feed, frozenset()), door).application()) as server:
+            url = str(server.make_url("/"))
+            async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
+                for path in ("", "page/main.js", "?token=wrong"):
+                    assert (await session.get(url + path)).status == 403, path
+                with pytest.raises(WSServerHandshakeError):
+                    await connect(session, url)
+                opened = await session.get(f"{url}?token={door.token}")
+                assert opened.status == 200 and "token" not in str(opened.url)
+                async with connect(session, url) as socket:
+                    await until(socket, "hello")
+
+    asyncio.run(run())
+
+
+def test_only_the_page_is_served_and_it_asks_for_nothing_from_elsewhere() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        response = await session.get(url)
+        assert "default-src 'self'" in response.headers["Content-Security-Policy"] and "http" not in await response.text()
+        for path in ("page/../server.py", "page/%2e%2e/server.py", "server.py", "page/"):
+            assert (await session.get(url + path)).status in (403, 404), path
+        assert (await session.post(url)).status == 405
+
+    serve(Made(), talk)
+
+
+def test_nothing_is_done_that_was_not_permitted() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            assert (await until(socket, "hello"))["permitted"] == []
+            for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
+                await socket.send_json(request)
+                assert not (await until(socket, "answer"))["done"]
+        assert feed.published == []
+
+    feed = Made()
+    serve(feed, talk)
+
+
+def test_a_mark_and_an_acknowledgement_are_published() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        feed.tell(ERROR)
+        async with connect(session, url) as socket:
+            number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
+            await socket.send_json({"do": "mark", "note": "hose moved"})
+            assert (await until(socket, "answer"))["done"]
+            await socket.send_json({"do": "acknowledge", "number": number})
+            assert (await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"]))
+        assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
+
+    feed = Made()
+    serve(feed, talk, permitted=("mark", "acknowledge"))
+
+
+def test_a_recorded_session_is_steered_by_each_viewer_alone() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as one, connect(session, url) as other:
+            await one.send_json({"do": "hold", "value": 1})
+            await one.send_json({"do": "seek", "value": 5.0})
+            state = await until(one, "state", lambda state: state["position"] == 5.0)
+            assert state["is_held"]
+            assert (await until(other, "state", lambda state: state["position"] > 0.4))["position"] < 4.0
+            await one.send_json({"do": "seek", "value": 2.0})
+            await until(one, "reset")
+            rows = await until(one, "rows")
+            assert rows["times"][-1] == pytest.approx(2.0)
+            await other.send_json({"do": "speed", "value": 10.0})
+            assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
+
+    serve(Made(end=9.0), talk)
+
+
+def test_when_time_is_set_back_the_page_begins_anew() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            await until(socket, "rows")
+            feed.store.clear()
+            feed.rows(5)
+            await until(socket, "reset")
+            assert (await until(socket, "rows"))["head"][3] == 5
+
+    feed = Made()
+    serve(feed, talk)

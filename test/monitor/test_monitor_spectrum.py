@@ -1,0 +1,70 @@
+"""The spectrum against scipy and known signals: frequencies of sines, damping of shaken oscillators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter, welch
+
+from boom_twin.monitor.modes import Modes
+from boom_twin.monitor.spectrum import SEGMENT, spectrum
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
+
+RATE = 200.0
+TIMES = np.arange(int(40 * RATE)) / RATE
+
+
+def test_the_density_is_scipys() -> None:
+    values = np.random.default_rng(1).normal(size=(len(TIMES), 2))
+    found = spectrum(TIMES, values)
+    assert found is not None
+    frequencies, densities = welch(values, RATE, "hann", round(SEGMENT * RATE), detrend="constant", axis=0)
+    assert found.frequencies == pytest.approx(frequencies)
+    assert found.densities[1:] == pytest.approx(densities[1:], rel=1e-6)
+
+
+@pytest.mark.parametrize("frequency", [0.97, 1.06, 2.3, 5.4, 11.1])
+def test_a_sine_is_a_peak_at_its_frequency_with_its_power(frequency: float) -> None:
+    noise = np.random.default_rng(2).normal(0.0, 0.01, (len(TIMES), 2))
+    found = spectrum(TIMES, noise + np.outer(np.sin(2 * np.pi * frequency * TIMES), (1.0, 0.0)))
+    assert found is not None
+    highest = max(found.peaks, key=lambda peak: peak.density)
+    assert highest.frequency == pytest.approx(frequency, abs=0.02)
+    assert found.densities[:, 0].sum() * found.frequencies[1] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(1.06, 0.02), (2.3, 0.03), (5.4, 0.01)])
+def test_the_damping_of_a_shaken_oscillator_is_found(frequency: float, damping: float) -> None:
+    found = []
+    for seed in range(12):
+        pole = 2 * np.pi * frequency / RATE * (-damping + 1j * np.sqrt(1 - damping**2))
+        push = np.random.default_rng(seed).normal(size=len(TIMES))
+        values = lfilter([1.0], [1.0, -2.0 * np.exp(pole).real, abs(np.exp(pole)) ** 2], push)
+        spectra = spectrum(TIMES, np.stack([values, 0.5 * values], axis=1))
+        assert spectra is not None
+        found.append(max(spectra.peaks, key=lambda peak: peak.density))
+    assert np.median([peak.frequency for peak in found]) == pytest.approx(frequency, rel=0.02)
+    assert np.nanmedian([peak.damping for peak in found]) == pytest.approx(damping, rel=0.4)
+
+
+def test_rows_without_a_value_and_uneven_times_do_no_harm() -> None:
+    random = np.random.default_rng(3)
+    times = TIMES + random.uniform(-2e-4, 2e-4, len(TIMES))
+    values = np.stack([np.sin(2 * np.pi * 2.3 * times)] * 2, axis=1)
+    values[500:520] = np.nan
+    found = spectrum(times, values)
+    assert found is not None and found.peaks[0].frequency == pytest.approx(2.3, abs=0.01)
+
+
+def test_less_than_a_segment_has_no_spectrum() -> None:
+    assert spectrum(TIMES[:1000], np.zeros((1000, 2))) is None
+    assert spectrum(np.zeros(0), np.zeros((0, 2))) is None
+
+
+def test_natural_frequencies_follow_the_posture() -> None:
+    scene = load_scene()
+    modes, strokes = Modes(scene), strokes_of_posture(scene, "arch")
+    first = modes.at(strokes)
+    assert first == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
+    assert modes.at(strokes + 0.001) is first and modes.at(strokes + 0.02) != first

@@ -1,0 +1,133 @@
+"""The monitor's feed over DDS: rows, lamps and events, as publishers beside it send them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from boom_twin.io.topics import Output, load_topics
+from boom_twin.monitor.lamps import Level, overall
+from boom_twin.records import Stream
+
+TOPICS = load_topics()
+EPOCH = 1_700_000_000
+
+
+class Rig:
+    """Publishers of what the node would publish, and a subscriber of events."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from rcl_interfaces.msg import Log
+
+        from boom_twin.ros.qos import qos_profile
+        from boom_twin.ros.types import message_class
+
+        self.node, self.events = rclpy.create_node("beside"), []
+        wanted: dict[Any, Any] = {**TOPICS.outputs, Stream.IMU: TOPICS.inputs[Stream.IMU]}
+        self._kinds = {role: message_class(topic.type) for role, topic in wanted.items()}
+        self._publishers = {
+            role: self.node.create_publisher(self._kinds[role], topic.absolute, qos_profile(topic.qos))
+            for role, topic in wanted.items()
+        }
+        self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
+
+    def is_heard(self) -> bool:
+        shown = set(self._publishers) - {Output.CHANGES}
+        return all(self._publishers[role].get_subscription_count() for role in shown)
+
+    def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:
+        message = self._kinds[role]()
+        message.header.stamp.sec, message.header.stamp.nanosec = EPOCH, nanosec
+        fill(message)
+        self._publishers[role].publish(message)
+
+
+def until(feed: Any, condition: Callable[[], Any]) -> None:
+    end = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < end
+        feed.poll()
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
+    from boom_twin.ros.monitor import TopicFeed
+
+    feed, rig = TopicFeed(TOPICS), Rig()
+    until(feed, rig.is_heard)
+    yield feed, rig
+    feed.close()
+    rig.node.destroy_node()
+
+
+def test_rows_come_from_the_topics(pair: tuple[Any, Rig]) -> None:
+    feed, rig = pair
+
+    def displacement(message: Any) -> None:
+        message.vector.x, message.vector.z = 0.5, -0.25
+
+    def measured(message: Any) -> None:
+        message.linear_acceleration.x, message.linear_acceleration.z = 1.0, 9.0
+
+    def residual(message: Any) -> None:
+        message.name = ["tip_imu_x", "tip_imu_z"]
+        message.position, message.velocity, message.effort = [0.25, -0.5], [1.0, -2.0], [0.25, 0.25]
+
+    rig.send(Output.TIP_DISPLACEMENT, 5_000_000, displacement)
+    until(feed, lambda: "displacement" in feed.store.tables)
+    assert feed.store.epoch == EPOCH * 10**9 + 5_000_000
+    assert feed.store.tables["displacement"].rows(0, 1)[1].tolist() == [[0.5, -0.25]]
+    rig.send(Stream.IMU, 10_000_000, measured)
+    until(feed, lambda: len(feed.catch._measured) == 1)
+    rig.send(Output.RESIDUALS, 10_000_000, residual)
+    until(feed, lambda: "force" in feed.store.tables)
+    times, values = feed.store.tables["force"].rows(0, 1)
+    assert times[0] == pytest.approx(0.005) and values.tolist() == [[1.0, 9.0, 0.75, 9.5, 0.25, 0.25]]
+
+
+def test_lamps_come_from_diagnostics_and_go_stale_with_them(pair: tuple[Any, Rig], monkeypatch: pytest.MonkeyPatch) -> None:
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    feed, rig = pair
+
+    def told(message: Any) -> None:
+        message.status = [DiagnosticStatus(name="boom_twin: model", level=DiagnosticStatus.ERROR, message="no pivot")]
+
+    rig.send(Output.DIAGNOSTICS, 0, told)
+    until(feed, lambda: feed.store.board(0.0).nodes)
+    now = feed.now()
+    assert overall(feed.store.board(now).groups(now)) == (Level.ERROR, "model: no pivot")
+    assert overall(feed.store.board(now).groups(now + 10.0))[0] == Level.STALE
+
+
+def test_an_event_is_published_with_the_stamp_of_the_newest_row_and_shown(pair: tuple[Any, Rig]) -> None:
+    import rclpy
+
+    feed, rig = pair
+    rig.send(Output.TIP_DISPLACEMENT, 20_000_000, lambda message: None)
+    until(feed, lambda: feed.store.newest > 0.014)
+
+    def heard() -> bool:
+        rclpy.spin_once(rig.node, timeout_sec=0.0)
+        return bool(rig.events)
+
+    until(feed, lambda: rig.node.count_subscribers(TOPICS.events.absolute) == 2)
+    feed.publish("mark: hose moved")
+    until(feed, heard)
+    event = rig.events[0]
+    assert (event.msg, event.stamp.sec, event.stamp.nanosec) == ("mark: hose moved", EPOCH, 20_000_000)
+    until(feed, lambda: any(alarm.name == "event" for alarm in feed.store.alarms.all))
+
+
+def test_time_set_back_begins_anew(pair: tuple[Any, Rig]) -> None:
+    feed, rig = pair
+    rig.send(Output.TIP_DISPLACEMENT, 30_000_000, lambda message: setattr(message.header.stamp, "sec", EPOCH + 10))
+    until(feed, lambda: feed.store.newest > 5.0)
+    rig.send(Output.TIP_DISPLACEMENT, 40_000_000, lambda message: None)
+    until(feed, lambda: feed.store.generation == 1)
+    assert feed.store.newest == 0.0 and list(feed.store.tables) == ["displacement"]
