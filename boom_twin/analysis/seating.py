@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..chain.clearance import axis_of
@@ -20,15 +22,26 @@ def clamp_pins(state: State) -> None:
 
 
 def release_pins(plan: Plan, state: State) -> None:
-    """Put every clamped journal to the side where its force presses it, and let contact hold it."""
+    """Let contact hold every clamped journal, as deep in its bush as its force presses it, with no clearance yet."""
     for row, memory in zip(plan.tables.clearances, state.contacts, strict=True):
         offset = state.z[row.z : row.z + 2]
         distance = float(np.hypot(*offset))
         if distance > 0.0:
-            depth = (CLAMP * distance / row.stiffness) ** (1.0 / row.exponent)
-            offset *= (row.gap + depth) / distance
+            offset *= (CLAMP * distance / row.stiffness) ** (1.0 / row.exponent) / distance
         memory[SPRING], memory[CLOSED], memory[APPROACH] = 0.0, 1.0, SLOWEST
+
+
+def loosen_pins(plan: Plan, state: State, share: float, more: float) -> Plan:
+    """Move every journal outwards by `more` of its clearance; returns the boom with `share` of all clearances."""
+    worn = plan.tables.clearances.copy()
+    for row in worn:
+        offset = state.z[row.z : row.z + 2]
+        distance = float(np.hypot(*offset))
+        if distance > 0.0:
+            offset *= 1.0 + more * row.gap / distance
         state.history[X, row.z : row.z + 2] = offset
+        row.gap *= share
+    return replace(plan, tables=plan.tables._replace(clearances=worn))
 
 
 def linearise_pins(plan: Plan, state: State) -> None:

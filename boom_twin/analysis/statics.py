@@ -18,12 +18,13 @@ from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_
 from ..scene.parts import Scene
 from .frequencies import Mode, constraints, natural_modes, negative_pivots
 from .posture import rigid_tip, set_undeformed
-from .seating import clamp_pins, linearise_pins, release_pins
+from .seating import clamp_pins, linearise_pins, loosen_pins, release_pins
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
 LONGEST_INCREMENT = 0.1  # rad in one pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full load at once fails, and the smallest that is tried
+LEAST_SHARE = 1e-3  # of the clearances, likewise
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,8 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then gradually, both with ideal pins; then those with clearance are seated.
-    Histories are left without motion.
+    The full load at once is tried first, then gradually, both with ideal pins; then those with clearance are let go,
+    likewise. Histories are left without motion.
     """
     drive, where = plan.closed_lengths + strokes, ", ".join(f"{stroke:.4f}" for stroke in strokes)
     state.drives[0], state.drives[1], state.pace[0] = drive, 0.0, 0
@@ -129,7 +130,7 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
             )
     if plan.pins:
         release_pins(plan, state)
-        if not _rests(plan, state, work, drive, 1.0):
+        if _loosen_gradually(plan, state, work, drive) < 1.0:
             raise SolverError(
                 f"no equilibrium at strokes {where} m with clearance in {', '.join(plan.pins)}, though there is one with ideal "
                 "pins. Check radial_clearance (m), and how near the posture is to a dead centre."
@@ -143,6 +144,19 @@ def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float
     while share < 1.0 and step >= LEAST_LOAD:
         z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
         if _rests(plan, state, work, drive, aim):
+            share, step = aim, 2.0 * step
+        else:
+            state.z[:], state.history[:] = z, history
+            step *= 0.5
+    return share
+
+
+def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
+    """Follow the equilibrium from no clearance to all of it, at once if that goes; returns the share that was reached."""
+    share, step = 0.0, 1.0
+    while share < 1.0 and step >= LEAST_SHARE:
+        z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
+        if _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0):
             share, step = aim, 2.0 * step
         else:
             state.z[:], state.history[:] = z, history

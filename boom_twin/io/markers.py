@@ -131,4 +131,3 @@ def force_colour(share: float) -> Colour:
     end = TENSION if share > 0.0 else COMPRESSION
     red, green, blue = (NO_FORCE + min(abs(share), 1.0) * (end - NO_FORCE)).tolist()
     return red, green, blue, 1.0
-

@@ -51,4 +51,5 @@ def _unknown(at: str, joints: tuple[Joint | None, ...], there: list[str]) -> tup
     number = int(form[2])
     if not 1 <= number <= len(joints):
         return f"the boom has joints and cylinders 1 to {len(joints)}", f"Give one of {', '.join(there)}."
-    return f"joint {number} is of kind A and has no links", f"Give one of {', '.join(names_of(0, joints[0]))}."  # type: ignore[arg-type]
+    own = [name for name in there if name.split(".")[0] in (f"joint_{number}", f"cylinder_{number}")]
+    return f"joint {number} is of kind A and has no links", f"Give one of {', '.join(own)}."

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracle import booms
+from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin.analysis.batch import Batch
 from boom_twin.analysis.march import march
@@ -21,12 +23,12 @@ def drive(times):
     return START + np.outer(times**2, [0.05, -0.02, 0.04, 0.01]), np.outer(2 * times, [0.05, -0.02, 0.04, 0.01])
 
 
-def softer(factor):
+def softer(factor, scene=SCENE):
     """The default scene with another oil spring in cylinder 2."""
-    joint = SCENE.joints[1]
+    joint = scene.joints[1]
     cylinder = joint.cylinder.model_copy(update={"k": joint.cylinder.k * factor})
-    joints = (SCENE.joints[0], joint.model_copy(update={"cylinder": cylinder}), *SCENE.joints[2:])
-    return SCENE.model_copy(update={"joints": joints})
+    joints = (scene.joints[0], joint.model_copy(update={"cylinder": cylinder}), *scene.joints[2:])
+    return scene.model_copy(update={"joints": joints})
 
 
 @pytest.mark.parametrize("cores", [1, 2])
@@ -42,6 +44,20 @@ def test_each_boom_is_stepped_as_it_is_alone(cores):
         assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
         assert np.array_equal(first[i][8:10], alone.tip[0])
     assert np.ptp(rows[:, -1, 9]) > 1e-3
+
+
+def test_booms_on_worn_pins_are_stepped_as_each_is_alone():
+    """Sub-steps and what pins remember are each boom's own."""
+    worn = with_pins(booms.document(), [*RODS, "joint_3.Q"], friction=0.1)
+    scenes = [softer(factor, worn) for factor in (1.0, 0.6, 1.7)]
+    batch = Batch([compile_scene(scene) for scene in scenes], 2)
+    batch.settle(START, ANGLES)
+    rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=3)
+    assert rows.shape == (3, STEPS // 3, 17 + 4 * 5) and not batch.failures()
+    for i, scene in enumerate(scenes):
+        alone = march(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
+        assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
+        assert np.array_equal(rows[i][:, 17:].reshape(-1, 5, 4), alone.pins[1:])
 
 
 def test_a_boom_that_fails_leaves_the_others_alone():
@@ -60,6 +76,8 @@ def test_other_structures_are_refused():
     rigid = compile_scene(SCENE.model_copy(update={"modes": 0}))
     with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
         Batch([compile_scene(SCENE), rigid])
+    with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
+        Batch([compile_scene(SCENE), compile_scene(with_pins(booms.document(), RODS))])
     with pytest.raises(UsageError, match="at least one"):
         Batch([])
     batch = Batch([compile_scene(SCENE)])

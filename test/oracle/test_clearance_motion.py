@@ -16,12 +16,12 @@ from boom_twin.plan.compile import compile_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
 MOVE, END = 0.2, 0.3  # s
-TRAVEL = (0.03, 0.02)  # m
-HEADINGS = np.array([0.5, -0.3])
+TRAVEL = (0.03, 0.02, 0.02, 0.02)  # m
+HEADINGS = np.array([0.5, -0.3, -0.6, -1.0])
 
 
-def both(count, step, treatment="contact", clearance=1e-4, end=END):
-    """The model in steps of `step`, and the oracle at the same rows, every 4 ms."""
+def both(count, step, treatment="contact", clearance=1e-4, end=END, rows=4e-3):
+    """The model in steps of `step`, and the oracle at the same rows, every `rows` s."""
     index, headings = count - 1, HEADINGS[:count]
     spec = rigid.document(count, index) | {"postures": {"test": np.degrees(headings).tolist()}}
     scene = with_pins(spec, [RODS[index]], clearance, treatment)
@@ -35,7 +35,7 @@ def both(count, step, treatment="contact", clearance=1e-4, end=END):
         rates[:, index] = [rate for _, rate in found]
         return strokes, rates
 
-    every = round(4e-3 / step)
+    every = round(rows / step)
     moved = march(scene, drive, end, step, every, angles=np.diff(headings, prepend=0.0))
     row = compile_scene(scene).tables.clearances[0]
     contact = Contact(row.stiffness, HYSTERESIS["lankarani-nikravesh"](0.9), row.gap, smoothing=SMOOTH)
@@ -54,6 +54,19 @@ def test_the_path_is_the_oracles(count):
     first = flying[flying - flying[0] == np.arange(len(flying))]
     assert np.hypot(*(moved.pins[first, 0, :2] - found.offset[first]).T).max() < 2e-6
     assert len(flying) > len(first)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_the_orbit_of_the_journal_is_the_oracles(count):
+    """Every kind of joint, from rest through the first flights (joint 1: up to them).
+
+    They differ by where contact is taken to begin: 4 um before the rim.
+    """
+    moved, found = both(count, 1e-3, end=0.044, rows=1e-3)
+    off = np.hypot(*(moved.pins[:, 0, :2] - found.offset).T)
+    assert off.max() < 5e-6
+    assert np.median(off) < 5e-7
+    assert np.abs(moved.tip - found.tip).max() < 4e-6
 
 
 def test_the_error_falls_with_the_step():

@@ -102,7 +102,7 @@ GOOD = Figures(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, o
 def judged(changes: dict[str, float], age: float = 0.0, sensor: Sensor = SENSOR) -> tuple[Level, str]:
     """Level and message after ten seconds of it."""
     judge = SensorJudge(sensor)
-    figures = Figures(**{name: changes.get(name, getattr(GOOD, name)) for name in Figures.__dataclass_fields__})  # type: ignore[arg-type]
+    figures = Figures(**{name: changes.get(name, getattr(GOOD, name)) for name in Figures.__dataclass_fields__})
     for now in range(10):
         status = judge.status(figures, age, Thresholds(), float(now), 1e9 + now)
     return status.level, status.message

@@ -1,5 +1,7 @@
 """A hydraulic cylinder on a fixed barrel pin: oil spring and damper between two rigid bodies on one line.
 
+About the pin, barrel and rod together have
+
     I(l) = I_b + m_b a_b^2 + I_r + m_r (l - a_r)^2 ,      moment of mass = m_b a_b + m_r (l - a_r) .
 """
 
