@@ -19,7 +19,7 @@ class Recent:
     Parameters
     ----------
     channels : dict of Stream to tuple of str
-        See `boom_twin.zeros.channels_of`.
+        See `boom_twin.records.channels_of`.
     """
 
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:

@@ -27,6 +27,15 @@ class Stream(Enum):
     IMU = "tip_imu"
 
 
+def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
+    """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
+    return {
+        Stream.STROKES: tuple(f"cylinder_{i + 1}" for i in range(joints)),
+        Stream.ANGLES: tuple(f"joint_{i + 1}" for i in range(joints)),
+        Stream.IMU: ("tip_imu_x", "tip_imu_z"),
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Sample:
     """One message of the rig, mapped to the scene's order and units.

@@ -16,13 +16,13 @@ from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
 from .recent import Recent
-from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream
+from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .requests import Requests
 from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
 from .stray import Strays
-from .zeros import Zeros, channels_of
+from .zeros import Zeros
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",

@@ -12,22 +12,13 @@ from .records import Array, Stream
 KEPT = 16  # sets of zeros that late samples may still need
 
 
-def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
-    """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
-    return {
-        Stream.STROKES: tuple(f"cylinder_{i + 1}" for i in range(joints)),
-        Stream.ANGLES: tuple(f"joint_{i + 1}" for i in range(joints)),
-        Stream.IMU: ("tip_imu_x", "tip_imu_z"),
-    }
-
-
 class Zeros:
     """The zeros of all sensors.
 
     Parameters
     ----------
     channels : dict of Stream to tuple of str
-        See `channels_of`.
+        See `boom_twin.records.channels_of`.
 
     Attributes
     ----------

@@ -16,8 +16,9 @@ from .program import JOINT_A, JOINT_B, Motion
 from .status import NOT_CONVERGED, NOT_FINITE, OK
 from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-TICKS = np.int64(32)  # of a step: its shortest sub-step, so that it cannot take longer than 32
-SHORTEST = 1e-5  # s, of a sub-step likewise
+TICKS = np.int64(4096)  # of a step, the grid of its sub-steps
+MOST = np.int64(32)  # sub-steps that a step is divided into for their error; for passes that fail, down to SHORTEST
+SHORTEST = 1e-5  # s, of a sub-step
 EASY = 0.1  # of the error allowed: the next sub-step is twice as long
 LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
 
@@ -50,6 +51,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     """
     history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
     part, least = first_part(t, state, scheme), least_part(t, scheme)
+    coarse = max(least, TICKS // MOST)
     now = scheme
     while done < TICKS:
         if part < TICKS:
@@ -76,7 +78,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             left -= 1
         total += passes - left
         error = coarseness(t, state, work, now)
-        if part > least and (status != OK or error > 1.0):
+        if (status != OK and part > least) or (error > 1.0 and part > coarse):
             part //= 2
             for i in range(state.z.shape[0]):
                 state.z[i] = history[X, i]
@@ -99,7 +101,7 @@ def first_part(t, state, scheme):
     """Ticks of the first sub-step: all, unless the last step was divided to its end."""
     if t.clearances.shape[0] == 0 or least_part(t, scheme) == TICKS or state.pace[0] == 0:
         return TICKS
-    return max(state.pace[0], least_part(t, scheme))
+    return max(state.pace[0], least_part(t, scheme), TICKS // MOST)
 
 
 @inner

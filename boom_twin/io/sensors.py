@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..errors import Fault
-from ..records import Mount, Stream
-from ..zeros import channels_of
+from ..records import Mount, Stream, channels_of
 
 GRAVITY = 9.80665
 """m/s^2 of one g, by definition."""

@@ -99,7 +99,7 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
     },
     ContactLaw: {
         "law": "hertz, lankarani-nikravesh, flores or hunt-crossley",
-        "exponent": "the exponent of the penetration, 1 to 3; 1.5 for Hertz's",
+        "exponent": "the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's",
         "restitution": "the coefficient of restitution, above 0 and at most 1",
         "friction": "Coulomb's coefficient of friction, 0 to 2",
         "bush": "a block with E (Pa) and nu of the bush, if it is not of the boom's material",

@@ -115,7 +115,7 @@ class ContactLaw(Part):
     """How journal and bush touch: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
 
     law: Literal["hertz", "lankarani-nikravesh", "flores", "hunt-crossley"] = "lankarani-nikravesh"
-    exponent: Annotated[float, Field(ge=1, le=3)] = 1.5
+    exponent: Annotated[float, Field(ge=1.3, le=3)] = 1.5
     restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
     friction: Annotated[float, Field(ge=0, le=2)] = 0.0
     bush: Material | None = None

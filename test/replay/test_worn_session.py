@@ -1,0 +1,27 @@
+"""The bundled session, recorded with ideal pins, replayed with worn ones: the model bears their impacts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle import booms
+from oracle.clearance.scenes import RODS, with_pins
+
+from boom_twin import replay
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+
+
+@pytest.mark.slow
+def test_no_sample_is_lost_and_every_pin_is_told(tmp_path):
+    """The lightly loaded pin of cylinder 4 travels round its bush twice, within the long steps of the look ahead."""
+    found = replay(SESSION, with_pins(booms.document(), RODS), tmp_path)
+    assert found.summary["samples"] == 12000 and found.summary["dropped"] == 0
+    assert "model" not in found.summary["events"]
+    pins = np.array([prediction.clearances for prediction in found.recording.predictions])
+    assert pins.shape == (12000, 4, 4)
+    assert np.hypot(pins[:, :, 0], pins[:, :, 1]).max() < 1.5e-4
+    assert np.ptp(np.arctan2(pins[:, 3, 1], pins[:, 3, 0])) > 1.0
+    assert (tmp_path / "orbits.png").stat().st_size > 10_000
