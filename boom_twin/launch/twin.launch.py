@@ -24,6 +24,7 @@ ARGUMENTS = [
         default_value=PathJoinSubstitution([CONFIG, "twin.yaml"]),
         description="parameters of the node; `scene` above wins",
     ),
+    DeclareLaunchArgument("mapping", default_value="", description="names and units of the rig's own sensors; empty: as usual"),
     DeclareLaunchArgument("namespace", default_value="", description="of the node and of all its topics, for several booms"),
     DeclareLaunchArgument("use_sim_time", default_value="false", description="time from /clock instead of the machine's"),
     DeclareLaunchArgument("rviz", default_value="false", description="start RViz"),
@@ -45,6 +46,7 @@ def twin() -> Node:
     """The node; it configures and activates itself."""
     own = {
         "scene": ParameterValue(LaunchConfiguration("scene"), value_type=str),
+        "mapping": ParameterValue(LaunchConfiguration("mapping"), value_type=str),
         "use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool),
     }
     return Node(
@@ -87,5 +89,6 @@ def rviz() -> Node:
 def recorder(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """The recorder, if a folder is given."""
     out = LaunchConfiguration("record").perform(context)
-    command = [sys.executable, "-m", "boom_twin.cli.main", "record", "--out", out]
+    mapping = LaunchConfiguration("mapping").perform(context)
+    command = [sys.executable, "-m", "boom_twin.cli.main", "record", "--out", out, *(["--mapping", mapping] if mapping else [])]
     return [ExecuteProcess(cmd=command, name="record", output="screen")] if out else []
