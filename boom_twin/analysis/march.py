@@ -6,15 +6,18 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..chain.plain import new_product
+from ..chain.program import State, Work
 from ..chain.status import OK, SENTENCES
 from ..chain.step import run
 from ..errors import UsageError
 from ..physics import integrators
 from ..plan.compile import BasisName, compile_scene
+from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
@@ -145,26 +148,12 @@ def march(
     plan = compile_scene(scene, basis)
     if plan.pins and method.product == "plain":
         raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
-    family = FAMILIES[method.integrator]
-    depth = integrators.depth_of(family)
-    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
-    first = drive(np.zeros(1))[0][0]
+    depth, first = integrators.depth_of(FAMILIES[method.integrator]), drive(np.zeros(1))[0][0]
     start, work = plan.state(depth), plan.work(depth)
-    product = new_product(plan.tables) if method.product == "plain" else None
     settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
-    steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
-    seconds = []
-    for _ in range(repeats):
-        state = type(start)(*(array.copy() for array in start))
-        out = np.full((rows + 1, row_width(plan)), np.nan)
-        out[0] = first_row(plan, state)
-        begun = time.perf_counter()
-        status, row, total, jolt, shake = run(
-            plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, family, method.parameter,
-            method.tolerance, np.int64(method.passes), product, out[1:],
-        )  # fmt: skip
-        seconds.append(time.perf_counter() - begun)
-    found, done = taken_apart(plan, out), max(int(row), 1) * every
+    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
+    runs = [_stepped(plan, start, work, method, step, every, strokes, rates) for _ in range(repeats)]
+    last, found = runs[-1], taken_apart(plan, runs[-1].out)
     tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return March(
@@ -174,9 +163,38 @@ def march(
         joints=found.joints,
         cylinder_forces=found.cylinder_forces,
         pins=found.pins,
-        seconds=statistics.median(seconds),
+        seconds=statistics.median(each.seconds for each in runs),
         steps=rows * every,
-        passes=total / done,
-        status="ok" if status == OK else SENTENCES[status],
-        doubt=doubt(jolt, shake, travel, step * rows * every * step) if status == OK else "",
+        passes=last.passes / (max(last.row, 1) * every),
+        status="ok" if last.status == OK else SENTENCES[last.status],
+        doubt=doubt(last.jolt, last.shake, travel, step * rows * every * step) if last.status == OK else "",
     )
+
+
+class _Run(NamedTuple):
+    """Rows, what `chain.step.run` returns, and the wall time, s."""
+
+    out: Array
+    status: int
+    row: int
+    passes: int
+    jolt: float
+    shake: float
+    seconds: float
+
+
+def _stepped(
+    plan: Plan, start: State, work: Work, method: Method, step: float, every: int, strokes: Array, rates: Array
+) -> _Run:
+    """Step a copy of `start` along its strokes (m) and their rates (m/s), shape (steps, n)."""
+    rows, state = len(strokes) // every, State(*(array.copy() for array in start))
+    out = np.full((rows + 1, row_width(plan)), np.nan)
+    out[0] = first_row(plan, state)
+    product = new_product(plan.tables) if method.product == "plain" else None
+    steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
+    begun = time.perf_counter()
+    status, row, passes, jolt, shake = run(
+        plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, FAMILIES[method.integrator],
+        method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
+    )  # fmt: skip
+    return _Run(out, int(status), int(row), int(passes), jolt, shake, time.perf_counter() - begun)
