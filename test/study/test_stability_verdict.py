@@ -67,7 +67,8 @@ def made_up(step=1e-2, duration=4.0, growing=0.0, ring=0.0, shift=0.0):
     tip = np.stack([wave + shift, 0.0 * wave], axis=1)
     acceleration = np.stack([-((2 * np.pi) ** 2) * wave + signs, 0.0 * wave], axis=1)
     forces = np.full((len(times), 2), 1e4)
-    return March(times, tip, acceleration, forces * 0.0, forces, 1.0, len(times) - 1, 1.5, "ok")
+    no_pins = np.zeros((len(times), 0, 4))
+    return March(times, tip, acceleration, forces * 0.0, forces, no_pins, 1.0, len(times) - 1, 1.5, "ok")
 
 
 def test_the_same_motion_has_no_error():
