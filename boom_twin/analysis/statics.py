@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -140,23 +141,24 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
 
 def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
     """Follow the equilibrium from no gravity towards all of it; returns the share that was reached."""
-    share, step = 0.0, FIRST_LOAD
-    while share < 1.0 and step >= LEAST_LOAD:
-        z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
-        if _rests(plan, state, work, drive, aim):
-            share, step = aim, 2.0 * step
-        else:
-            state.z[:], state.history[:] = z, history
-            step *= 0.5
-    return share
+    return _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
 
 
 def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
     """Follow the equilibrium from no clearance to all of it, at once if that goes; returns the share that was reached."""
-    share, step = 0.0, 1.0
-    while share < 1.0 and step >= LEAST_SHARE:
+
+    def rests(share: float, aim: float) -> bool:
+        return _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0)
+
+    return _gradually(state, 1.0, LEAST_SHARE, rests)
+
+
+def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:
+    """Follow what `rests` solves from share to share, in steps that halve down to `least` where it fails and double."""
+    share = 0.0
+    while share < 1.0 and step >= least:
         z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
-        if _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0):
+        if rests(share, aim):
             share, step = aim, 2.0 * step
         else:
             state.z[:], state.history[:] = z, history
