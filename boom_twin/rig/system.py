@@ -55,8 +55,8 @@ class Boom:
     container, system : object
         Exudyn's SystemContainer and MainSystem.
     sections : list of BuiltSection
-    shear_over_axial : float
-        GA over EA of all beams.
+    nodally_exact : bool
+        Whether a straight, lightly bent beam is exact at its nodes however few they are.
     drives : list of (int, str)
         Connector of each cylinder, and the name of its length parameter.
     """
@@ -66,7 +66,7 @@ class Boom:
     system: Any
     gravity: list[float]
     ground: int
-    shear_over_axial: float
+    nodally_exact: bool
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)
 
