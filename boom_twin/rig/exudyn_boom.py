@@ -11,11 +11,11 @@ J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything tha
 from __future__ import annotations
 
 from ..records import Array
-from ..scene.ideal import refuse_clearance
 from ..scene.parts import Scene
 from .assembly import gravity_in_base, section_frames
 from .joints import add_joint, add_pivot
 from .peer import exudyn, items
+from .play import refuse_other_pins
 from .sections import add_section
 from .system import Boom
 
@@ -33,9 +33,9 @@ def build(scene: Scene, strokes: Array, elements: int = 16, nodally_exact: bool 
     Raises
     ------
     UsageError
-        The scene has pins with clearance.
+        The scene has pins with clearance other than of rods, or on a rod without mass.
     """
-    refuse_clearance(scene, "the virtual rig")
+    refuse_other_pins(scene)
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))

@@ -104,7 +104,12 @@ def move(
 def settle(boom: Boom, strokes: Array) -> None:
     """Assemble the boom and bring it to its equilibrium; it is the start of what follows."""
     boom.system.Assemble()
-    find_equilibrium(boom.system, f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m")
+    aim = f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m"
+    find_equilibrium(boom.system, aim)
+    if boom.bushes:
+        for bush in boom.bushes:
+            bush.release(boom.system)
+        find_equilibrium(boom.system, f"{aim} with play in its pins")
 
 
 def _ratio(name: str, whole: float, step: float) -> int:

@@ -119,6 +119,8 @@ def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
     def before_step(_: Any, at: float) -> bool:
         begun = time.perf_counter()
         hand_over(round(at / step))
+        for bush in boom.bushes:
+            bush.watch(boom.system)
         spent[0] += time.perf_counter() - begun
         return True
 
