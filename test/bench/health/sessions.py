@@ -12,8 +12,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import Pool
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process per core has no use for more
@@ -30,16 +30,19 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.named import parameter, parameter_names
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)
+STEP_OF_PLAY, SCHEME_OF_PLAY = 2e-3, Scheme(modified=False)
 NICE = 10
+AT_ONCE = 20  # sessions of one process: what Exudyn does not give back, its end does
 
 
 def simulated(job: Job) -> dict[str, np.ndarray]:
     """The session of one motion, as arrays."""
-    scene = with_faults(instance(job.instance), [] if job.fault is None else [job.fault])
+    boom = with_faults(instance(job.instance), [] if job.fault is None else [job.fault])
     programme = random_programme(load_scene(), job.posture, job.duration, job.seed)
-    resting = at_rest(scene, np.array(programme.first), ELEMENTS, nodally_exact=True)
-    rows, _ = move(resting, programme, job.duration, STEP, STEP, SCHEME)
-    session = observe(scene, programme, rows, Sensors(), job.seed)
+    resting = at_rest(boom, np.array(programme.first), ELEMENTS, nodally_exact=True)
+    step, scheme = (STEP_OF_PLAY, SCHEME_OF_PLAY) if resting.boom.bushes else (STEP, SCHEME)
+    rows, _ = move(resting, programme, job.duration, step, step, scheme)
+    session = observe(boom, programme, rows, Sensors(), job.seed)
     return {**_arrays(session), **_programme_arrays(programme)}
 
 
@@ -73,8 +76,8 @@ def make_all(folder: Path, processes: int, first: int | None) -> None:
     stored.save_json(folder / "instances.json", parameters)
     todo = jobs()[:first]
     done: list[dict] = []
-    with ProcessPoolExecutor(processes, initializer=os.nice, initargs=(NICE,)) as pool:
-        for job, failure in zip(todo, pool.map(partial(make, folder=folder), todo), strict=True):
+    with Pool(processes, os.nice, (NICE,), AT_ONCE) as pool:
+        for job, failure in zip(todo, pool.imap(partial(make, folder=folder), todo), strict=True):
             if failure:
                 print(failure, file=sys.stderr, flush=True)
                 continue
