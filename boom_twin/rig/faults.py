@@ -90,7 +90,7 @@ class Fault:
         if not 0.0 <= self.onset < math.inf:
             raise UsageError(f"fault {self}: onset = {self.onset:g} s, must be finite and at least 0.")
         if self.is_physical and self.onset:
-            raise UsageError(f"fault {self}: a change of the boom holds from the start of a session. Leave out @{self.onset:g}.")
+            raise UsageError(f"fault {self}: changes of the boom hold from the start of a session. Leave out @{self.onset:g}.")
 
     def __str__(self) -> str:
         size = f":{self.size:g}" if self.size else ""

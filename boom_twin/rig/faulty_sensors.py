@@ -46,7 +46,7 @@ def _with_one(session: Session, fault: Fault, rng: np.random.Generator) -> Sessi
         column = fault.number - 1
         true = session.truth[name][:, column]
         values[after, column] = _spoiled(fault, session.truth["t"], values[:, column], true, after, rng)[after]
-    return replace(session, **{name: values})
+    return replace(session, joints=values) if name == "joints" else replace(session, strokes=values)
 
 
 def _spoiled(

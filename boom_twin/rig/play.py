@@ -104,7 +104,8 @@ def refuse_other_pins(scene: Scene) -> None:
         owners = (f"cylinder_{index + 1}", f"joint_{index + 1}")
         other = [pin.at for owner in owners for pin in scene.pins_of(owner) if not pin.at.endswith(".rod")]
         if other:
-            raise UsageError(f"clearance.pins = {', '.join(other)}: the virtual rig knows play in rod pins only. Leave them out.")
+            names = ", ".join(other)
+            raise UsageError(f"clearance.pins = {names}: the virtual rig knows play in rod pins only. Leave them out.")
         rod = joint.cylinder.rod
         if pin_with_play(scene, index) is not None and (rod is None or rod.mass == 0.0):
             raise UsageError(

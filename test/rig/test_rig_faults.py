@@ -36,7 +36,7 @@ def test_text_and_back(text, fault):
         ("cylinder_2.k:softer:30", "size = 30, must be above 0 and below 1, a share"),
         ("joint_1.sensor:stuck:3", "it has no size"),
         ("tip.payload:more:x", "size and onset must be numbers. Write CAUSE:KIND"),
-        ("tip.payload:more:20@5", "holds from the start of a session. Leave out @5"),
+        ("tip.payload:more:20@5", "hold from the start of a session. Leave out @5"),
         ("joint_1.sensor:bias:1@-1", "onset = -1 s, must be finite and at least 0"),
         ("cylinder_1.rod.clearance:play:0.2", "must be above 0 and below 0.005 m"),
     ],

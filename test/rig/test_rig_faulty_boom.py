@@ -81,5 +81,5 @@ def test_wrong_within_twice_the_share_and_repeatable():
 
 @pytest.mark.parametrize("share", [-0.01, 0.31, float("nan")])
 def test_wrong_by_too_much(share):
-    with pytest.raises(UsageError, match="must be from 0 to 0.3"):
+    with pytest.raises(UsageError, match=r"must be from 0 to 0\.3"):
         wrong_by(load_scene(), share, 0)

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.records import Stream
 from boom_twin.io.session import samples_of
+from boom_twin.records import Stream
 from boom_twin.rig.faults import parse
 from boom_twin.rig.faulty_sensors import SPIKE_SHARE, spoil
 from boom_twin.rig.session import EPOCH, Session

@@ -10,7 +10,7 @@ pytest.importorskip("exudyn")
 from boom_twin.analysis.simulate import simulate
 from boom_twin.analysis.statics import statics
 from boom_twin.errors import UsageError
-from boom_twin.rig import Move, Programme, Scheme, at_rest, move
+from boom_twin.rig import Move, Programme, at_rest, move
 from boom_twin.rig.play import contact_of
 from boom_twin.rig.probes import read
 from boom_twin.scene import load_scene

@@ -1,13 +1,13 @@
 """Sessions of the health benchmark as they lie on disk; needs no Exudyn.
 
-A file holds ``stamps``, ``angle_stamps`` (m,) ns; ``strokes``, ``joints`` (m, n) and ``imu`` (m, 2) as read, NaN where a reading
-is missing; the truth at the same instants as ``true_strokes``, ``true_joints``, ``true_forces`` (m, n), ``true_tip``,
-``true_tip_acc`` (m, 2), ``true_tip_angle`` (m,); and the programme as ``first`` (n,) strokes and ``moves`` (k, 4): cylinder from 0,
-start, duration, target. SI.
+A file holds ``stamps``, ``angle_stamps`` (m,) ns; ``strokes``, ``joints`` (m, n) and ``imu`` (m, 2) as read, NaN where a
+reading is missing; the truth at the same instants as ``true_strokes``, ``true_joints``, ``true_forces`` (m, n), ``true_tip``,
+``true_tip_acc`` (m, 2), ``true_tip_angle`` (m,); and the programme as ``first`` (n,) strokes and ``moves`` (k, 4): cylinder
+from 0, start, duration, target. SI.
 
-``index.json`` beside the files has an entry for each: ``file``, ``group``, ``instance`` (0 is the right model), ``cause``, ``kind``,
-``size``, ``onset`` (s; null when healthy), ``seed``, ``posture`` or ``base`` (the healthy file that a sensor fault was put on), and
-``duration`` (s). ``instances.json`` has the parameters of every instance by name.
+``index.json`` beside the files has an entry for each: ``file``, ``group``, ``instance`` (0 is the right model), ``cause``,
+``kind``, ``size``, ``onset`` (s), which are null of healthy ones, ``seed``, ``duration`` (s), and ``posture``, or ``base``: the
+healthy file that a sensor fault was put on. ``instances.json`` has the parameters of every instance by name.
 """
 
 from __future__ import annotations
