@@ -10,8 +10,11 @@ from .faults import Fault
 
 JOURNAL = 0.025  # m, radius of a pin that the scene does not list
 
+
 def with_faults(scene: Scene, faults: Sequence[Fault]) -> Scene:
     """`scene` with the physical ones of `faults`; those of sensors are passed over.
+
+    A pin that the scene does not list gets a journal of 25 mm radius.
 
     Raises
     ------
