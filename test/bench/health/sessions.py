@@ -17,7 +17,7 @@ from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process per core has no use for more
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process per core; and files repeat bit for bit
 
 import numpy as np
 import stored
