@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EADDRINUSE
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser, option=True)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
-    parser.add_argument("--port", type=int, default=PORT, help=f"({PORT}; 0: any that is free)")
+    parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     parser.add_argument(
         "--allow",
@@ -40,6 +41,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="what viewers may do: mark events, acknowledge alarms, start and stop a record(ing) (mark acknowledge)",
     )
     parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
+    parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help="remappings of the twin's topics, as for any node")
 
 
 def run(args: Namespace) -> int:
@@ -77,7 +80,7 @@ def _feed(args: Namespace) -> Iterator[Feed]:
     from ..ros.context import ros
     from ..ros.monitor import TopicFeed
 
-    with ros([]):
+    with ros(["--ros-args", *args.ros_args]):
         feed = TopicFeed(load_mapping(args.mapping), open_scene(args.scene) if args.scene else None)
         try:
             yield feed
@@ -107,17 +110,30 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
     stopped = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    if args.until_stdin_ends:
+        asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)
     runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     try:
-        site = web.TCPSite(runner, args.host, args.port)
-        await site.start()
+        await _listen(runner, args.host, args.port)
         port = runner.addresses[0][1]
         address = f"http://{args.host}:{port}/" + (f"?token={token}" if token else "")
         print(f"open {address}   (Ctrl-C ends it)", file=sys.stderr, flush=True)
         await stopped.wait()
     finally:
         await runner.cleanup()
+
+
+async def _listen(runner: Any, host: str, port: int | None) -> None:
+    """At `port`; without one at the usual one, or at any if that is taken."""
+    from aiohttp import web
+
+    try:
+        await web.TCPSite(runner, host, PORT if port is None else port).start()
+    except OSError as error:
+        if port is not None or error.errno != EADDRINUSE:
+            raise
+        await web.TCPSite(runner, host, 0).start()
 
 
 def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
