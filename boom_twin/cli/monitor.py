@@ -6,7 +6,7 @@ import os
 import sys
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from errno import EADDRINUSE
 from importlib.util import find_spec
 from pathlib import Path
@@ -70,8 +70,9 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         from ..monitor.bag import bag_feed
         from ..settings import load_settings
 
-        print("reading the session (compiles for up to a minute the first time) ..", file=sys.stderr)
-        yield bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), _progress, args.mapping)
+        print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
+        with closing(bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), args.mapping)) as feed:
+            yield feed
         return
     from ..ros.require import require_rclpy
 
@@ -81,11 +82,9 @@ def _feed(args: Namespace) -> Iterator[Feed]:
     from ..ros.monitor import TopicFeed
 
     with ros(["--ros-args", *args.ros_args]):
-        feed = TopicFeed(load_mapping(args.mapping), open_scene(args.scene) if args.scene else None)
-        try:
+        scene = open_scene(args.scene) if args.scene else None
+        with closing(TopicFeed(load_mapping(args.mapping), scene)) as feed:
             yield feed
-        finally:
-            feed.close()
 
 
 def _serve(args: Namespace, feed: Feed, desk: Any) -> None:
@@ -134,9 +133,3 @@ async def _listen(runner: Any, host: str, port: int | None) -> None:
         if port is not None or error.errno != EADDRINUSE:
             raise
         await web.TCPSite(runner, host, 0).start()
-
-
-def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
-    from tqdm import tqdm
-
-    return iter(tqdm(messages, total=total, unit="msg", desc="reading", disable=None, mininterval=0.2))

@@ -51,7 +51,7 @@ class Viewer:
 
     def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: Desk, analyst: Analyst) -> None:
         self._socket, self._feed, self._desk, self._analyst = socket, feed, desk, analyst
-        self._playback = None if feed.end is None else Playback(feed.end)
+        self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
         self._tables = 0
@@ -111,7 +111,8 @@ class Viewer:
         message = state(feed.store.board(now), now, position)
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
-        await self._say({**message, "is_recording": self._desk.is_recording})
+            message |= {"end": feed.end, "read": feed.store.newest}
+        await self._say({**message, "trouble": feed.trouble, "is_recording": self._desk.is_recording})
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
             self._alarms = told
@@ -203,6 +204,6 @@ class Viewer:
         elif what == "speed":
             play.pace(value)
         else:
-            if play.position >= play.end and not value:
+            if play.is_at_end and not value:
                 self._steer(play, "seek", 0.0)
             play.is_held = bool(value)

@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)"),
 ]
-PATIENCE = 8_000  # ms
+PATIENCE = 20_000  # ms
 FAULT = 25.0  # s, where encoder 3 is known to be wrong
 
 
@@ -74,7 +74,7 @@ def page(browser: Any, monitor: Monitor) -> Iterator[Any]:
     page.on("request", lambda request: page.asked.append(request.url))
     page.on("pageerror", lambda error: page.errors.append(str(error)))
     page.goto(monitor.url)
-    wait(page, "twin.link.table('displacement')?.count > 0")
+    wait(page, "twin.timeline.isRead")
     go(page, FAULT)
     yield page
     assert not page.errors

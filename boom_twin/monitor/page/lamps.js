@@ -22,9 +22,10 @@ export class Lamps {
     let words = "";
     if (silence > SILENCE) words = Number.isFinite(silence) ? `NO CONNECTION to the monitor for ${Math.round(silence / 1000)} s: nothing here is current` : "NO CONNECTION to the monitor";
     else if (!isReplay && now - this.link.grown > SILENCE) words = Number.isFinite(this.link.grown) ? `NO DATA for ${Math.round((now - this.link.grown) / 1000)} s: the traces are old` : "NO DATA yet: is the node active, and do strokes come?";
+    else if (this.state?.trouble) words = this.state.trouble;
     if (this.notice.textContent !== words) this.notice.textContent = words;
     this.notice.hidden = !words;
-    document.querySelector("main").classList.toggle("old", Boolean(words));
+    document.querySelector("main").classList.toggle("old", Boolean(words) && words !== this.state?.trouble);
     if (silence > SILENCE && this.isShown !== "lost") { this.isShown = "lost"; this.showLost(); }
   }
 
