@@ -56,6 +56,7 @@ class Viewer:
         self._generation = -1
         self._tables = 0
         self._alarms = ""
+        self._past: float | None = None
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
@@ -99,7 +100,7 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent = store.generation, 0, {}
+            self._generation, self._tables, self._sent, self._past = store.generation, 0, {}, None
             await self._say({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
@@ -160,7 +161,16 @@ class Viewer:
                 lines, block = found
                 await self._say(lines)
                 await self._socket.send_bytes(block)
+            await self._send_past(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
+
+    async def _send_past(self, position: float) -> None:
+        """The columns of the spectrogram that are owed."""
+        generation = self._generation
+        found = await self._analyst.past(position - HISTORY if self._past is None else self._past, position)
+        if found is not None and generation == self._generation == self._feed.store.generation:
+            self._past, block = found
+            await self._socket.send_bytes(block)
 
     async def _say(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(dump(message))

@@ -18,8 +18,8 @@ const link = new Link(), view = new View(link), timeline = new Timeline(link), l
 new Work(link, view);
 const spectrum = new SpectrumTab(link, new Sheet("peaks"));
 const tabs = { traces: new Traces(link, view, new Sheet("figures")), spectrum, spectrogram: spectrum, shape: new Shape(link, view), state: null };
-let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now();
-const delays = []; // s from the newest stamp to its drawing, live, if the clocks agree
+let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN;
+const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
 // -- what is chosen ---------------------------------------------------------------------------------------------------
 
@@ -74,6 +74,7 @@ link.addEventListener("reset", () => { tabs.traces.rebuild(); if (view.zoom || v
 function draw(now) {
   requestAnimationFrame(draw);
   frames++;
+  tellDelay();
   if (now - second > 1000) tellRate(now);
   const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : link.grown} ${spectrum.isNew}`;
   if (now < due || state === drawn || document.hidden) return;
@@ -81,7 +82,12 @@ function draw(now) {
   tabs[open]?.draw(open);
   drawn = state;
   due = now + REST * (performance.now() - began);
-  if (!timeline.isReplay && link.epoch) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - view.newest);
+  shown = view.newest;
+}
+
+function tellDelay() {
+  if (!timeline.isReplay && link.epoch && Number.isFinite(shown)) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - shown);
+  shown = NaN;
 }
 
 function tellRate(now) {
