@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BoomTwinError
+from .stop import on_stop_signal
 
 if TYPE_CHECKING:
     from .player import Player
@@ -82,6 +83,7 @@ class Company:
     def __init__(self, out: Path) -> None:
         self._out, self.recorded = out, out / "recorded"
         self._children: list[Child] = []
+        self._is_asked_to_end = False
 
     def begin(self, origin: str) -> None:
         """Start node and recorder; `origin` is kept in the recording."""
@@ -95,9 +97,15 @@ class Company:
         return self._children[-1]
 
     def check(self) -> None:
-        """Raise BoomTwinError if one of them has ended."""
+        """Raise BoomTwinError if one of them has ended, KeyboardInterrupt after SIGINT or SIGTERM."""
+        if self._is_asked_to_end:
+            raise KeyboardInterrupt
         for child in self._children:
             child.check()
+
+    def ask_to_end(self) -> None:
+        """End with the next `check`."""
+        self._is_asked_to_end = True
 
     def play(self, player: Player, duration: float | None = None) -> Iterator[int]:
         """Play as long as all of them run; as `boom_twin.ros.player.Player.play`."""
@@ -138,8 +146,12 @@ def company(out: Path, origin: str) -> Iterator[Company]:
     except OSError as error:
         raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
     running = Company(out)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    on_stop_signal(running.ask_to_end)
     try:
         running.begin(origin)
         yield running
     finally:
         running.end()
+        for number, act in before.items():
+            signal.signal(number, act)

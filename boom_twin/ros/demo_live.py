@@ -53,7 +53,7 @@ def _play(args: Namespace, running: Company) -> None:
         running.meet(player)
         while not (found := re.search(r"open (http://\S+)", monitor.said())):
             running.check()
-            time.sleep(LOOK)
+            time.sleep(0.1 * LOOK)
         print(f"open {found[1]} in a browser; Ctrl-C ends it", file=sys.stderr, flush=True)
         while True:
             for _ in running.play(player):

@@ -53,7 +53,10 @@ def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable
     demo.wait_for("in a browser")
     url = demo.said().split("open ")[1].split()[0]
     assert b"boom twin" in urlopen(url).read()
-    assert demo.stop(signal.SIGINT) == 0 and "Traceback" not in demo.said()
+    children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
+    assert demo.stop(signal.SIGINT) == 0, demo.said()
+    assert len(children) == 3 and not any(Path(f"/proc/{pid}").exists() for pid in children)
+    assert "Traceback" not in demo.said()
     assert scan(tmp_path / "recorded").topics
 
 
