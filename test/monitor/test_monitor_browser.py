@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from boom_twin.monitor.feed import Feed
 
@@ -147,7 +148,13 @@ def test_the_exported_table_holds_every_row_that_is_shown(page: Any, feed: Feed)
 def test_the_exported_picture_is_one(page: Any) -> None:
     with page.expect_download() as download:
         page.locator("#picture").click()
-    assert Path(download.value.path()).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    picture = imread(download.value.path(), format="png")
+    sizes = page.evaluate("[...document.querySelectorAll('#traces canvas')].map(each => [each.width, each.height])")
+    assert picture.shape[:2] == (30 + sum(height for _, height in sizes), max(width for width, _ in sizes))
+    top = 30
+    for _, height in sizes:
+        assert len(np.unique(picture[top : top + height].reshape(-1, picture.shape[2]), axis=0)) > 20
+        top += height
 
 
 @pytest.mark.parametrize("name", ["displacement", "acceleration", "force", "residuals"])
@@ -297,6 +304,13 @@ def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: 
 
 def test_everything_comes_from_this_server(page: Any, monitor: Monitor) -> None:
     assert len(page.asked) > 10 and all(url.startswith((monitor.url, "data:", "ws://127.0.0.1")) for url in page.asked)
+
+
+def test_two_minutes_of_six_traces_at_200_hz() -> None:
+    bench = Path(__file__).parents[1] / "bench" / "monitor.py"
+    done = subprocess.run([sys.executable, str(bench)], capture_output=True, text=True, timeout=400)
+    print(done.stdout)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_page_itself_says_that_the_monitor_is_gone_and_comes_back(browser: Any, replayed: Path) -> None:

@@ -4,6 +4,7 @@ import { Chart } from "./chart.js";
 import { figures, thin } from "./thin.js";
 
 const BAND = 2; // deviations that are shaded
+const SLOT = 2; // px from lowest to highest of which one line is drawn
 const TELL = 500; // ms between two looks at the figures
 const NAMES = { x: "forward", z: "up" };
 
@@ -44,7 +45,7 @@ export class Traces {
       if (!table?.count) continue;
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
-      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth));
+      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
       chart.draw([times, ...(kind.isBanded ? banded(values) : kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor)))], from, to);
     }
   }
