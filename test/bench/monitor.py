@@ -96,11 +96,13 @@ def heap(page: Any) -> float:
     """What the page's scripts hold once the rest is collected, MiB."""
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
-    return float(session.send("Runtime.getHeapUsage")["usedSize"]) / 2**20
+    used = float(session.send("Runtime.getHeapUsage")["usedSize"]) / 2**20
+    session.detach()
+    return used
 
 
 def one_page(page: Any, seconds: int) -> bool:
-    """Frames, delay and memory of one page in four parts of that time; whether memory stays and at least half the frames come."""
+    """Frames, delay and memory of one page in four parts of that time; whether memory stays, and half the frames come."""
     found, heaps = [], []
     for _ in range(4):
         (frames,) = watch([page], max(seconds // 4, 5))

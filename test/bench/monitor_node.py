@@ -25,10 +25,11 @@ from pathlib import Path
 
 import numpy as np
 from aiohttp import ClientSession
+from live import cpu
 
 LIVE = [sys.executable, str(Path(__file__).with_name("live.py"))]
 SETTLING = 3.0
-KINDS = ("none", "read", "attacked", "stopped")
+KINDS = ("none", "read", "attacked")
 BURST = 5.0
 GARBAGE = ("{", "[" * 4000, '{"do": "format"}', b"\0" * 100)
 
@@ -118,7 +119,9 @@ def span(kind: str, seconds: float) -> tuple[int, int]:
         time.sleep(SETTLING)
         if kind == "stopped":
             process.send_signal(signal.SIGSTOP)
+        before = cpu(process)
         found = pass_by(seconds)
+        print(f"{kind}: the monitor took {100 * (cpu(process) - before) / seconds:.0f} % of a core", flush=True)
         if process.poll() is not None or any(other.poll() is not None for other in others):
             raise SystemExit(f"{kind}: the monitor or its viewer ended")
         for other in others:
@@ -153,7 +156,7 @@ def watch(rounds: int, seconds: float) -> tuple[list[dict[str, tuple[int, int]]]
             time.sleep(SETTLING)
             spans = []
             for number in range(rounds):
-                order = KINDS[number % 4 :] + KINDS[: number % 4]
+                order = KINDS[number % len(KINDS) :] + KINDS[: number % len(KINDS)]
                 spans.append({kind: span(kind, seconds) for kind in order})
             for process in (listener, node):
                 process.send_signal(signal.SIGTERM)

@@ -169,6 +169,22 @@ def test_every_chart_shows_its_traces_with_a_read_out(page: Any, name: str) -> N
     assert float(values[0]) == pytest.approx(sum(page.evaluate("twin.view.span")) / 2, abs=1.0)
 
 
+def test_alarms_of_what_is_shown_are_told_in_words_and_as_bars(page: Any, feed: Feed) -> None:
+    alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
+    assert page.locator("#during").inner_text().startswith(f"✖ residual joint_3: {alarm.reason}, since {alarm.begin:.1f} s")
+    script = """moments => {
+        const canvas = document.querySelector("#chart-acceleration canvas");
+        const over = document.querySelector("#chart-acceleration .u-over");
+        const [low, high] = twin.view.span, scale = canvas.width / canvas.clientWidth;
+        const at = moment => over.offsetLeft + over.clientWidth * (moment - low) / (high - low);
+        const pixel = moment => canvas.getContext("2d").getImageData(scale * at(moment), scale * (over.offsetTop + 2), 1, 1).data;
+        return moments.map(moment => [...pixel(moment)]) }"""
+    before, during = page.evaluate(script, [alarm.begin - 2.0, alarm.begin + 2.0])
+    assert before[:3] != during[:3] and during[0] > 150 > during[2]
+    go(page, 10.0)
+    assert page.locator("#during").inner_text() == ""
+
+
 def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
     box = page.locator("#chart-acceleration .u-over").bounding_box()
     page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 20)

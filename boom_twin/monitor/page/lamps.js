@@ -2,7 +2,7 @@
 
 import { escape, show } from "./sheet.js";
 
-const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
+export const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
 const OVERALL = { OK: "ALL WELL", WARN: "WARNING", ERROR: "FAULT", STALE: "STALE" };
 const SILENCE = 2000; // ms without a word from the monitor after which nothing here is known
 

@@ -1,10 +1,14 @@
 // What the tip does and how far it is from what was measured, against time.
 
 import { Chart } from "./chart.js";
+import { paint } from "./colours.js";
+import { RANKS, SIGNS } from "./lamps.js";
+import { escape } from "./sheet.js";
 import { figures, thin } from "./thin.js";
 
 const BAND = 2; // deviations that are shaded
 const SLOT = 2; // px from lowest to highest of which one line is drawn
+const BAR = 4; // px, of an alarm's mark
 const TELL = 500; // ms between two looks at the figures
 const NAMES = { x: "forward", z: "up" };
 
@@ -23,6 +27,8 @@ export class Traces {
     this.view = view;
     this.sheet = sheet;
     this.charts = new Map();
+    this.alarms = [];
+    link.addEventListener("alarms", event => { this.alarms = event.detail.alarms; view.version++; });
     setInterval(() => this.tell(), TELL);
     for (const { name } of CHARTS) {
       const element = document.createElement("div");
@@ -66,16 +72,40 @@ export class Traces {
           if (width > 5) this.view.set({ zoom: [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] });
           plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
         }],
-        draw: kind.name === "residuals" ? [shadeExpected] : [],
+        draw: [plot => this.markAlarms(plot), ...(kind.name === "residuals" ? [shadeExpected] : [])],
       },
     });
   }
 
+  // The alarms of a span of time, the worst last.
+  during(from, to) {
+    return this.alarms.filter(({ begin, end }) => begin <= to && (end ?? Infinity) >= from).sort((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level));
+  }
+
+  // A bar at the top of the chart as long as an alarm lasts, the worst over the others.
+  markAlarms({ ctx, bbox, scales, valToPos }) {
+    const right = bbox.left + bbox.width, at = time => Math.min(Math.max(valToPos(time, "x", true), bbox.left), right);
+    ctx.save();
+    for (const { level, begin, end } of this.during(scales.x.min, scales.x.max)) {
+      ctx.fillStyle = paint(level === "OK" ? "accent" : level.toLowerCase());
+      ctx.fillRect(at(begin), bbox.top, Math.max((end === null ? right : at(end)) - at(begin), 2 * devicePixelRatio), BAR * devicePixelRatio);
+    }
+    ctx.restore();
+  }
+
+  // In words, the worst first.
+  tellAlarms(from, to) {
+    const words = this.during(from, to).reverse().map(({ name, reason, level, begin, end }) =>
+      `<span data-level=${level}>${SIGNS[level]} ${escape(name)}</span>: ${escape(reason)}, ${end === null ? `since ${begin.toFixed(1)} s` : `${begin.toFixed(1)} to ${end.toFixed(1)} s`}`);
+    document.getElementById("during").innerHTML = words.join(" &nbsp; ");
+  }
+
   // The table of figures of what is shown.
   tell() {
-    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown}`;
+    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown} ${this.view.version}`;
     if (told === this.told || !Number.isFinite(to) || !this.sheet.element.offsetParent) return;
     this.told = told;
+    this.tellAlarms(from, to);
     const rows = [];
     for (const [name, unit, factor, label] of [["displacement", "mm", 1000, "displ."], ["acceleration", "m/s²", 1, "accel."], ["force", "m/s²", 1, "IMU"], ["joints", "mrad", 1000, ""]]) {
       const table = this.link.table(name);
