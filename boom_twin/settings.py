@@ -45,6 +45,7 @@ class Settings(BaseModel):
     jump_back: Limit = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")
     leap: Limit = Field(default=3600.0, description="a stamp further from its stream must be confirmed by the next, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
+    false_alarms: Positive = Field(default=0.03, description="false alarms of all residuals together that are allowed, a day")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @classmethod

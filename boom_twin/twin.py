@@ -12,6 +12,8 @@ from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
 from .errors import BoomTwinError, UsageError
 from .following import Following
+from .health.baseline import Baseline
+from .health.judge import Judge
 from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
@@ -75,6 +77,8 @@ class Twin:
     mounts : sequence of Mount or None, optional
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
         `boom_twin.mounting.Mounting`.
+    baseline : Baseline, optional
+        What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
 
     Attributes
     ----------
@@ -92,8 +96,14 @@ class Twin:
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
-    def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
-        self.scene, self.settings = scene, settings or Settings()
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        mounts: Sequence[Mount | None] = (),
+        baseline: Baseline | None = None,
+    ) -> None:
+        self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
@@ -138,8 +148,10 @@ class Twin:
 
     def _build(self) -> None:
         """The model under the present load."""
-        self._boom = Following(loaded(self.scene, *self.settings.load), self.settings)
+        scene = loaded(self.scene, *self.settings.load)
+        self._boom = Following(scene, self.settings)
         self.plan = self._boom.plan
+        self._judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -165,6 +177,8 @@ class Twin:
         self._run = None
         self._zeros.forget_past()
         self._recent.clear()
+        if self._judge is not None:
+            self._judge.begin()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -236,7 +250,11 @@ class Twin:
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         self._remember(run, prediction)
         self.counts.update(events)
-        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=self._boom.passes)
+        if self._judge is not None:
+            self._judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
+        residuals = self._settle_pending(run)
+        health = None if self._judge is None else self._judge.judge(sample.stamp)
+        return Report(sample.stamp, True, prediction, residuals, tuple(events), passes=self._boom.passes, health=health)
 
     def _remember(self, run: _Run, prediction: Prediction) -> None:
         """Keep what residuals need."""
@@ -291,7 +309,10 @@ class Twin:
         zeros = self._zeros.of(sample.stream, sample.stamp)
         if zeros is not None:
             values = values - zeros
-        return Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+        residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+        if self._judge is not None:
+            self._judge.measured(residuals, sample.values)
+        return residuals
 
     def _hold(self, sample: Sample) -> Report:
         """Taken as a witness of time alone."""
