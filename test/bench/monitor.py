@@ -30,7 +30,7 @@ from boom_twin.monitor.store import Store
 
 RATE = 200
 CHROMIUM = Path("/usr/bin/chromium")
-LARGEST = 1.0
+LARGEST = 2.0
 """MiB by which the heap may grow from the first quarter to the last."""
 COUNT = "window.counted ??= (requestAnimationFrame(function step() { window.counted++; requestAnimationFrame(step); }), 0)"
 
