@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ..errors import BagError, BoomTwinError
+from ..health.baseline import Baseline
 from ..io.ahead import Ahead
 from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
@@ -160,7 +161,7 @@ class _Twin:
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self._twin, self._outlet = Twin(scene, settings, mounts), Outlet(scene, settings)
+        self._twin, self._outlet = Twin(scene, settings, mounts, Baseline()), Outlet(scene, settings)
         self._takers = {key: feed.catch.takers[topic.absolute] for key, topic in topics.outputs.items() if key in SHOWN}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
@@ -189,6 +190,8 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
+        if report.health is not None:
+            self._feed.catch.judge(report.health)
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())

@@ -109,7 +109,7 @@ class Viewer:
     async def _say_state(self, position: float) -> None:
         feed, play = self._feed, self._playback
         now = feed.now() if play is None else position
-        message = state(feed.store.board(now), now, position)
+        message = state(feed.store, now, position)
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}

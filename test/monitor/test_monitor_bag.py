@@ -18,6 +18,7 @@ from boom_twin.monitor.bag import bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
 from boom_twin.monitor.playback import Playback
+from boom_twin.monitor.words import state
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -42,6 +43,14 @@ def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:
     assert np.sqrt((joints**2).mean(axis=0)) == pytest.approx(summary["joint_residual_rms_rad"], rel=1e-5)
     gaps = [(alarm.begin, alarm.end) for alarm in feed.store.alarms.all if alarm.name == "cylinder_strokes"]
     assert gaps == [pytest.approx((alarm["from_s"], alarm["to_s"])) for alarm in summary["alarms"] if alarm["kind"] == "gap"]
+
+
+def test_the_cause_is_named_from_when_it_shows(feed: Feed) -> None:
+    (alarm,) = [alarm for alarm in feed.store.alarms.all if alarm.causes]
+    assert (alarm.name, alarm.causes[0][0]) == ("joint_3", "joint_3.sensor") and alarm.begin == pytest.approx(15.0, abs=0.1)
+    told = state(feed.store, 20.0, 20.0)
+    assert told["level"] == "ERROR" and told["reason"] == f"joint_3: {alarm.reason}"
+    assert state(feed.store, 14.0, 14.0)["level"] == "OK"
 
 
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:

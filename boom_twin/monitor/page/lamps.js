@@ -62,9 +62,9 @@ export class Lamps {
 
   showAlarms(alarms) {
     const table = document.getElementById("alarms");
-    table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th>from, s<th>to, s<th></tr>" : "") +
+    table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th class=text>cause<th>from, s<th>to, s<th></tr>" : "") +
       alarms.slice(-50).reverse().map(alarm => `<tr><td>${escape(alarm.name)}<td class=text data-level=${alarm.level}>${SIGNS[alarm.level]} ${alarm.level}<td class=text>${escape(alarm.reason)}` +
-        `<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
+        `<td class=text>${alarm.causes.map(([cause, share]) => escape(cause) + (share === null ? "" : ` ${(100 * share).toFixed(0)} %`)).join(", ")}<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
   }
 }
 

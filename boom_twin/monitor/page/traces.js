@@ -14,7 +14,7 @@ const NAMES = { x: "forward", z: "up" };
 
 // Every chart: table, columns (a function of the table), their labels, a factor of the unit.
 const CHARTS = [
-  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
+  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true },
   { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
   { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
   { name: "residuals", table: "joints", title: "residual, σ", factor: 1, columns: table => range(table.columns.length / 2, table.columns.length),
@@ -52,14 +52,24 @@ export class Traces {
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
       const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
-      chart.draw([times, ...(kind.isBanded ? banded(values) : kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor)))], from, to);
+      const scaled = kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor));
+      chart.draw([times, ...(kind.isBanded ? banded(scaled) : kind.isUncertain ? this.uncertain(times, scaled, kind.factor) : scaled)], from, to);
     }
+  }
+
+  // The tip's lines, and beside each what it may be off by: as told last before each time.
+  uncertain(times, values, factor) {
+    const table = this.link.table("uncertainty");
+    let row = table?.count ? Math.max(table.first, table.from(times[0]) - 1) : NaN;
+    const at = times.map(time => { while (row + 1 < table?.count && table.time(row + 1) <= time) row++; return row; });
+    const beside = (column, sign) => values[column].map((value, i) => value === null || !(table?.time(at[i]) <= times[i]) ? null : value + sign * factor * BAND * table.at(column, at[i]));
+    return [...values, ...[0, 1].flatMap(column => [beside(column, 1), beside(column, -1)])];
   }
 
   build(kind, table) {
     const labels = typeof kind.labels === "function" ? kind.labels(table) : kind.labels;
     const plain = () => labels.map((label, i) => ({ label, colour: i }));
-    const options = kind.isBanded ? BANDED : { series: plain() };
+    const options = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
       axes: [kind === CHARTS.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
@@ -79,7 +89,7 @@ export class Traces {
 
   // The alarms of a span of time, the worst last.
   during(from, to) {
-    return this.alarms.filter(({ begin, end }) => begin <= to && (end ?? Infinity) >= from).sort((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level));
+    return this.alarms.filter(({ begin, end }) => begin <= to && (end ?? Infinity) >= from).sort((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level) || a.causes.length - b.causes.length);
   }
 
   // A bar at the top of the chart as long as an alarm lasts, the worst over the others.
@@ -130,6 +140,11 @@ const BANDED = {
     { label: "measured x", colour: "soft", width: 1, show: false }, { label: "predicted x", colour: 1, width: 1, show: false },
   ],
   bands: [[3, 4, 0]],
+};
+
+const UNCERTAIN = {
+  series: [{ label: "tip forward", colour: 0 }, { label: "tip up", colour: 1 }, ...[0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }))],
+  bands: [[3, 4, 0], [5, 6, 1]],
 };
 
 // From measured, predicted, deviation of z, then of x, to what is drawn.
