@@ -58,7 +58,6 @@ class Alarms:
         self.all: list[Alarm] = []
         self._open: dict[str, Alarm] = {}
         self._judged: dict[str, Alarm] = {}
-        self._found: list[Alarm] = []
         self._number = 0
 
     def follow(self, time: float, board: Board) -> None:
@@ -73,24 +72,23 @@ class Alarms:
     def judge(self, health: Health, time: Callable[[int], float]) -> None:
         """What is known of the rig's health; `time` gives seconds of a stamp."""
         for found in health.alarms:
-            alarm = self._judged.get(found.channel)
+            alarm = self._judged.pop(found.channel, None)
             if alarm is None:
-                alarm = self._keep(Alarm(self._next(), "", Level.ERROR, "", 0.0))
+                alarm = self._keep(Alarm(self._next(), found.channel, Level.ERROR, "", 0.0))
+            if found.until is None:
                 self._judged[found.channel] = alarm
-                self._found.append(alarm)
             causes = tuple((each.cause, each.probability) for each in found.ranked) or ((found.cause or "not known", nan),)
             alarm.is_acknowledged &= [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
-            alarm.name, alarm.reason, alarm.begin, alarm.causes = found.channel, found.told, time(found.since), causes
+            alarm.reason, alarm.begin, alarm.causes = found.told, time(found.since), causes
             alarm.end = None if found.until is None else time(found.until)
         lasting = {found.channel for found in health.alarms if found.until is None}
         for channel in self._judged.keys() - lasting:
-            alarm = self._judged.pop(channel)
-            alarm.end = time(health.stamp) if alarm.end is None else alarm.end
+            self._judged.pop(channel).end = time(health.stamp)
 
     def lamps(self, time: float) -> Iterable[Lamp]:
         """What the judge had found at `time` (s), as lamps."""
-        for alarm in self._found:
-            if alarm.begin <= time and (alarm.end is None or time < alarm.end):
+        for alarm in self.all:
+            if alarm.causes and alarm.begin <= time and (alarm.end is None or time < alarm.end):
                 yield Lamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
 
     def add(self, name: str, level: Level, reason: str, begin: float, end: float) -> None:

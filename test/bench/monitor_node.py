@@ -29,7 +29,7 @@ from live import cpu
 
 LIVE = [sys.executable, str(Path(__file__).with_name("live.py"))]
 SETTLING = 3.0
-KINDS = ("none", "read", "attacked")
+KINDS = ("none", "read", "attacked", "stopped")
 BURST = 5.0
 GARBAGE = ("{", "[" * 4000, '{"do": "format"}', b"\0" * 100)
 
