@@ -23,6 +23,9 @@ ACTS = ("mark", "acknowledge", "record")
 NICE = 5
 """By how much it gives way to the node on the same machine."""
 
+BACKLOG = 16
+"""Connections that may wait to be taken; the kernel turns away more before they cost the node's machine anything."""
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What is shown, to whom, and what may be done."""
@@ -135,8 +138,8 @@ async def _listen(runner: Any, host: str, port: int | None) -> None:
     from aiohttp import web
 
     try:
-        await web.TCPSite(runner, host, PORT if port is None else port).start()
+        await web.TCPSite(runner, host, PORT if port is None else port, backlog=BACKLOG).start()
     except OSError as error:
         if port is not None or error.errno != EADDRINUSE:
             raise
-        await web.TCPSite(runner, host, 0).start()
+        await web.TCPSite(runner, host, 0, backlog=BACKLOG).start()
