@@ -95,8 +95,8 @@ def settings_from(values: dict[str, Any], source: str) -> Settings:
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``mapping``, ``autostart``) and of ``/diagnostics`` are passed over.
+    Parameters of the node alone (``scene``, ``mapping``, ``autostart``, ``monitor``) and of ``/diagnostics`` are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    others = {"scene", "mapping", "autostart", *Thresholds.model_fields}
+    others = {"scene", "mapping", "autostart", "monitor", *Thresholds.model_fields}
     return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))

@@ -46,6 +46,7 @@ TABLE = (
     Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
     Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     Row("autostart", True, "the node configures and activates itself", AT_START),
+    Row("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
     *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
     *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
 )
