@@ -120,7 +120,7 @@ class ResidualWatch:
         if self.alarm is not None:
             return
         self._detector.take(self.surprise)
-        if self._case is None and self.levels.max() > SUSPICIOUS:
+        if self._case is None and self._detector.suspicion > SUSPICIOUS:
             assert self._linear.epoch is not None
             start = problem.start + SKIPPED * BLOCK
             self._case = Case(self._bank, start, *known, self._errors2, self._noise2, self._linear.epoch)
@@ -131,7 +131,7 @@ class ResidualWatch:
         """An alarm where the detector says so, if a fault explains the case better than none."""
         levels = self.levels
         channel = int(np.argmax(levels))
-        if self._case is None or levels[channel] < CLEAN:
+        if self._case is None or self._detector.suspicion < CLEAN:
             self._case = None
             return None
         if levels[channel] < 1.0:
