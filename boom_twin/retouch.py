@@ -26,21 +26,18 @@ def with_value(text: str, place: Place, value: Any) -> str:
     key, rest = place[depth], place[depth + 1 :]
     pairs: list[Pair] = block.value
     names = [str(name.value) for name, _ in pairs]
-    if key in names and not rest:
-        number = names.index(str(key))
-        if value is None:
-            return _removed(text, block, number)
-        node = pairs[number][1]
-        return text[: node.start_mark.index] + yaml_text(value) + text[_end(text, node) :]
     if value is None:
-        return text
+        return _removed(text, block, names.index(str(key))) if key in names and not rest else text
     for step in reversed(rest):
         value = {step: value}
-    if key in names:  # something empty stands where a block is needed
-        node = pairs[names.index(str(key))][1]
-        space = "" if text[: node.start_mark.index].endswith(" ") else " "
-        return text[: node.start_mark.index] + space + yaml_text(value) + text[_end(text, node) :]
-    return _inserted(text, block, f"{key}: {yaml_text(value)}")
+    if key not in names:
+        return _inserted(text, block, f"{key}: {yaml_text(value)}")
+    name, node = pairs[names.index(str(key))]
+    start, end = int(node.start_mark.index), _end(text, node)
+    if start < int(node.end_mark.index):
+        return text[:start] + yaml_text(value) + text[end:]
+    colon = text.index(":", int(name.end_mark.index)) + 1  # nothing stands there: its mark lies further on
+    return f"{text[:colon]} {yaml_text(value)}{text[colon:]}"
 
 
 def yaml_text(value: Any) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..records import Array, Mount, Stream, channels_of
-from .course import Course
+from .course import Course, filled
 from .measured import NANO, Measured, Series
 
 SHORTEST = 0.05  # s
@@ -90,14 +90,11 @@ def _averages(series: Series, course: Course, length: float, count: int) -> tupl
     times: Array = np.asarray((series.stamps - course.start) * NANO)
     block = np.minimum((times / length).astype(np.int64), count - 1)
     there = np.isfinite(series.values)
-    numbers = np.zeros((count, there.shape[1]))
-    sums = np.zeros_like(numbers)
-    np.add.at(numbers, block, there)
-    np.add.at(sums, block, np.where(there, series.values, 0.0))
     total = np.bincount(block, minlength=count)
-    enough = numbers > LEAST * np.maximum(total, 1)[:, None]
-    means = np.where(enough, sums / np.maximum(numbers, 1.0), np.nan)
-    return means, numbers, _interpolated_mean(times / course.step, block, total, len(course.strokes))
+    mean = csr_array((1.0 / total[block], (block, np.arange(len(block)))), shape=(count, len(block)))
+    shares = mean @ there.astype(float)
+    means = np.where(shares > LEAST, mean @ filled(times, series.values), np.nan)
+    return means, shares * total[:, None], _interpolated_mean(times / course.step, block, total, len(course.strokes))
 
 
 def _interpolated_mean(places: Array, block: NDArray[np.int64], total: NDArray[np.int64], grid: int) -> csr_array:

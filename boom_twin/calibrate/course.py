@@ -84,7 +84,7 @@ def course_of(session: Measured, settings: Settings) -> Course:
     refuse_short(session.name, float(grid[-1]), "without a gap in the strokes")
     spectrum = settings.stroke_variance * float(np.median(np.diff(times)))
     corner = min((settings.jerk_density / spectrum) ** (1.0 / 6.0) / (2.0 * np.pi), HIGHEST / step)
-    strokes = _smoothed(times, _filled(times, series.values), grid, corner)
+    strokes = _smoothed(times, filled(times, series.values), grid, corner)
     first = _rest(np.abs(np.gradient(strokes, step, axis=0)).max(axis=1), round(REST / step))
     if first is None:
         raise BagError(f"{session.name}: the boom never rests for {REST:g} s, where a calibration starts. Record a hold first.")
@@ -121,10 +121,14 @@ def _longest(series: Series) -> Series:
     return Series(series.stamps[part], series.values[part])
 
 
-def _filled(times: Array, values: Array) -> Array:
-    """Missing values between those that are there."""
-    columns = [np.interp(times, times[known], column[known]) for column in values.T for known in [np.isfinite(column)]]
-    return np.column_stack(columns)
+def filled(times: Array, values: Array) -> Array:
+    """Values (m, c) at `times` (m,), missing ones on the line between their neighbours; a column without any stays."""
+    columns = values.T.copy()
+    for column in columns:
+        known = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(times[~known], times[known], column[known])
+    return np.asarray(columns.T)
 
 
 def _rest(speeds: Array, count: int) -> int | None:

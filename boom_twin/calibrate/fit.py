@@ -14,7 +14,7 @@ from .course import Course
 from .problem import Problem
 from .whitening import Whitening, whitening_of
 
-MOST = 20  # evaluations
+MOST = 12  # evaluations of a round
 ROUNDS = 2
 ENOUGH = 1e-5  # relative change of the sum of squares, and of the unknowns
 HOLD, STILL = 1.0, 1e-3  # a hold of so long (s), in which no stroke moves by more (m)
@@ -50,10 +50,15 @@ class Fit:
     whitening: Whitening
 
     def covariance(self, more: Array | float = 0.0) -> Array:
-        """Of the deviations, with the priors, and with `more` information."""
+        """Of the deviations, with the priors, and with `more` information.
+
+        None is smaller than white noise would give: few realisations may happen to pull little.
+        """
         spread, prior = max(1.0, self.misfit) ** 2, np.eye(len(self.deviations))
-        gain = np.linalg.inv((self.information + more) / spread + prior)
-        return np.asarray(gain @ ((self.scatter + more) / spread + prior) @ gain)
+        white = np.linalg.inv((self.information + more) / spread + prior)
+        found = white @ ((self.scatter + more) / spread + prior) @ white
+        factors = np.sqrt(np.maximum(1.0, np.diag(white) / np.diag(found)))
+        return np.asarray(factors[:, None] * found * factors)
 
 
 def fitted(problem: Problem, tell: Tell) -> Fit:
