@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-
 from oracle import booms
 
-from boom_twin import load_scene, rig
+from boom_twin import rig
 from boom_twin.io.session import write_session
 from boom_twin.scene.named import parameter, with_parameters
 from boom_twin.scene.parts import Scene
@@ -27,8 +26,8 @@ class Made(NamedTuple):
     def write(self, path: Path, seed: int, zeros=0.0, imu=True, cut=slice(None)) -> Path:
         """A session of it with the sensors' noise of `seed`, encoders reading `zeros` (rad) too much."""
         seen = rig.observe(self.truth, self.programme, self.rows, rig.Sensors(), seed)
-        force = seen.imu[cut] if imu else None
-        write_session(path, seen.stamps[cut], seen.strokes[cut], seen.joints[cut] + zeros, force, {"origin": "synthetic, a test"})
+        force, joints = seen.imu[cut] if imu else None, seen.joints[cut] + zeros
+        write_session(path, seen.stamps[cut], seen.strokes[cut], joints, force, {"origin": "synthetic, a test"})
         return path
 
 

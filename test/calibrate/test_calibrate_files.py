@@ -50,7 +50,8 @@ def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, sh
     scene = load_scene(folder / "new.yaml")
     assert parameter(scene, "cylinder_1.k") == pytest.approx(parameter(short.truth, "cylinder_1.k"), rel=0.03)
     assert scene.description.startswith("a test boom\nCalibrated 2026-01-02 by boom_twin 0.")
-    for part in ("from bag (sha256 ", "held out: the last third of bag", "Before: cylinder_1.k 4e+07 N/m, cylinder_2.k 3e+07 N/m."):
+    before = "Before: cylinder_1.k 4e+07 N/m, cylinder_2.k 3e+07 N/m."
+    for part in ("from bag (sha256 ", "held out: the last third of bag", before):
         assert part in scene.description
     added, removed = set(new.splitlines()) - set(old.splitlines()), set(old.splitlines()) - set(new.splitlines())
     assert len(removed) == 3 and all("k:" in line or "description" in line for line in removed)
@@ -83,7 +84,7 @@ def test_it_overwrites_only_when_told(ran, source, capsys):
 
 
 def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_path):
-    folder, arguments = ran
+    _, arguments = ran
     (tmp_path / "own.yaml").write_text("sensors:\n  joint_1: {zero: 0.1, unit: deg, scale: 57.29577951308232}  # mine\n")
     out = tmp_path / "again.yaml"
     arguments = [*arguments, "--mapping", str(tmp_path / "own.yaml"), "--out", str(out), "--json", "--no-pictures"]
