@@ -28,11 +28,16 @@ class Deviations:
     settings : Settings
     epoch : int
         Stamp (ns) of the first one, when the boom was at rest.
+
+    Attributes
+    ----------
+    noise : StrokeNoise or None
+        As propagated last; None before the first prediction.
     """
 
     def __init__(self, plan: Plan, settings: Settings, epoch: int) -> None:
         self._plan, self._settings, self._epoch = plan, settings, epoch
-        self._noise: StrokeNoise | None = None
+        self.noise: StrokeNoise | None = None
         self._interval = 0.0
         self._at = np.zeros(plan.joints)
         self._seen = epoch
@@ -56,20 +61,20 @@ class Deviations:
         angles : ndarray, shape (n,)
             Joint angles of the rigid boom, rad.
         """
-        if self._noise is None or prediction.stamp >= self._seen + INTERVAL:
+        if self.noise is None or prediction.stamp >= self._seen + INTERVAL:
             self._refresh(prediction, interval, live, angles)
         return np.sqrt(self._joints + self._slopes2 * variances), self._force
 
     def _refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
         self._seen = prediction.stamp
         moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP
-        if self._noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
-            self._noise = self._propagate(live, interval)
+        if self.noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
+            self.noise = self._propagate(live, interval)
             self._at, self._interval = prediction.strokes, interval
             slopes = [cylinder_length(self._plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
             self._slopes2 = 1.0 / np.square(slopes)
         time = (prediction.stamp - self._epoch) * 1e-9
-        joints, acceleration = self._noise.after(time, prediction.tip_angle)
+        joints, acceleration = self.noise.after(time, prediction.tip_angle)
         self._joints = self._settings.angle_variance + joints
         self._force = np.sqrt(self._settings.imu_sigma**2 + acceleration)
 

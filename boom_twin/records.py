@@ -147,6 +147,80 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class Ranked:
+    """One cause that may explain an alarm.
+
+    Attributes
+    ----------
+    cause : str
+        A parameter of the scene, a sensor, or ``unknown``.
+    probability : float
+        Beside the other causes, given that something is wrong.
+    parts : tuple of (str, float, float, str)
+        What would be the matter: kind, estimate, its standard deviation, unit (empty for a share).
+    """
+
+    cause: str
+    probability: float
+    parts: tuple[tuple[str, float, float, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """Something is wrong with the rig, its sensors, or the model of it.
+
+    Attributes
+    ----------
+    channel : str
+        Where it shows.
+    kind : str
+        What is the matter, in a word.
+    since : int
+        Stamp (ns) from which it shows.
+    until : int or None
+        Stamp (ns) at which it ended; None while it lasts.
+    cause : str or None
+        The scene's parameter or the sensor at fault; None if that cannot be told.
+    told : str
+        One sentence.
+    ranked : tuple of Ranked
+        Causes that may explain it, the most probable first; empty where the sensor itself gives it away.
+    """
+
+    channel: str
+    kind: str
+    since: int
+    until: int | None
+    cause: str | None
+    told: str
+    ranked: tuple[Ranked, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What is known of the rig's health at one stamp (ns).
+
+    Attributes
+    ----------
+    stamp : int
+        End of the newest block of residuals that was judged.
+    alarms : tuple of Alarm
+        All that last, and those that have ended since the last `Health`.
+    names : tuple of str
+        Of the channels.
+    levels : ndarray, shape (channels,)
+        How near each channel is to an alarm, which is at 1.
+    tip_sigmas : ndarray, shape (2,)
+        Standard deviation of the predicted tip's x and y, m: strokes' noise, and what model and sensors may be off by.
+    """
+
+    stamp: int
+    alarms: tuple[Alarm, ...]
+    names: tuple[str, ...]
+    levels: Array
+    tip_sigmas: Array
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """What one sample caused.
 
@@ -168,6 +242,8 @@ class Report:
         Set where the model began from rest, or something that was asked for took effect.
     passes : int
         Newton passes that the prediction took, with those of what was stepped for good.
+    health : Health or None
+        Set once a second, and where an alarm began, changed or ended.
     """
 
     stamp: int
@@ -178,3 +254,4 @@ class Report:
     status: str = "ok"
     change: Change | None = None
     passes: int = 0
+    health: Health | None = None

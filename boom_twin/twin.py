@@ -12,9 +12,12 @@ from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
 from .errors import BoomTwinError, UsageError
 from .following import Following
+from .health.baseline import Baseline
+from .health.judge import Judge
 from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
+from .plausible import Plausible
 from .recent import Recent
 from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .requests import Requests
@@ -34,6 +37,8 @@ EVENTS = {
     "restart": "pause too long to bridge; started again from rest",
     "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
     "jump back": "time was set back; everything started again",
+    "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
+    "held": "a stroke missing for long; taken to stay where it was",
     "model": "the model failed; it starts again with the next full sample",
     "reset": "asked for; the model started again from rest",
     "load": "payload or line fill changed; the model started again from rest",
@@ -61,6 +66,7 @@ class _Run:
     interval: float = 0.0
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
+    plausible: Plausible = field(default_factory=Plausible)
 
 
 class Twin:
@@ -75,6 +81,8 @@ class Twin:
     mounts : sequence of Mount or None, optional
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
         `boom_twin.mounting.Mounting`.
+    baseline : Baseline, optional
+        What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
 
     Attributes
     ----------
@@ -85,6 +93,8 @@ class Twin:
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
+    judge : Judge or None
+        Of the rig's health; None without a baseline.
 
     Notes
     -----
@@ -92,8 +102,14 @@ class Twin:
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
-    def __init__(self, scene: Scene, settings: Settings | None = None, mounts: Sequence[Mount | None] = ()) -> None:
-        self.scene, self.settings = scene, settings or Settings()
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        mounts: Sequence[Mount | None] = (),
+        baseline: Baseline | None = None,
+    ) -> None:
+        self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
@@ -138,8 +154,10 @@ class Twin:
 
     def _build(self) -> None:
         """The model under the present load."""
-        self._boom = Following(loaded(self.scene, *self.settings.load), self.settings)
+        scene = loaded(self.scene, *self.settings.load)
+        self._boom = Following(scene, self.settings)
         self.plan = self._boom.plan
+        self.judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -165,6 +183,8 @@ class Twin:
         self._run = None
         self._zeros.forget_past()
         self._recent.clear()
+        if self.judge is not None:
+            self.judge.begin()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -226,7 +246,9 @@ class Twin:
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
-        status = self._boom.step((sample.stamp - run.epoch) * NANO, sample.values)
+        values, oddities = run.plausible.of(sample.stamp, sample.values, self.settings)
+        events += oddities
+        status = self._boom.step((sample.stamp - run.epoch) * NANO, values)
         if status != OK:
             self.reset()
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
@@ -234,9 +256,14 @@ class Twin:
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
         before, run.newest, run.slot = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
+        run.plausible.estimate = prediction.strokes
         self._remember(run, prediction)
         self.counts.update(events)
-        return Report(sample.stamp, True, prediction, self._settle_pending(run), tuple(events), passes=self._boom.passes)
+        if self.judge is not None:
+            self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
+        residuals = self._settle_pending(run)
+        health = None if self.judge is None else self.judge.judge(sample.stamp)
+        return Report(sample.stamp, True, prediction, residuals, tuple(events), passes=self._boom.passes, health=health)
 
     def _remember(self, run: _Run, prediction: Prediction) -> None:
         """Keep what residuals need."""
@@ -291,7 +318,10 @@ class Twin:
         zeros = self._zeros.of(sample.stream, sample.stamp)
         if zeros is not None:
             values = values - zeros
-        return Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+        residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
+        if self.judge is not None:
+            self.judge.measured(residuals, sample.values)
+        return residuals
 
     def _hold(self, sample: Sample) -> Report:
         """Taken as a witness of time alone."""

@@ -159,7 +159,7 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
 
 def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
     """Linearised motion of all histories by increments of the unknowns; central differences."""
-    return _difference(plan, state, work, increments, lambda: work.position.copy())
+    return along(plan, state, work, increments, lambda: work.position.copy())
 
 
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
@@ -170,10 +170,10 @@ def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
         observe(plan.tables, state, row)
         return row[: plan.joints].copy()
 
-    return _difference(plan, state, work, mode.increments, angles)
+    return along(plan, state, work, mode.increments, angles)
 
 
-def _difference(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
+def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
     """Derivative of what `read` returns along `increments` of the unknowns."""
     z = state.z.copy()
     size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)

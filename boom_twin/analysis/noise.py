@@ -39,11 +39,16 @@ class StrokeNoise:
         Deviation of the tip's acceleration, as a vector along the mode's motion there, m/s^2, likewise.
     decay : ndarray, shape (modes,)
         2 zeta omega, 1/s.
+    collected : ndarray, shape (modes,)
+        Of the modal coordinates, likewise, m^2 kg.
+    modes : tuple of Mode
     """
 
     joints: Array
     swing: Array
     decay: Array
+    collected: Array
+    modes: tuple[Mode, ...]
 
     def after(self, time: float, angle: float) -> tuple[Array, Array]:
         """Variances of joint angles (n,), and of tip acceleration (2,) in axes turned by `angle`, `time` s from rest."""
@@ -57,7 +62,7 @@ def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval
     spectrum = variance * interval
     corner = (density / spectrum) ** (1.0 / 6.0)
     modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=BAND * corner)
-    joints, swing, decay = [], [], []
+    joints, swing, decay, variances = [], [], [], []
     tip = plan.tables.tip
     for mode in modes:
         omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
@@ -67,8 +72,11 @@ def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval
         joints.append(collected * joint_increments(plan, state, work, mode) ** 2)
         swing.append(np.sqrt(collected) * omega**2 * mode.motion[tip : tip + 2])
         decay.append(2.0 * zeta * omega)
+        variances.append(collected)
     n = plan.joints
-    return StrokeNoise(np.array(joints).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay))
+    return StrokeNoise(
+        np.array(joints).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay), np.array(variances), modes
+    )
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

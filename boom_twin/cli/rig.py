@@ -19,22 +19,38 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration", type=float, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
+    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %%"
+    parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
+    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each")
+    fault = "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); may be repeated"
+    parser.add_argument("--fault", action="append", default=[], metavar="CAUSE:KIND[:SIZE][@ONSET]", help=fault)
 
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
     from ..io.session import write_session
     from ..rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
+    from ..rig.faults import check, parse
+    from ..rig.faulty_scene import with_faults
+    from ..rig.faulty_sensors import spoil
+    from ..rig.wrong import wrong_by
     from ..truth import FILE_NAME
 
     scene, out = open_scene(args.scene), Path(args.out)
     duration = BUNDLED_DURATION if args.duration is None else args.duration
+    faults = [parse(text) for text in args.fault]
+    check(faults, scene, duration)
+    boom = with_faults(wrong_by(scene, args.wrong, args.rig_seed), faults)
     programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     sensors = noise_free() if args.clean else Sensors()
     print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
-    session = record(scene, programme, duration, sensors, args.seed)
+    session = spoil(record(boom, programme, duration, sensors, args.seed), faults, args.seed)
     notes = {"origin": ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
-    write_session(out, session.stamps, session.strokes, session.joints, session.imu, notes)
+    if args.wrong:
+        notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
+    if faults:
+        notes["faults"] = ", ".join(map(str, faults))
+    write_session(out, session.stamps, session.strokes, session.joints, session.imu, notes, session.angle_stamps)
     session.save_truth(out / FILE_NAME)
     print(out)
     return 0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..records import Array, Stream
+from ..records import Array, Sample, Stream
 from .factory import RosbagsTypes
 from .places import FRAME, fill_header
 from .topics import TYPES, load_topics
@@ -28,8 +28,9 @@ def write_session(
     joints: Array,
     imu: Array | None,
     description: Mapping[str, str],
+    angle_stamps_ns: NDArray[np.int64] | None = None,
 ) -> None:
-    """Write the bag of one session; log times are the stamps.
+    """Write the bag of one session in the order of its stamps, which are the log times.
 
     Parameters
     ----------
@@ -43,6 +44,8 @@ def write_session(
         Specific force along x and z of the tip, m/s^2.
     description : dict of str to str
         Kept as notes of the bag: say here what the session is, and that it is synthetic if it is.
+    angle_stamps_ns : ndarray of int, shape (k,), optional
+        Of the joint angles, where they are not those of the strokes.
 
     Raises
     ------
@@ -57,11 +60,31 @@ def write_session(
         topics = {stream: topic for stream, topic in topics.items() if stream is not Stream.IMU}
     messages = _Messages(strokes.shape[1])
     with SessionWriter(directory, {stream.value: topic for stream, topic in topics.items()}, description) as bag:
-        for row, stamp in enumerate(stamps_ns.tolist()):
-            bag.write(Stream.STROKES.value, stamp, messages.joint_state("cylinder", stamp, strokes[row]))
-            bag.write(Stream.ANGLES.value, stamp, messages.joint_state("joint", stamp, joints[row]))
-            if imu is not None:
-                bag.write(Stream.IMU.value, stamp, messages.imu(stamp, imu[row]))
+        for sample in samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns):
+            bag.write(sample.stream.value, sample.stamp, messages.of(sample))
+
+
+def samples_of(
+    stamps_ns: NDArray[np.int64],
+    strokes: Array,
+    joints: Array,
+    imu: Array | None,
+    angle_stamps_ns: NDArray[np.int64] | None = None,
+) -> list[Sample]:
+    """The samples of a session in the order of their stamps, of one stamp strokes first; arrays as in `write_session`.
+
+    Where a row has no value at all, there is no sample.
+    """
+    angle_stamps = stamps_ns if angle_stamps_ns is None else angle_stamps_ns
+    streams = [(Stream.STROKES, stamps_ns, strokes), (Stream.ANGLES, angle_stamps, joints)]
+    streams += [] if imu is None else [(Stream.IMU, stamps_ns, imu)]
+    samples = [
+        Sample(stream, stamp, row)
+        for stream, stamps, values in streams
+        for stamp, row, there in zip(stamps.tolist(), values, ~np.isnan(values).all(axis=1), strict=True)
+        if there
+    ]
+    return sorted(samples, key=lambda sample: sample.stamp)
 
 
 class _Messages:
@@ -70,6 +93,12 @@ class _Messages:
     def __init__(self, count: int) -> None:
         self._types = RosbagsTypes()
         self._names = {kind: [f"{kind}_{i}" for i in range(1, count + 1)] for kind in ("cylinder", "joint")}
+
+    def of(self, sample: Sample) -> Any:
+        if sample.stream is Stream.IMU:
+            return self.imu(sample.stamp, sample.values)
+        kind = "cylinder" if sample.stream is Stream.STROKES else "joint"
+        return self.joint_state(kind, sample.stamp, sample.values)
 
     def joint_state(self, kind: str, stamp: int, values: Array) -> Any:
         msg = self._types.make(TYPES[Stream.STROKES])

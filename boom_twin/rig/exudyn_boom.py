@@ -11,37 +11,35 @@ J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything tha
 from __future__ import annotations
 
 from ..records import Array
-from ..scene.ideal import refuse_clearance
 from ..scene.parts import Scene
 from .assembly import gravity_in_base, section_frames
 from .joints import add_joint, add_pivot
 from .peer import exudyn, items
+from .play import refuse_other_pins
 from .sections import add_section
 from .system import Boom
 
-SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
 
-
-def build(scene: Scene, strokes: Array, elements: int = 16, shear_over_axial: float = SHEAR_OVER_AXIAL) -> Boom:
+def build(scene: Scene, strokes: Array, elements: int = 16, nodally_exact: bool = False) -> Boom:
     """The undeformed boom with its drives at absolute `strokes` (m), shape (n,); sensors may still be added.
 
     Parameters
     ----------
     elements : int
         Finite elements per flexible section, at least one per part between cylinder brackets.
-    shear_over_axial : float
-        GA over EA of all beams.
+    nodally_exact : bool
+        Whether few elements bend as many do; see `sections.shear_stiffness`.
 
     Raises
     ------
     UsageError
-        The scene has pins with clearance.
+        The scene has pins with clearance other than of rods, or on a rod without mass.
     """
-    refuse_clearance(scene, "the virtual rig")
+    refuse_other_pins(scene)
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))
-    boom = Boom(scene, container, system, [*gravity_in_base(scene), 0.0], ground, shear_over_axial)
+    boom = Boom(scene, container, system, [*gravity_in_base(scene), 0.0], ground, nodally_exact)
     frames = section_frames(scene, strokes)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))

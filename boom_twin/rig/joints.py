@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from ..records import Array
-from ..scene.parts import Cylinder, CylinderPart
+from ..scene.parts import Cylinder, CylinderPart, Pin
 from .assembly import Frame, six_bar_points
 from .peer import items
+from .play import Bush, contact_of, pin_with_play
 from .system import Boom
 
 
@@ -34,9 +35,10 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
         ends = np.array(boom.scene.base.cylinder_pin), frames[0].point(place)
     else:
         barrel_pin, rod_pin, ends = _six_bar(boom, frames, index)
-    _drive(boom, cylinder, (barrel_pin, rod_pin), stroke)
-    _cylinder_part(boom, cylinder.barrel, (barrel_pin, rod_pin), ends)
-    _cylinder_part(boom, cylinder.rod, (rod_pin, barrel_pin), (ends[1], ends[0]))
+    worn = pin_with_play(boom.scene, index)
+    rod_end = _cylinder_part(boom, cylinder.rod, (rod_pin, barrel_pin), (ends[1], ends[0]), worn)
+    _drive(boom, cylinder, (barrel_pin, rod_end), stroke)
+    _cylinder_part(boom, cylinder.barrel, (barrel_pin, rod_end), ends)
 
 
 def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tuple[Array, Array]]:
@@ -79,16 +81,24 @@ def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float)
     boom.drives.append((int(drive), "referenceLength"))
 
 
-def _cylinder_part(boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array]) -> None:
-    """Barrel or rod: pinned at its own end, its axis through the other end (so the two parts slide on each other)."""
+def _cylinder_part(
+    boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array], worn: Pin | None = None
+) -> int:
+    """Barrel or rod: pinned at its own end, its axis through the other end (so the two parts slide on each other).
+
+    Gives the marker of its own end, which is off the pin's where the pin is `worn`.
+    """
     if part is None or part.mass == part.inertia == 0.0:
-        return
+        return pins[0]
     axis = ends[1] - ends[0]
     angle = math.atan2(axis[1], axis[0])
-    centre = ends[0] + part.com * axis / np.hypot(*axis)
-    body = boom.body(boom.node(centre, angle), part.mass, (0.0, 0.0), part.inertia)
+    node = boom.node(ends[0] + part.com * axis / np.hypot(*axis), angle)
+    body = boom.body(node, part.mass, (0.0, 0.0), part.inertia)
     own = boom.marker(body, (-part.com, 0.0))
-    boom.pin(pins[0], own)
+    if worn is None:
+        boom.pin(pins[0], own)
+    else:
+        boom.loosen(Bush(contact_of(boom.scene, worn), (pins[0], own), node))
     boom.system.AddObject(
         items.ObjectJointPrismatic2D(
             markerNumbers=[pins[1], own],
@@ -97,3 +107,4 @@ def _cylinder_part(boom: Boom, part: CylinderPart | None, pins: tuple[int, int],
             constrainRotation=False,
         )
     )
+    return own if worn else pins[0]

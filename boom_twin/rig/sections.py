@@ -13,6 +13,7 @@ from .peer import items
 from .system import Boom, BuiltSection, Station
 
 SAME_PLACE = 1e-9  # m
+SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
 
 
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
@@ -59,15 +60,16 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
     section, scene = boom.scene.sections[index], boom.scene
     assert section.A is not None and section.I is not None
     axial, bending, beta = scene.material.E * section.A, scene.material.E * section.I, section.beta or 0.0
-    shear = boom.shear_over_axial * axial
     places = np.linspace(ends[0].x, ends[1].x, elements + 1)
     inner = [boom.node(frame.point((float(x), 0.0)), frame.angle) for x in places[1:-1]]
     nodes = [ends[0].node, *inner, ends[1].node]
+    length = float(places[1] - places[0])
+    shear = shear_stiffness(axial, bending, length if boom.nodally_exact else 0.0)
     for pair in pairwise(nodes):
         beam = boom.system.AddObject(
             items.ObjectBeamGeometricallyExact2D(
                 nodeNumbers=[*pair],
-                length=float(places[1] - places[0]),
+                length=length,
                 massPerLength=(section.rho_A or 0.0) + (scene.line_fill or 0.0),
                 crossSectionInertia=section.rho_I or 0.0,
                 bendingStiffness=bending,
@@ -79,3 +81,14 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
             )
         )
         boom.weigh(int(beam))
+
+
+def shear_stiffness(axial: float, bending: float, length: float) -> float:
+    """Shear stiffness (N) of an element: the beam's, in series with 12 EI / `length`^2.
+
+    An element of constant curvature lacks the bending of a constant shear force, whose flexibility is length^2 / 12 EI. Given
+    back as shear, it makes nodes of a straight beam exact under loads at nodes; a `length` of 0 leaves it out.
+
+    Source: R. MacNeal, "A simple quadrilateral shell element", Computers & Structures 8 (1978), residual bending flexibility.
+    """
+    return 1.0 / (1.0 / (SHEAR_OVER_AXIAL * axial) + length**2 / (12.0 * bending))

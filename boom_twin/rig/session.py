@@ -26,12 +26,12 @@ EPOCH = 1_700_000_000 * NANO
 
 @dataclass(frozen=True)
 class Session:
-    """Samples of all sensors on common stamps, with the truth at the same instants.
+    """Samples of all sensors, taken at common instants, with the truth at the same instants.
 
     Attributes
     ----------
-    stamps : ndarray of int64, shape (m,)
-        Nanoseconds.
+    stamps, angle_stamps : ndarray of int64, shape (m,)
+        Nanoseconds; those of the joint angles are the same unless they come late.
     strokes, joints : ndarray, shape (m, n)
         As the transducers read them; m, rad.
     imu : ndarray, shape (m, 2)
@@ -45,6 +45,7 @@ class Session:
     strokes: Array
     joints: Array
     imu: Array
+    angle_stamps: NDArray[np.int64]
     truth: dict[str, Array]
 
     def save_truth(self, path: Path) -> None:
@@ -104,6 +105,7 @@ def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors:
         read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
         read(truth["joints"], sensors.angle_sigma, sensors.angle_resolution, angle_noise),
         read(force, sensors.imu_sigma, 0.0, imu_noise),
+        stamps,
         truth,
     )
 

@@ -12,7 +12,7 @@ from ..records import Array
 from ..scene.parts import Scene
 from .assembly import section_frames
 from .equilibrium import find_equilibrium
-from .exudyn_boom import SHEAR_OVER_AXIAL, build
+from .exudyn_boom import build
 from .probes import Probes, attach, read
 from .stepping import Effort, Scheme, step_through
 from .system import Boom
@@ -79,11 +79,9 @@ class Resting:
     forces: Array
 
 
-def at_rest(
-    scene: Scene, strokes: Array, elements: int, shear_over_axial: float = SHEAR_OVER_AXIAL
-) -> Resting:
+def at_rest(scene: Scene, strokes: Array, elements: int, nodally_exact: bool = False) -> Resting:
     """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest; see `build`."""
-    boom = build(scene, strokes, elements, shear_over_axial)
+    boom = build(scene, strokes, elements, nodally_exact)
     probes = attach(boom)
     settle(boom, strokes)
     return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])
@@ -106,7 +104,12 @@ def move(
 def settle(boom: Boom, strokes: Array) -> None:
     """Assemble the boom and bring it to its equilibrium; it is the start of what follows."""
     boom.system.Assemble()
-    find_equilibrium(boom.system, f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m")
+    aim = f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m"
+    find_equilibrium(boom.system, aim)
+    if boom.bushes:
+        for bush in boom.bushes:
+            bush.release(boom.system)
+        find_equilibrium(boom.system, f"{aim} with play in its pins")
 
 
 def _ratio(name: str, whole: float, step: float) -> int:

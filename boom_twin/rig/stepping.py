@@ -100,7 +100,7 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
     """Before every step, hand the drives that move their lengths and rates at its end; returns the seconds it takes.
 
-    All drives get those of the start at once.
+    All drives get those of the start at once. Pins with play note then whether they touch.
     """
     closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
     lengths, speeds = (strokes + closed).tolist(), rates.tolist()
@@ -119,9 +119,13 @@ def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
     def before_step(_: Any, at: float) -> bool:
         begun = time.perf_counter()
         hand_over(round(at / step))
+        for bush in boom.bushes:
+            bush.watch(boom.system)
         spent[0] += time.perf_counter() - begun
         return True
 
     hand_over(0)
+    for bush in boom.bushes:
+        bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
     return spent

@@ -8,6 +8,7 @@ from typing import Any
 from ..records import Array
 from ..scene.parts import Point, Scene
 from .peer import items
+from .play import Bush
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +56,12 @@ class Boom:
     container, system : object
         Exudyn's SystemContainer and MainSystem.
     sections : list of BuiltSection
-    shear_over_axial : float
-        GA over EA of all beams.
+    nodally_exact : bool
+        Whether a straight, lightly bent beam is exact at its nodes however few they are.
     drives : list of (int, str)
         Connector of each cylinder, and the name of its length parameter.
+    bushes : list of Bush
+        Pins with play.
     """
 
     scene: Scene
@@ -66,9 +69,10 @@ class Boom:
     system: Any
     gravity: list[float]
     ground: int
-    shear_over_axial: float
+    nodally_exact: bool
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)
+    bushes: list[Bush] = field(default_factory=list)
 
     def marker(self, body: int, local: Point) -> int:
         """A point of a rigid body, in the body's axes."""
@@ -81,6 +85,13 @@ class Boom:
     def pin(self, one: int, other: int) -> None:
         """Two markers share their place."""
         self.system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[one, other]))
+
+    def loosen(self, bush: Bush) -> None:
+        """Two markers touch as journal and bush."""
+        self.system.AddObject(
+            items.ObjectConnectorCartesianSpringDamper(markerNumbers=[*bush.sides], springForceUserFunction=bush.spring)
+        )
+        self.bushes.append(bush)
 
     def node(self, place: Array, angle: float) -> int:
         """A new node with three unknowns."""

@@ -1,0 +1,76 @@
+"""The baseline: what a boom's model and sensors are off by while all is well, as learnt from healthy sessions, or assumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..errors import UsageError
+from ..parameter_file import checked
+from ..plain import read_plain
+from ..records import Array
+from .parameters import Parameter, variances
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Row = list[Finite]
+
+
+class Baseline(BaseModel):
+    """A baseline as its file has it; SI units. Channels are ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``.
+
+    Without learning, parameters may be off by what `boom_twin.health.parameters` calls healthy.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    description: str = Field(default="nothing learnt", description="where it comes from")
+    sessions: tuple[str, ...] = Field(default=(), description="that it was learnt from")
+    names: tuple[str, ...] = Field(default=(), description="parameters that were learnt, cause:kind")
+    mean: Row = Field(default=[], description="of these")
+    covariance: list[Row] = Field(default=[], description="of these")
+    angle_error: Positive = Field(default=5e-5, description="deviation of the model's error of an angle in one posture, rad")
+    force_error: Positive = Field(default=0.02, description="likewise of the IMU's readings, m/s^2")
+    angle_noise: Positive = Field(default=1.0, description="noise of the angles over what sensors are stated to have")
+    force_noise: Positive = Field(default=1.9, description="likewise of the IMU; the look ahead adds to it")
+    detuning: Positive = Field(default=0.01, description="share by which natural frequencies may be wrong")
+
+    def errors(self, joints: int) -> Array:
+        """Deviation of the model's error of every channel, shape (joints + 2,)."""
+        return np.array([self.angle_error] * joints + [self.force_error] * 2)
+
+    def noise(self, joints: int) -> Array:
+        """Factors on the noise of every channel, shape (joints + 2,)."""
+        return np.array([self.angle_noise] * joints + [self.force_noise] * 2)
+
+    def healthy(self, known: tuple[Parameter, ...]) -> tuple[Array, Array]:
+        """Mean (parameters,) and covariance (parameters, parameters) of all parameters while all is well.
+
+        Raises
+        ------
+        UsageError
+            It was learnt on another boom.
+        """
+        place = {each.name: i for i, each in enumerate(known)}
+        if strange := [name for name in self.names if name not in place]:
+            raise UsageError(f"baseline: this boom has no {', '.join(strange)}. Learn a baseline with its own scene.")
+        size = len(self.names)
+        if len(self.mean) != size or len(self.covariance) != size or any(len(row) != size for row in self.covariance):
+            raise UsageError("baseline: mean and covariance are not of the size of names. Learn it anew.")
+        mean, covariance = np.zeros(len(known)), np.diag(variances(known, "healthy"))
+        at = [place[name] for name in self.names]
+        mean[at] = self.mean
+        if at:
+            covariance[np.ix_(at, at)] = self.covariance
+        return mean, covariance
+
+
+def load_baseline(path: Path) -> Baseline:
+    """A baseline from its file (YAML); UsageError names every value that cannot be."""
+    content = read_plain(path, UsageError, "Give a file written by `boom_twin calibrate --baseline`.")
+    if not isinstance(content, dict):
+        raise UsageError(f"{path}: not a baseline. Give a file written by `boom_twin calibrate --baseline`.")
+    return checked(Baseline, {str(key): value for key, value in content.items()}, str(path))

@@ -1,0 +1,87 @@
+"""Detection: whether innovations that should be white and of unit variance are.
+
+Per channel a two-sided CUSUM (Page 1954) for a lasting deviation, and the sum of squares over a window for a larger spread.
+Thresholds follow from the rate of false alarms that is stated: that of the CUSUM by Siegmund's approximation of its run length,
+
+    E[run] = (exp(2 k b) - 1 - 2 k b) / (2 k^2),   b = h + 1.166,
+
+k being the allowance and h the threshold; that of the window by the quantile of chi-square.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import chi2
+
+from ..records import Array
+
+ALLOWANCE = 1.0  # deviations by which the mean may be off
+CUT = 4.0  # a single innovation counts no more than this
+WINDOW = 20  # blocks of the window: 2 s
+EXCESS = 1.5  # times the variance that model error may have
+
+
+class Detector:
+    """Watches the innovations of all channels.
+
+    Parameters
+    ----------
+    channels : int
+    block : float
+        Time between innovations, s.
+    false_alarms : float
+        Of all channels together, per s.
+    """
+
+    def __init__(self, channels: int, block: float, false_alarms: float) -> None:
+        rate = false_alarms * block / (4.0 * channels)  # per test: two sides, and as many for the window as for the CUSUM
+        self.threshold = cusum_threshold(1.0 / rate)
+        self.limit = EXCESS * float(chi2.isf(2.0 * rate, WINDOW))
+        self._up, self._down = np.zeros(channels), np.zeros(channels)
+        self._began = np.zeros((2, channels), dtype=np.int64)
+        self._squares: deque[Array] = deque(maxlen=WINDOW)
+        self._count = 0
+
+    def take(self, normal: Array) -> None:
+        """Innovations of one block, shape (channels,), NaN where nothing was measured."""
+        self._count += 1
+        z = np.clip(np.nan_to_num(normal), -CUT, CUT)
+        for row, (sums, signed) in enumerate(((self._up, z), (self._down, -z))):
+            self._began[row] = np.where(sums == 0.0, self._count, self._began[row])
+            np.maximum(0.0, sums + np.where(np.isfinite(normal), signed - ALLOWANCE, 0.0), out=sums)
+        self._squares.append(np.minimum(np.nan_to_num(normal) ** 2, CUT**2))
+
+    @property
+    def levels(self) -> Array:
+        """Of each channel: 1 and above is an alarm; shape (channels,)."""
+        window = np.sum(self._squares, axis=0) if len(self._squares) == WINDOW else 0.0
+        return np.maximum(np.maximum(self._up, self._down) / self.threshold, window / self.limit)
+
+    def blocks_since(self, channel: int) -> int:
+        """Blocks since the deviation of a channel began, as far as it can be told."""
+        row = 0 if self._up[channel] >= self._down[channel] else 1
+        if max(self._up[channel], self._down[channel]) < self.threshold:
+            return WINDOW
+        return self._count - int(self._began[row, channel]) + 1
+
+    def reset(self, channels: NDArray[np.bool_] | None = None) -> None:
+        """Begin anew, at some channels or all."""
+        which = np.ones(len(self._up), dtype=bool) if channels is None else channels
+        self._up[which], self._down[which] = 0.0, 0.0
+        for squares in self._squares:
+            squares[which] = 0.0
+
+
+def cusum_threshold(run: float) -> float:
+    """Threshold of a one-sided CUSUM whose mean time between false alarms is `run` steps."""
+
+    def excess(h: float) -> float:
+        b = 2.0 * ALLOWANCE * (h + 1.166)
+        return math.expm1(b) - b - 2.0 * ALLOWANCE**2 * run
+
+    return float(brentq(excess, 0.0, 100.0))

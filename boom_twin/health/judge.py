@@ -1,0 +1,132 @@
+"""The judge of a rig's health: predictions and measurements in, alarms out. No ROS, no files, no clock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..analysis.noise import StrokeNoise
+from ..records import Alarm, Array, Health, Mount, Prediction, Residuals
+from ..scene.parts import Scene
+from ..settings import Settings
+from .baseline import Baseline
+from .blocks import BLOCK, NANO, Block, Blocks, means, stacked
+from .linear import Means
+from .residual_watch import ResidualWatch
+from .sensor_watch import SensorWatch
+from .sensors import SensorCheck
+
+PERIOD = 1_000_000_000  # ns between two `Health` without news
+
+
+class Judge:
+    """Follows one rig.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    settings : Settings
+    mounts : tuple of Mount or None
+        Of the angle sensors.
+    baseline : Baseline
+        What is known of this rig while all is well.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], baseline: Baseline) -> None:
+        n = len(scene.joints)
+        self._n, self._settings = n, settings
+        self._angle_names = tuple(f"joint_{i + 1}" for i in range(n))
+        self._stroke_names = tuple(f"cylinder_{i + 1}" for i in range(n))
+        self.names = (*self._angle_names, "tip_imu_x", "tip_imu_z")
+        self._low = np.array([np.radians(joint.range_deg[0]) for joint in scene.joints])
+        self._high = np.array([np.radians(joint.range_deg[1]) for joint in scene.joints])
+        absolute = np.array([mount is not None for mount in mounts])
+        self._low[absolute], self._high[absolute] = -np.inf, np.inf
+        self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+        self.residuals = ResidualWatch(scene, settings, mounts, baseline, self.names)
+        self._angle_watch, self._stroke_watch = SensorWatch(self._angle_names), SensorWatch(self._stroke_names)
+        self._ended: list[Alarm] = []
+        self._told = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """The boom starts from rest; alarms of sensors go on."""
+        settings = self._settings
+        self._blocks = Blocks()
+        self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
+        zero = np.zeros(self._n)
+        self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
+        self._rates: Array | None = None
+        ended = self.residuals.close(self._told)
+        if ended is not None:
+            self._ended.append(ended)
+        self.residuals.begin()
+
+    def predicted(self, prediction: Prediction, strokes: Array, variances: Array, noise: StrokeNoise | None) -> None:
+        """A prediction, with the strokes (m) as measured, the variances (m^2) of their estimates, and the modes there."""
+        self._blocks.predicted(prediction, strokes)
+        self._variances, self._noise = variances, noise
+
+    def measured(self, residuals: Residuals, values: Array) -> None:
+        """Residuals of a sample with its values (rad, m/s^2)."""
+        self._blocks.measured(residuals, values)
+
+    def judge(self, stamp: int) -> Health | None:
+        """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell."""
+        news: list[Alarm] = []
+        done = self._blocks.close(stamp)
+        for block in done:
+            if block.predictions:
+                news += self._judge(block)
+        news += self._ended
+        self._ended = []
+        if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
+            return None
+        self._told = done[-1].end
+        lasting = (*self._stroke_watch.alarms, *self._angle_watch.alarms)
+        if self.residuals.alarm is not None:
+            lasting = (*lasting, self.residuals.alarm)
+        ended = tuple(alarm for alarm in news if alarm.until is not None)
+        return Health(self._told, (*ended, *lasting), self.names, self.residuals.levels, self._tip_sigmas())
+
+    def _judge(self, block: Block) -> list[Alarm]:
+        n, start = self._n, block.number * BLOCK
+        stamps, raw, left = stacked(block.angles, n)
+        news = self._angle_watch.take(self._angles.look(stamps, raw, raw - left, block.end * NANO), start, block.end)
+        stroke_stamps = np.array([prediction.stamp for prediction in block.predictions]) * NANO
+        readings = np.array(block.strokes)
+        strokes = self._strokes.look(stroke_stamps, readings, np.zeros_like(readings), block.end * NANO)
+        news += self._stroke_watch.take(strokes, start, block.end)
+        if self._stroke_watch.masked.any() or self._noise is None:
+            ended = self.residuals.close(start)
+            return news if ended is None else [*news, ended]
+        told = self.residuals.take(self._means(block, left), self._noise)
+        return news if told is None else [*news, told]
+
+    def _means(self, block: Block, left: Array) -> Means:
+        settings, predictions = self._settings, block.predictions
+        _, _, forces = stacked(block.forces, 2)
+        angle, angle_count = means(left, settings.angle_variance**0.5)
+        angle[self._angle_watch.masked] = np.nan
+        force, force_count = means(forces, settings.imu_sigma)
+        first, last = predictions[0], predictions[-1]
+        span = (last.stamp - first.stamp) * NANO
+        rates = (last.joints - first.joints) / span if span > 0.0 else np.zeros(self._n)
+        accelerations = np.array([prediction.tip_acceleration for prediction in predictions])
+        return Means(
+            start=block.number * BLOCK,
+            left=np.concatenate([angle, force]),
+            counts=np.concatenate([angle_count, force_count]),
+            strokes=predictions[len(predictions) // 2].strokes,
+            variances=self._variances,
+            rates=rates,
+            shaking=float((accelerations**2).sum(axis=1).mean()),
+        )
+
+    def _tip_sigmas(self) -> Array:
+        """Of the predicted tip, m: what strokes and parameters may be off by."""
+        signature, watch = self.residuals.signature, self.residuals
+        if signature is None:
+            return np.full(2, np.nan)
+        by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip)
+        return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))

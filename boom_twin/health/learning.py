@@ -1,0 +1,113 @@
+"""Learns a baseline from healthy sessions: what parameters are off by, and how large the errors are that stay.
+
+The errors (deviation of the model's error of angles and of the IMU, their noise, the detuning) are those under which the
+innovations of all sessions are most probable, found by coordinate search on a grid of ratios; with them, the regression of all
+sessions one after the other gives the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from ..errors import UsageError
+from ..records import Array
+from .baseline import Baseline
+from .blocks import BLOCK, NANO
+from .linear import Problem
+from .parameters import Parameter
+from .regression import GATE, Regression
+from .whitening import Modes, Whitening
+
+SEARCHED = ("angle_error", "force_error", "angle_noise", "force_noise", "detuning")
+BOUNDS = {
+    "angle_error": (3e-5, 2e-3), "force_error": (2e-3, 0.5), "angle_noise": (0.7, 3.0), "force_noise": (0.7, 5.0),
+    "detuning": (2e-3, 0.1),
+}  # fmt: skip
+RATIOS = (2.0, 1.25)  # of the grid, coarse and fine
+ROUNDS = 2
+WIDER = 4.0  # times the covariance that is learnt, because the model is not exact
+LEAST = 60.0  # s
+
+Session = Sequence[Problem]
+
+
+def learn(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, names: Sequence[str]) -> Baseline:
+    """A baseline from the linear problems of healthy sessions of one rig, called `names`.
+
+    Raises
+    ------
+    UsageError
+        Less than a minute of sessions.
+    """
+    span = sum(len(session) for session in sessions) * BLOCK * NANO
+    if span < LEAST:
+        raise UsageError(f"sessions = {span:.0f} s in all: too short to learn from. Give at least {LEAST:.0f} s, with moves.")
+    best = Baseline(description="learnt", sessions=tuple(names))
+    for ratio in RATIOS:
+        for _ in range(ROUNDS):
+            before = best
+            for key in SEARCHED:
+                best = _climb(sessions, known, joints, best, key, ratio)
+            if best == before:
+                break
+    regression, _ = _run(sessions, known, joints, best)
+    learnt = [i for i, each in enumerate(known) if each.healthy > 0.0]
+    covariance = WIDER * regression.covariance[np.ix_(learnt, learnt)]
+    return best.model_copy(
+        update={
+            "names": tuple(known[i].name for i in learnt),
+            "mean": regression.mean[learnt].tolist(),
+            "covariance": covariance.tolist(),
+        }
+    )
+
+
+def _climb(
+    sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, start: Baseline, key: str, ratio: float
+) -> Baseline:
+    """Go up or down with one value as long as innovations get more probable."""
+    low, high = BOUNDS[key]
+
+    def logs(values: list[float]) -> list[float]:
+        trials = [start.model_copy(update={key: value}) for value in values]
+        with ThreadPoolExecutor(2) as pool:
+            return list(pool.map(lambda trial: _run(sessions, known, joints, trial)[1], trials))
+
+    now = getattr(start, key)
+    down, here, up = logs([now / ratio, now, now * ratio])
+    if max(down, up) <= here:
+        return start
+    factor = 1.0 / ratio if down > up else ratio
+    best, value = max(down, up), now * factor
+    if not low <= value <= high:
+        return start.model_copy(update={key: min(max(value, low), high)})
+    while low < value * factor < high and (found := logs([value * factor])[0]) > best:
+        best, value = found, value * factor
+    return start.model_copy(update={key: float(f"{value:.3g}")})
+
+
+def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, trial: Baseline) -> tuple[Regression, float]:
+    """Regression over all sessions, and the logarithm of the probability of their innovations."""
+    regression, log = Regression(*Baseline().healthy(known)), 0.0
+    errors2, noise2 = trial.errors(joints) ** 2, trial.noise(joints) ** 2
+    for session in sessions:
+        whitening = Whitening(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning)
+        modes: Modes | None = None
+        for problem in session:
+            if problem.modes is not modes:
+                modes = problem.modes
+                whitening.tune(modes)
+            noise = np.diag(problem.own * noise2) + problem.strokes
+            found = whitening.step(problem.table, noise, errors2, problem.shaking, problem.travel)
+            log += _log(regression, found.white, found.log)
+    return regression, log
+
+
+def _log(regression: Regression, white: Array, log: float) -> float:
+    """Logarithm of the probability of one block, and the regression narrowed by it; outliers count as if at the gate."""
+    first = white[:, 0].copy()
+    left, spread = regression.take(white, True)
+    return log + 0.5 * float(first @ first) - 0.5 * float(np.minimum(left**2, GATE**2).sum()) - spread

@@ -1,0 +1,163 @@
+"""What may be wrong with a boom and its sensors, as parameters of linear signatures in the residuals.
+
+A parameter is 0 where the scene and the mapping are right. Stiffnesses are taken by their compliance, in which residuals are
+nearly linear: a parameter of 0.25 of ``cylinder_2.k`` is an oil spring 1.25 times as compliant as the scene's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal
+
+import numpy as np
+
+from ..records import Array
+from ..scene.named import parameter, parameter_names
+from ..scene.parts import Scene
+
+
+class Form(Enum):
+    """How a parameter enters the residuals."""
+
+    SCENE = "scene"  # by another equilibrium of the model
+    ANGLE = "angle"  # adds to one angle
+    DRIFT = "drift"  # adds to one angle, in proportion to time
+    STROKE = "stroke"  # adds to one stroke
+    SCALE = "scale"  # multiplies one stroke
+    PLAY = "play"  # lengthens one cylinder the way it is pulled
+    DELAY = "delay"  # angles are those of an earlier time
+    IMU = "imu"  # adds to one axis of the IMU
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One thing that may be wrong.
+
+    Attributes
+    ----------
+    cause : str
+        The scene's parameter or the sensor, as alarms name it.
+    kind : str
+        What is then the matter with it, in a word.
+    form : Form
+    index : int
+        Of the cylinder, joint, section or axis, from 0; 0 where there is only one.
+    unit : str
+        Of the parameter; empty for a share.
+    healthy : float
+        Standard deviation that it may have while all is well and nothing has been learnt.
+    faulty : float
+        Standard deviation of a fault.
+    one_sided : bool
+        Faults are positive.
+    """
+
+    cause: str
+    kind: str
+    form: Form
+    index: int
+    unit: str
+    healthy: float
+    faulty: float
+    one_sided: bool = False
+
+    @property
+    def name(self) -> str:
+        """Cause and kind: no two parameters share it."""
+        return f"{self.cause}:{self.kind}"
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One cause, with the places of the parameters (in the order of `parameters`) that it may show in.
+
+    Attributes
+    ----------
+    cause : str
+    places : tuple of int
+    prior : float
+        Its weight beside the others before anything is seen.
+    """
+
+    cause: str
+    places: tuple[int, ...]
+    prior: float
+
+
+COMPLIANCE = (0.02, 0.5)
+BENDING = (0.02, 0.3)
+RARE = 0.1
+
+
+def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
+    """Everything that may be wrong with this boom and its sensors, in a fixed order."""
+    names, joints = set(parameter_names(scene)), len(scene.joints)
+    each = range(joints)
+    found = [
+        Parameter(f"cylinder_{i + 1}.k", "softer", Form.SCENE, i, "", *COMPLIANCE, one_sided=True)
+        for i in each
+        if f"cylinder_{i + 1}.k" in names
+    ]
+    found += [
+        Parameter(f"section_{i + 1}.EI", "softer", Form.SCENE, i, "", *BENDING, one_sided=True)
+        for i in each
+        if f"section_{i + 1}.EI" in names
+    ]
+    found += [
+        Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0),
+        Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0),
+    ]
+    found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
+    found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 5e-4, one_sided=True) for i in each]
+    found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05))
+    if has_imu:
+        found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
+    found += [
+        Parameter(f"section_{i + 1}.mass", "changed", Form.SCENE, i, "", 0.02, 0.0)
+        for i in each
+        if f"section_{i + 1}.mass" in names
+    ]
+    return tuple(found)
+
+
+def hypotheses(known: tuple[Parameter, ...]) -> tuple[Hypothesis, ...]:
+    """The causes of faults among parameters: one for each cause that can have one."""
+    causes = dict.fromkeys(each.cause for each in known if each.faulty > 0.0)
+    return tuple(
+        Hypothesis(
+            cause,
+            tuple(i for i, each in enumerate(known) if each.cause == cause),
+            RARE if cause.endswith("clearance") else 1.0,
+        )
+        for cause in causes
+    )
+
+
+def step_of(each: Parameter, scene: Scene) -> tuple[float, dict[str, float]]:
+    """A small value of a parameter of the scene, and what the scene then has; see `boom_twin.scene.named`."""
+    value = parameter(scene, each.cause)
+    if each.unit == "":
+        share = 0.01
+        return share, {each.cause: value * (1.0 + share) if each.cause.endswith(".mass") else value / (1.0 + share)}
+    step = 1.0 if each.unit == "kg" else 0.1
+    return step, {each.cause: value + step}
+
+
+def physical(each: Parameter, scene: Scene, value: float) -> float:
+    """What a scene's parameter is (SI) where its parameter here has a value."""
+    own = parameter(scene, each.cause)
+    if each.unit:
+        return own + value
+    return own * (1.0 + value) if each.cause.endswith(".mass") else own / (1.0 + value)
+
+
+Spread = Literal["healthy", "faulty"]
+
+
+def variances(known: tuple[Parameter, ...], spread: Spread) -> Array:
+    """Squares of one of the deviations, shape (parameters,)."""
+    return np.array([getattr(each, spread) ** 2 for each in known])

@@ -1,0 +1,156 @@
+"""What one sensor does that no boom can do: stuck, noisy, spikes, jumps, silence, readings out of range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records import Array
+
+Flags = NDArray[np.bool_]
+
+SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
+JUMP = 10.0  # likewise, by which readings change at once and for good
+NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is stated; time (s) over which it is taken
+QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
+REPEATS_FOR = 0.4  # s, at least, of one reading again and again
+FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
+SILENT_FOR = 0.5  # s
+
+
+@dataclass(frozen=True)
+class Findings:
+    """By channel, in one block; shape (channels,) each."""
+
+    stuck: Flags
+    noisy: Flags
+    spikes: Flags
+    jumped: Array
+    silent: Flags
+    outside: Flags
+
+    def by_kind(self) -> dict[str, Flags]:
+        """In the words of alarms."""
+        return {
+            "stuck": self.stuck, "noise": self.noisy, "spikes": self.spikes, "jump": self.jumped != 0.0,
+            "dropout": self.silent, "range": self.outside,
+        }  # fmt: skip
+
+
+class SensorCheck:
+    """Looks at the readings of one stream, block by block.
+
+    Parameters
+    ----------
+    sigma, resolution : float
+        Noise and rounding of its sensors, in their unit.
+    low, high : ndarray, shape (channels,)
+        Their range.
+    fastest : float
+        What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
+    """
+
+    def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
+        self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
+        self._fastest = fastest
+        self._low, self._high = low - 5.0 * self._sigma, high + 5.0 * self._sigma
+        self._patience = repeats(sigma, resolution)
+        count = len(low)
+        self._raw, self._left = np.full((3, count), np.nan), np.full((3, count), np.nan)
+        self._stamps = np.zeros(3)
+        self._run, self._since = np.zeros(count, dtype=np.int64), np.zeros(count)
+        self._heard = np.full(count, np.nan)
+        self._power, self._weight = np.full(count, np.nan), 0.0
+
+    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> Findings:
+        """Take the readings of a block.
+
+        Parameters
+        ----------
+        stamps : ndarray, shape (k,)
+            s.
+        raw, expected : ndarray, shape (k, channels)
+            As measured, NaN where not, and as the model has them.
+        now : float
+            End of the block, s.
+        """
+        count = raw.shape[1]
+        if not len(stamps):
+            return self._nothing(count, now)
+        times = np.concatenate([self._stamps, stamps])
+        all_raw = np.vstack([self._raw, raw])
+        left = np.vstack([self._left, raw - expected])
+        self._heard = _newest(stamps, raw, self._heard)
+        spikes = self._spikes(left)
+        self._listen(left[1:], stamps[-1] - stamps[0], len(stamps))
+        findings = Findings(
+            stuck=self._stuck(times[2:], all_raw[2:]),
+            noisy=self._power > (NOISY * self._sigma) ** 2,
+            spikes=spikes,
+            jumped=self._jumps(times, all_raw, left),
+            silent=now - self._heard > SILENT_FOR,
+            outside=((raw < self._low) | (raw > self._high)).mean(axis=0) > 0.5,
+        )
+        self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
+        return findings
+
+    def _nothing(self, count: int, now: float) -> Findings:
+        none = np.zeros(count, dtype=bool)
+        return Findings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
+
+    def _spikes(self, left: Array) -> Flags:
+        """A reading that leaves both neighbours the same way, while these agree."""
+        with np.errstate(invalid="ignore"):
+            out, back = left[1:-1] - left[:-2], left[1:-1] - left[2:]
+            lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * self._sigma) & (out * back > 0.0)
+            lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
+        return np.asarray(lone.any(axis=0))
+
+    def _listen(self, left: Array, span: float, number: int) -> None:
+        """Power of the noise, by second differences of neighbours; single outliers are cut off."""
+        with np.errstate(invalid="ignore"):
+            bend2 = np.minimum((left[2:] - 2.0 * left[1:-1] + left[:-2]) ** 2 / 6.0, (4.0 * NOISY * self._sigma) ** 2)
+        known = np.isfinite(bend2)
+        power = np.where(known.any(axis=0), np.nansum(bend2, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
+        share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
+        fresh = np.isnan(self._power)
+        mixed = np.where(fresh, np.minimum(power, self._sigma**2), self._power + share * (power - self._power))
+        self._power = np.where(np.isnan(power), self._power, mixed)
+
+    def _stuck(self, times: Array, raw: Array) -> Flags:
+        """One reading again and again, while others of the stream are alive with noise."""
+        same, changed = raw[1:] == raw[:-1], np.isfinite(raw[1:]) & (raw[1:] != raw[:-1])
+        order = np.arange(1, len(raw))[:, None]
+        last = np.where(changed, order, 0).max(axis=0)
+        self._run = np.where(last > 0, 0, self._run) + (same & (order > last)).sum(axis=0)
+        self._since = np.where(last > 0, times[last], self._since)
+        live = self._power > (QUIET * self._sigma) ** 2
+        witnessed = live.any() and len(live) > 1
+        return np.asarray((self._run >= self._patience) & (times[-1] - self._since >= REPEATS_FOR) & witnessed)
+
+    def _jumps(self, times: Array, raw: Array, left: Array) -> Array:
+        """How far readings changed from one to the next, for good, while the model did not; 0 where they did not."""
+        with np.errstate(invalid="ignore"):
+            step, measured = left[2:-1] - left[1:-2], raw[2:-1] - raw[1:-2]
+            lasting = 0.5 * (left[2:-1] + left[3:]) - 0.5 * (left[:-3] + left[1:-2])
+            least = np.maximum(JUMP * self._sigma, self._fastest * (times[2:-1] - times[1:-2]))[:, None]
+            sudden = (np.abs(measured) > least) & (np.abs(step) > least) & (np.abs(lasting) > 0.7 * np.abs(step))
+            calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
+            sudden &= calm < 0.3 * np.abs(step)
+        return np.where(sudden.any(axis=0), np.where(sudden, step, 0.0).sum(axis=0), 0.0)
+
+
+def _newest(stamps: Array, raw: Array, before: Array) -> Array:
+    """Times of the newest readings, shape (channels,)."""
+    seen = np.where(np.isfinite(raw), stamps[:, None], -np.inf).max(axis=0)
+    return np.asarray(np.where(np.isnan(before), np.where(np.isfinite(seen), seen, stamps[0]), np.maximum(before, seen)))
+
+
+def repeats(sigma: float, resolution: float) -> int:
+    """Readings in a row that are the same with a probability below `FALSE_ALARM` while the sensor lives."""
+    spread = math.sqrt(2.0) * max(sigma, 1e-300)
+    same = math.erf(resolution / (2.0 * spread))  # that rounding hides the difference of two readings, at most
+    return 3 if same < 1e-4 else min(math.ceil(math.log(FALSE_ALARM) / math.log(min(same, 0.9999))), 1_000_000)

@@ -1,0 +1,163 @@
+"""How every parameter shows in the residuals, at the present posture and load: derivatives of the boom's equilibrium."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.statics import settle
+from ..chain.program import State, Work
+from ..chain.status import OK
+from ..chain.step import advance
+from ..errors import BoomTwinError
+from ..mounting import Mounting
+from ..physics.integrators import REST, X, prepare
+from ..plan.compile import compile_scene
+from ..plan.plan import Plan
+from ..records import Array, Mount
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.named import with_parameters
+from ..scene.parts import Scene
+from .parameters import Form, Parameter, step_of
+from .reading import Reading
+
+STROKE_STEP = 1e-5  # m
+TOLERANCE, PASSES, LONGEST = 1e-7, np.int64(12), 0.1  # of a pass, rad
+
+
+class Signature(NamedTuple):
+    """At one posture; n joints, c = n + 2 channels (angles, IMU).
+
+    Attributes
+    ----------
+    strokes : ndarray, shape (n,)
+        m.
+    channels : ndarray, shape (c, parameters)
+        Derivative of measured minus predicted; the columns that depend on motion or time are 0.
+    tip : ndarray, shape (2, parameters)
+        Likewise of the tip's place, m.
+    by_stroke : ndarray, shape (c, n)
+        Derivative of what sensors should read by the strokes, 1/m.
+    tip_by_stroke : ndarray, shape (2, n)
+    """
+
+    strokes: Array
+    channels: Array
+    tip: Array
+    by_stroke: Array
+    tip_by_stroke: Array
+
+
+class _Boom:
+    """One boom with a state of its own."""
+
+    def __init__(self, scene: Scene, mounts: tuple[Mount | None, ...]) -> None:
+        self.scene = scene
+        self.plan: Plan = compile_scene(scene)
+        self.state: State = self.plan.state()
+        self.work: Work = self.plan.work()
+        self._still = np.zeros(self.plan.joints)
+        self._scheme = prepare(REST, 0.0, 0.0, self.work.weights)
+        self.reading = Reading(self.plan, Mounting(self.plan, scene.base.inclination, mounts))
+
+    def start(self, strokes: Array) -> None:
+        """Rest there, from nothing; SolverError or UsageError if there is no equilibrium."""
+        settle(self.plan, self.state, self.work, strokes, joint_angles_of_strokes(self.scene, strokes))
+
+    def rest(self, strokes: Array) -> Array | None:
+        """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
+        drive = self.plan.closed_lengths + strokes
+        status, _, _ = advance(
+            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None
+        )
+        return self.reading.of(self.state) if status == OK else None
+
+    def follow(self, other: _Boom) -> None:
+        """Be where a boom with the same unknowns is; it may lack point masses that this one has."""
+        self.state.z[:] = other.state.z
+        self.state.history[X, : len(self.state.z)] = self.state.z
+        self.state.contacts[:], self.state.drives[:] = other.state.contacts, other.state.drives
+
+
+class Signatures:
+    """Follows the posture of a boom.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    known : tuple of Parameter
+    mounts : tuple of Mount or None
+        Of the angle sensors.
+    """
+
+    def __init__(self, scene: Scene, known: tuple[Parameter, ...], mounts: tuple[Mount | None, ...]) -> None:
+        self.scene, self.known = scene, known
+        self.nominal = _Boom(scene, mounts)
+        self._changed: list[tuple[int, float, _Boom]] = []
+        for place, each in enumerate(known):
+            if each.form is Form.SCENE:
+                step, values = step_of(each, scene)
+                self._changed.append((place, step, _Boom(with_parameters(scene, values), mounts)))
+        self._is_settled = False
+
+    def at(self, strokes: Array) -> Signature | None:
+        """At `strokes` (m), shape (n,); None where there is no equilibrium."""
+        try:
+            return self._at(strokes)
+        except BoomTwinError:
+            self._is_settled = False
+            return None
+
+    def _at(self, strokes: Array) -> Signature | None:
+        n = len(strokes)
+        base = self._rest(strokes)
+        if base is None:
+            return None
+        forces = self.nominal.reading.forces(self.nominal.state)
+        by_stroke = np.empty((n + 4, n))
+        probe = strokes.copy()
+        for i in range(n):
+            probe[i] = strokes[i] + STROKE_STEP
+            moved = self.nominal.rest(probe)
+            probe[i] = strokes[i]
+            if moved is None:
+                return None
+            by_stroke[:, i] = (moved - base) / STROKE_STEP
+        if self.nominal.rest(strokes) is None:
+            return None
+        table = np.zeros((n + 4, len(self.known)))
+        for place, step, boom in self._changed:
+            boom.follow(self.nominal)
+            moved = boom.rest(strokes)
+            if moved is None:
+                return None
+            table[:, place] = (moved - base) / step
+        for place, each in enumerate(self.known):
+            table[:, place] += _direct(each, n, by_stroke, strokes, forces)
+        return Signature(strokes.copy(), table[: n + 2], table[n + 2 :], by_stroke[: n + 2], by_stroke[n + 2 :])
+
+    def _rest(self, strokes: Array) -> Array | None:
+        """The nominal boom there: next to where it was, else from nothing."""
+        if self._is_settled and (found := self.nominal.rest(strokes)) is not None:
+            return found
+        self.nominal.start(strokes)
+        self._is_settled = True
+        return self.nominal.rest(strokes)
+
+
+def _direct(each: Parameter, n: int, by_stroke: Array, strokes: Array, forces: Array) -> Array:
+    """The column of a parameter that is not the scene's, shape (n + 4,)."""
+    column, i = np.zeros(n + 4), each.index
+    if each.form is Form.ANGLE:
+        column[i] = 1.0
+    elif each.form is Form.IMU:
+        column[n + i] = 1.0
+    elif each.form is Form.STROKE:
+        column = -by_stroke[:, i]
+    elif each.form is Form.SCALE:
+        column = -by_stroke[:, i] * strokes[i]
+    elif each.form is Form.PLAY:
+        column = by_stroke[:, i] * np.sign(forces[i])
+    return column

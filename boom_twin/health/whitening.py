@@ -1,0 +1,205 @@
+"""The whitening filter: residuals less the vibration and the slow errors that a good model still leaves in them.
+
+Two kinds of deviation are no fault. What strokes' noise shakes out of the natural modes, and what a model leaves of a
+vibration whose frequency it has a little wrong: per mode a coordinate eta with eta'' + 2 zeta omega eta' + omega^2 eta = w;
+w is white, of the density that
+
+- gives eta the variance that stroke noise collects in the mode (see `boom_twin.analysis.noise`), and
+- lets a vibration of the predicted size lose step with the real one as if its frequency were wrong by the share `detuning`
+  within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
+
+The shape of a mode is then wrong, too: every channel has a noise of its own, of `SHAPE` detuning times what it reads of that
+vibration.
+
+And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
+a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
+
+A Kalman filter on all these turns the means of residuals in blocks into innovations: white and of unit variance while all is
+well, but for what parameters add. Its gains do not depend on what is measured, so the same filter run over the signature of a
+parameter tells how that parameter shows in the innovations (Willsky and Jones 1976).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.frequencies import Mode, along
+from ..analysis.noise import StrokeNoise
+from ..chain.program import State, Work
+from ..plan.plan import Plan
+from ..records import Array
+from .reading import Reading
+
+HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
+KEEPS_STEP = 1.0  # s, see above
+LEAST_DAMPING = 2e-4  # of omega, so that every mode has a finite variance
+SHAPE = 0.5  # see above
+REACH = 0.05  # m of travel
+REST = 1e-3  # m/s of travel that time stands for while the boom rests
+
+
+class Modes(NamedTuple):
+    """Of one posture: c channels, m modes below `HIGHEST`.
+
+    Attributes
+    ----------
+    frequencies : ndarray, shape (m,)
+        Hz.
+    turn, least, driven : ndarray, shape (2 m, 2 m)
+        What coordinates and their rates become within a block; covariance that stroke noise adds, and that wrong frequencies
+        add for a mean square of the tip's acceleration of 1 (m/s^2)^2 and a detuning of 1.
+    rest : ndarray, shape (2 m, 2 m)
+        Their covariance after long shaking by stroke noise.
+    shown : ndarray, shape (c, 2 m)
+        How the means of the channels read them.
+    shaken : ndarray, shape (c,)
+        Mean square of what they read while the mean square of the tip's acceleration is 1 (m/s^2)^2.
+    """
+
+    frequencies: Array
+    turn: Array
+    least: Array
+    driven: Array
+    rest: Array
+    shown: Array
+    shaken: Array
+
+
+def modes_of(
+    noise: StrokeNoise, plan: Plan, state: State, work: Work, reading: Reading, block: float, before: Modes | None
+) -> Modes:
+    """The modes of a posture, where the boom is at rest in `state`, for blocks of `block` s; of the signs of those `before`."""
+    kept = [j for j, mode in enumerate(noise.modes) if mode.frequency < HIGHEST]
+    size, n, tip, h = len(kept), plan.joints, plan.tables.tip, block
+    turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
+    shown, shaken = np.zeros((n + 2, 2 * size)), np.zeros(n + 2)
+    for k, j in enumerate(kept):
+        mode, omega, at = noise.modes[j], 2.0 * math.pi * noise.modes[j].frequency, slice(2 * k, 2 * k + 2)
+        turn[at, at] = own = oscillation(omega, max(noise.decay[j], LEAST_DAMPING * omega), h)
+        rest[at, at] = noise.collected[j] * np.diag([1.0, omega * omega])
+        least[at, at] = rest[at, at] - own @ rest[at, at] @ own.T
+        swing = max(float(np.hypot(*mode.motion[tip : tip + 2])), 1e-12)
+        driven[at, at] = KEEPS_STEP / swing**2 * np.array([[h**3 / 3.0, h * h / 2.0], [h * h / 2.0, h]])
+        shown[:, 2 * k] = np.sinc(mode.frequency * h) * _shown(plan, state, work, mode, reading)
+        if before is not None and 2 * k < before.shown.shape[1] and shown[:, 2 * k] @ before.shown[:, 2 * k] < 0.0:
+            shown[:, 2 * k] *= -1.0
+        shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
+    return Modes(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown, shaken)
+
+
+def oscillation(omega: float, decay: float, h: float) -> Array:
+    """What position and velocity of eta'' + decay eta' + omega^2 eta = 0 become within h (s); shape (2, 2), exact."""
+    half = 0.5 * decay
+    wave2 = omega * omega - half * half
+    wave = math.sqrt(abs(wave2))
+    if wave2 > 0.0:
+        c, s = math.cos(wave * h), math.sin(wave * h) / wave
+    else:
+        c, s = math.cosh(wave * h), (math.sinh(wave * h) / wave if wave > 0.0 else h)
+    return math.exp(-half * h) * np.array([[c + half * s, s], [-omega * omega * s, c - half * s]])
+
+
+def _shown(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> Array:
+    """How the sensors read a unit of a mode's coordinate, shape (n + 2,): angles, and the IMU's axes with the acceleration."""
+    n, omega = plan.joints, 2.0 * math.pi * mode.frequency
+    angle = float(state.frames[-1, 2])
+    shown = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
+    ax, ay = -omega * omega * mode.motion[plan.tables.tip : plan.tables.tip + 2]
+    c, s = math.cos(angle), math.sin(angle)
+    shown[n:] += np.array([c * ax + s * ay, c * ay - s * ax])
+    return shown
+
+
+class Innovations(NamedTuple):
+    """Of one block.
+
+    Attributes
+    ----------
+    white : ndarray, shape (measured, columns)
+        In the order of the channels that were measured; each row of unit variance and independent of the others.
+    log : float
+        Logarithm of the probability density of column 0, but for a constant.
+    """
+
+    white: Array
+    log: float
+
+
+class Whitening:
+    """Filters several columns at once: column 0 the residuals, the others signatures.
+
+    Parameters
+    ----------
+    channels, columns : int
+    block : float
+        Length of a block, s.
+    detuning : float
+        Share by which natural frequencies may be wrong.
+    """
+
+    def __init__(self, channels: int, columns: int, block: float, detuning: float) -> None:
+        self._block, self._detuning2, self._channels = block, detuning**2, channels
+        self._x, self._p = np.zeros((channels, columns)), np.zeros((channels, channels))
+        self._fresh, self._modes = True, 0
+
+    def tune(self, modes: Modes) -> None:
+        """Take the modes of another posture; coordinates of modes that were there go on."""
+        size, old, c = len(modes.turn), self._modes, self._channels
+        kept = min(size, old)
+        places = [*range(kept), *range(old, old + c)]
+        at = [*range(kept), *range(size, size + c)]
+        x, p = np.zeros((size + c, self._x.shape[1])), np.zeros((size + c, size + c))
+        p[:size, :size] = modes.rest
+        x[at], p[np.ix_(at, at)] = self._x[places], self._p[np.ix_(places, places)]
+        self._x, self._p, self._modes = x, p, size
+        self._turn, self._least, self._driven = modes.turn, modes.least, self._detuning2 * modes.driven
+        self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
+        self._shown = np.hstack([modes.shown, np.eye(c)])
+
+    def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
+        """Innovations of one block.
+
+        Parameters
+        ----------
+        table : ndarray, shape (channels, columns)
+            Column 0 the residuals' means, NaN where nothing was measured; the others the signatures.
+        noise : ndarray, shape (channels, channels)
+            Covariance of the means by sensor and stroke noise.
+        errors2 : ndarray, shape (channels,)
+            Variance of the model's error in one posture.
+        shaking : float
+            Mean square of the predicted tip acceleration lately, (m/s^2)^2.
+        travel : float
+            Of the strokes since the block before, m.
+        """
+        self._go_on(errors2, shaking, travel)
+        rows = np.isfinite(table[:, 0])
+        if not rows.any():
+            return Innovations(table[:0], 0.0)
+        shown = self._shown[rows]
+        cross = self._p @ shown.T
+        own = (noise + np.diag(shaking * self._shaken))[np.ix_(rows, rows)]
+        root = np.linalg.cholesky(shown @ cross + own)
+        white = np.linalg.solve(root, np.hstack([table[rows] - shown @ self._x, cross.T]))
+        innovation, cross = white[:, : table.shape[1]], white[:, table.shape[1] :]
+        self._x = self._x + cross.T @ innovation
+        self._p = self._p - cross.T @ cross
+        log = -0.5 * float(innovation[:, 0] @ innovation[:, 0]) - float(np.log(np.diag(root)).sum())
+        return Innovations(innovation, log)
+
+    def _go_on(self, errors2: Array, shaking: float, travel: float) -> None:
+        """To the next block, before it is measured."""
+        m = self._modes
+        kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
+        self._fresh = False
+        self._x[:m] = self._turn @ self._x[:m]
+        self._x[m:] *= kept
+        self._p[:m] = self._turn @ self._p[:m]
+        self._p[:, :m] = self._p[:, :m] @ self._turn.T
+        self._p[m:] *= kept
+        self._p[:, m:] *= kept
+        self._p[:m, :m] += self._least + shaking * self._driven
+        self._p[m:, m:] += np.diag((1.0 - kept * kept) * errors2)

@@ -1,0 +1,110 @@
+"""Alarms in words: what is the matter, how much of it, what else may explain it, and which move would tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..records import Alarm, Array, Ranked
+from ..scene.parts import Scene
+from .bank import UNKNOWN, Explanation, Verdict
+from .parameters import Form, Parameter, physical
+from .signatures import Signature, Signatures
+
+NAMED, KEPT = 0.95, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
+LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
+MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
+
+
+class Teller:
+    """Puts explanations into words.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    known : tuple of Parameter
+    signatures : Signatures
+    errors : ndarray, shape (channels,)
+        Standard deviation of the model's error in one posture.
+    """
+
+    def __init__(self, scene: Scene, known: tuple[Parameter, ...], signatures: Signatures, errors: Array) -> None:
+        self._scene, self._known, self._signatures, self._errors = scene, known, signatures, errors
+        self._advised: tuple[str, str] | None = None
+        self._advice = ""
+
+    def alarm(self, alarm: Alarm, verdict: Verdict, signature: Signature | None) -> Alarm:
+        """The alarm with its present explanation."""
+        found, probabilities = verdict.found, verdict.probabilities
+        likely = [i for i, p in enumerate(probabilities) if p >= LISTED][:MOST]
+        ranks = tuple(self._ranked(found[i], float(probabilities[i]), verdict.excess) for i in likely)
+        certain = self._certain(alarm, verdict)
+        if found[0].cause == UNKNOWN and probabilities[0] > 0.5:
+            told = f"{alarm.channel} deviates as no single fault that is known would make it"
+            return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
+        if certain is not None:
+            rank = next(rank for rank in ranks if rank.cause == certain)
+            best = max(rank.parts, key=lambda part: abs(part[1]) / part[2])
+            return replace(alarm, kind=best[0], cause=certain, told=self._sentence(rank, best), ranked=ranks)
+        told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
+        return replace(alarm, kind="residual", cause=None, told=told + self._advised_move(found, signature), ranked=ranks)
+
+    @staticmethod
+    def _certain(alarm: Alarm, verdict: Verdict) -> str | None:
+        """The cause that is named: one that is probable enough; one that was is kept while it is still quite probable."""
+        share = {each.cause: float(p) for each, p in zip(verdict.found, verdict.probabilities, strict=True)}
+        best = verdict.found[0].cause
+        if best != UNKNOWN and share[best] >= NAMED:
+            return best
+        return alarm.cause if alarm.cause is not None and share[alarm.cause] >= KEPT else None
+
+    def _ranked(self, each: Explanation, probability: float, excess: float) -> Ranked:
+        parts = tuple(
+            (self._known[place].kind, float(value), float(sigma * excess**0.5), self._known[place].unit)
+            for place, value, sigma in zip(each.places, each.values, each.sigmas, strict=True)
+        )
+        return Ranked(each.cause, probability, parts)
+
+    def _sentence(self, rank: Ranked, part: tuple[str, float, float, str]) -> str:
+        """Cause, amount and certainty."""
+        kind, value, sigma, unit = part
+        each = next(p for p in self._known if p.cause == rank.cause and p.kind == kind)
+        if each.form is Form.SCENE and not unit:
+            now, own = physical(each, self._scene, value), physical(each, self._scene, 0.0)
+            spread = abs(physical(each, self._scene, value + sigma) - now)
+            amount = f"{now:.3g} +- {spread:.1g}, {100 * (now / own - 1):+.0f} % of the scene's"
+        else:
+            amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
+        return f"{rank.cause} {kind}: {amount} (probability {rank.probability:.3f})"
+
+    def _advised_move(self, found: tuple[Explanation, ...], signature: Signature | None) -> str:
+        """The move that would best tell the two most probable causes apart; worked out once for every pair."""
+        pair = (found[0].cause, found[1].cause)
+        if signature is None or UNKNOWN in pair:
+            return ""
+        if pair != self._advised:
+            self._advised, self._advice = pair, self._best_move(found[0], found[1], signature.strokes)
+        return self._advice
+
+    def _best_move(self, one: Explanation, other: Explanation, strokes: Array) -> str:
+        best, told = 1.0, ""
+        for i, joint in enumerate(self._scene.joints):
+            for way in (1.0, -1.0):
+                aim = strokes.copy()
+                aim[i] += way * MOVE * joint.cylinder.max_stroke
+                if not 0.0 <= aim[i] <= joint.cylinder.max_stroke:
+                    continue
+                there = self._signatures.at(aim)
+                if there is not None and (apart := self._apart(one, other, there)) > best:
+                    best = apart
+                    told = f"; moving cylinder_{i + 1} to {aim[i]:.2f} m would tell"
+        self._signatures.at(strokes)
+        return told
+
+    def _apart(self, one: Explanation, other: Explanation, there: Signature) -> float:
+        """How far the two would be apart, in deviations of the model's error."""
+        first = there.channels[:, list(one.places)] @ one.values
+        second = there.channels[:, list(other.places)] @ other.values
+        return float(np.linalg.norm((first - second) / self._errors))

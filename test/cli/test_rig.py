@@ -1,0 +1,72 @@
+"""``boom_twin rig``: sessions of wrong and faulty booms, and that they can be replayed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+pytest.importorskip("exudyn")
+
+from boom_twin.cli.main import main
+from boom_twin.io.reader import scan
+from boom_twin.scene.load import default_text
+
+SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
+CYLINDER = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One rigid section on an oil spring."""
+    document = dict(YAML(typ="safe").load(default_text()))
+    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": CYLINDER}
+    path = tmp_path_factory.mktemp("scene") / "one.yaml"
+    with path.open("w") as file:
+        YAML().dump(document | {"sections": [SECTION], "joints": [joint], "postures": {"up": [40]}}, file)
+    return path
+
+
+def made(scene: Path, out: Path, *more: str) -> Path:
+    """The session that the command writes."""
+    assert main(["rig", str(scene), "--out", str(out), "--random", "up", "--duration", "3", *more]) == 0
+    return out
+
+
+def replayed(scene: Path, bag: Path) -> dict[str, Any]:
+    """What replay says of it."""
+    out = bag.with_name(f"{bag.name}_out")
+    assert main(["replay", str(bag), "--scene", str(scene), "--out", str(out)]) == 0
+    return dict(json.loads((out / "summary.json").read_text()))
+
+
+def test_faulty_sessions_replay(scene: Path, tmp_path: Path) -> None:
+    healthy = replayed(scene, made(scene, tmp_path / "healthy"))
+    faults = ["--fault", "cylinder_1.k:softer:0.5", "--fault", "joint_1.sensor:bias:0.01@1", "--fault"]
+    bag = made(scene, tmp_path / "faulty", *faults, "joint_angles.delay:late:0.02@2")
+    notes = scan(bag).notes
+    assert notes["faults"] == "cylinder_1.k:softer:0.5, joint_1.sensor:bias:0.01@1, joint_angles.delay:late:0.02@2"
+    assert "synthetic" in notes["origin"] and "wrong" not in notes
+    faulty = replayed(scene, bag)
+    assert faulty["samples"] == healthy["samples"]
+    assert healthy["joint_residual_rms_rad"][0] < 3e-4
+    assert faulty["joint_residual_rms_rad"][0] == pytest.approx(0.01 * np.sqrt(2 / 3), rel=0.2)
+
+
+def test_wrong_boom(scene: Path, tmp_path: Path) -> None:
+    bag = made(scene, tmp_path / "wrong", "--wrong", "0.1", "--rig-seed", "3")
+    assert scan(bag).notes["wrong"] == "k, d, EI and masses off by 0.1, rig seed 3"
+    assert "faults" not in scan(bag).notes
+    assert (bag / "truth.csv.gz").is_file()
+
+
+def test_a_bad_fault_is_told_before_anything_is_simulated(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["rig", str(scene), "--out", str(tmp_path / "none"), "--fault", "joint_2.sensor:stuck"]) == 1
+    assert "fault joint_2.sensor:stuck: the boom has joints, cylinders and sections 1 to 1." in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()

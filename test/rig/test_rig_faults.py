@@ -1,0 +1,55 @@
+"""Faults as they are written: what there is, what is refused and how it is told."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.errors import UsageError
+from boom_twin.rig.faults import Fault, check, parse
+from boom_twin.scene import load_scene
+
+
+@pytest.mark.parametrize(
+    "text, fault",
+    [
+        ("cylinder_2.k:softer:0.3", Fault("cylinder_2.k", "softer", 0.3)),
+        ("joint_3.sensor:bias:-0.0035@20", Fault("joint_3.sensor", "bias", -0.0035, 20.0)),
+        ("cylinder_1.sensor:stuck@12.5", Fault("cylinder_1.sensor", "stuck", onset=12.5)),
+        ("cylinder_4.rod.clearance:play:0.0005", Fault("cylinder_4.rod.clearance", "play", 5e-4)),
+        ("joint_angles.delay:late:0.03@10", Fault("joint_angles.delay", "late", 0.03, 10.0)),
+    ],
+)
+def test_text_and_back(text, fault):
+    assert parse(text) == fault and str(fault) == text
+
+
+@pytest.mark.parametrize(
+    "text, told",
+    [
+        ("foo:bias:1", "fault foo: not a cause. Give one of cylinder_i.k, "),
+        ("joint_0.sensor:bias:1", "not a cause. .* with i from 1"),
+        ("joint_1.sensor:bend:1", "joint_1.sensor:bend: not a kind of this cause. Give one of bias, drift, "),
+        ("joint_1.sensor:bias", "size = 0, must be finite and not 0"),
+        ("joint_1.sensor:bias:inf", "size = inf, must be finite"),
+        ("cylinder_2.k:softer:30", "size = 30, must be above 0 and below 1, a share"),
+        ("joint_1.sensor:stuck:3", "it has no size"),
+        ("tip.payload:more:x", "size and onset must be numbers. Write CAUSE:KIND"),
+        ("tip.payload:more:20@5", "hold from the start of a session. Leave out @5"),
+        ("joint_1.sensor:bias:1@-1", "onset = -1 s, must be finite and at least 0"),
+        ("cylinder_1.rod.clearance:play:0.2", "must be above 0 and below 0.005 m"),
+    ],
+)
+def test_refused(text, told):
+    with pytest.raises(UsageError, match=told):
+        parse(text)
+
+
+def test_refused_of_a_scene():
+    scene = load_scene()
+    check([parse("joint_4.sensor:bias:1@59")], scene, 60.0)
+    with pytest.raises(UsageError, match=r"cylinder_5\.k.*sections 1 to 4"):
+        check([parse("cylinder_5.k:softer:0.1")], scene, 60.0)
+    with pytest.raises(UsageError, match="begins at 60 s, must be before the end at 60 s"):
+        check([parse("joint_4.sensor:bias:1@60")], scene, 60.0)

@@ -1,0 +1,85 @@
+"""Booms that are not those of their scene: physical faults, and parameters off at random."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.errors import UsageError
+from boom_twin.rig import Move, Programme, Sensors, record
+from boom_twin.rig.faults import parse
+from boom_twin.rig.faulty_scene import with_faults
+from boom_twin.rig.wrong import wrong_by
+from boom_twin.scene import load_scene
+from boom_twin.scene.named import parameter, parameter_names
+from boom_twin.scene.parts import Scene
+
+
+def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
+    """New over old of every parameter that has a name and is not 0."""
+    names = [name for name in parameter_names(scene) if parameter(scene, name)]
+    return {name: parameter(changed, name) / parameter(scene, name) for name in names}
+
+
+@pytest.mark.parametrize("text", ["cylinder_2.k:softer:0.3", "section_3.EI:softer:0.2"])
+def test_softer_by_its_share(text):
+    scene, fault = load_scene(), parse(text)
+    changed = ratios(with_faults(scene, [fault]), scene)
+    assert changed.pop(fault.cause) == pytest.approx(1.0 - fault.size)
+    assert set(changed.values()) == {1.0}
+
+
+def test_more_on_what_is_there():
+    scene = with_faults(load_scene(), [parse("tip.payload:more:20"), parse("line_fill:more:2")])
+    again = with_faults(scene, [parse("tip.payload:more:5"), parse("joint_1.sensor:bias:1")])
+    assert again.tip.payload == 25.0 and again.line_fill == 2.0
+
+
+def test_play_grows():
+    scene = with_faults(load_scene(), [parse("cylinder_2.rod.clearance:play:0.0005")])
+    (pin,) = scene.pins_of("cylinder_2")
+    assert pin.at == "cylinder_2.rod" and pin.radial_clearance == 5e-4
+    (pin,) = with_faults(scene, [parse("cylinder_2.rod.clearance:play:0.0002")]).pins_of("cylinder_2")
+    assert pin.radial_clearance == pytest.approx(7e-4)
+
+
+def test_no_oil_spring_cannot_soften(cantilever):
+    with pytest.raises(UsageError, match=r"cylinder_1\.k: the scene has no such parameter"):
+        with_faults(Scene.model_validate(cantilever), [parse("cylinder_1.k:softer:0.3")])
+
+
+def test_stamps_and_noise_do_not_see_the_fault(one_rigid):
+    scene, sensors = Scene.model_validate(one_rigid), replace(Sensors(), angle_resolution=0.0)
+    programme = Programme((0.5,), (Move(0, 0.1, 0.3, 0.52),))
+    soft = with_faults(scene, [parse("cylinder_1.k:softer:0.5")])
+    one, other = (record(boom, programme, 0.5, sensors, 7, 1e-3) for boom in (scene, soft))
+    assert np.array_equal(one.stamps, other.stamps) and np.array_equal(one.strokes, other.strokes)
+    assert np.abs(one.truth["joints"] - other.truth["joints"])[0] > 1e-4
+    noise = [session.joints - session.truth["joints"] for session in (one, other)]
+    assert noise[0] == pytest.approx(noise[1], abs=1e-14)
+
+
+def test_wrong_within_twice_the_share_and_repeatable():
+    scene = load_scene()
+    found = [wrong_by(scene, 0.02, seed) for seed in range(40)]
+    assert found[3] == wrong_by(scene, 0.02, 3) != found[4]
+    assert wrong_by(scene, 0.0, 1) == scene
+    off = np.array([list(ratios(boom, scene).values()) for boom in found]) - 1.0
+    moved = off[:, np.any(off, axis=0)]
+    assert moved.shape[1] == 16  # k, d, EI and mass, four times each
+    assert np.abs(off).max() < 0.04 and moved.std() == pytest.approx(0.02 * 0.88, rel=0.1)
+    assert np.abs(np.corrcoef(moved.T) - np.eye(16)).max() < 0.6
+    links = [boom.joints[1].mL / scene.joints[1].mL - 1.0 for boom in found]
+    rods = [boom.joints[3].cylinder.rod.mass / scene.joints[3].cylinder.rod.mass - 1.0 for boom in found]
+    assert 0.01 < np.std(links) < 0.03 and 0.01 < np.std(rods) < 0.03
+    assert found[0].base == scene.base and found[0].sections[1].beta == scene.sections[1].beta
+
+
+@pytest.mark.parametrize("share", [-0.01, 0.31, float("nan")])
+def test_wrong_by_too_much(share):
+    with pytest.raises(UsageError, match=r"must be from 0 to 0\.3"):
+        wrong_by(load_scene(), share, 0)

@@ -1,0 +1,112 @@
+"""Sensor faults: each does what it says, from its onset on, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.io.session import samples_of
+from boom_twin.records import Stream
+from boom_twin.rig.faults import parse
+from boom_twin.rig.faulty_sensors import SPIKE_SHARE, spoil
+from boom_twin.rig.session import EPOCH, Session
+
+ONSET = 4.0
+ARRAYS = ("stamps", "strokes", "joints", "imu", "angle_stamps")
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    rng = np.random.default_rng(5)
+    times = (np.arange(2000) + 0.5) / 200.0
+    true = {"t": times, "strokes": 0.2 + 0.01 * np.outer(times, [1, 2, 3]), "joints": 0.1 * np.outer(times, [3, 2, 1])}
+    noisy = {name: true[name] + 1e-4 * rng.standard_normal((2000, 3)) for name in ("strokes", "joints")}
+    stamps = EPOCH + np.rint(times * 1e9).astype(np.int64)
+    return Session(stamps, noisy["strokes"], noisy["joints"], rng.standard_normal((2000, 2)), stamps, true)
+
+
+def spoilt(healthy, text, seed=1):
+    """The session with the fault, and its readings of that sensor after the onset, with those of before."""
+    fault = parse(f"{text}@{ONSET:g}")
+    session = spoil(healthy, [fault], seed)
+    name = "joints" if fault.cause.startswith("joint") else "strokes"
+    after = healthy.truth["t"] >= ONSET
+    column = fault.number - 1
+    return session, getattr(session, name)[after, column], getattr(healthy, name)[after, column]
+
+
+@pytest.mark.parametrize("owner", ["joint", "cylinder"])
+@pytest.mark.parametrize("kind", ["bias:0.01", "drift:0.01", "scale:0.02", "stuck", "noisy:3", "spikes:0.1", "dropout:0.3"])
+def test_nothing_else_changes(healthy, owner, kind):
+    session, read, was = spoilt(healthy, f"{owner}_2.sensor:{kind}")
+    before, name = healthy.truth["t"] < ONSET, "joints" if owner == "joint" else "strokes"
+    for other in ARRAYS:
+        if other != name:
+            assert np.array_equal(getattr(session, other), getattr(healthy, other)), other
+    changed, kept = getattr(session, name), getattr(healthy, name)
+    assert np.array_equal(changed[before], kept[before])
+    assert np.array_equal(changed[:, [0, 2]], kept[:, [0, 2]])
+    assert session.truth is healthy.truth
+    assert not np.array_equal(read, was)
+
+
+def test_bias_drift_and_scale(healthy):
+    since = healthy.truth["t"][healthy.truth["t"] >= ONSET] - ONSET
+    _, read, was = spoilt(healthy, "joint_1.sensor:bias:0.01")
+    assert read - was == pytest.approx(0.01, abs=1e-15)
+    _, read, was = spoilt(healthy, "joint_1.sensor:drift:-0.02")
+    assert read - was == pytest.approx(-0.02 * since, abs=1e-15)
+    _, read, was = spoilt(healthy, "cylinder_3.sensor:scale:0.05")
+    assert read == pytest.approx(1.05 * was, abs=1e-15)
+
+
+def test_stuck_repeats_the_last_reading(healthy):
+    session, read, _ = spoilt(healthy, "joint_3.sensor:stuck")
+    last = np.flatnonzero(healthy.truth["t"] < ONSET)[-1]
+    assert np.all(read == healthy.joints[last, 2]) and len(read) == len(session.joints) - last - 1
+
+
+def test_noise_grows_by_the_factor(healthy):
+    _, read, was = spoilt(healthy, "joint_3.sensor:noisy:4")
+    true = healthy.truth["joints"][healthy.truth["t"] >= ONSET, 2]
+    assert read - true == pytest.approx(4.0 * (was - true), abs=1e-12)
+
+
+def test_spikes_and_dropouts_come_as_often_as_they_say(healthy):
+    _, read, was = spoilt(healthy, "cylinder_1.sensor:spikes:0.3")
+    hit = read != was
+    assert np.abs(read - was)[hit] == pytest.approx(0.3) and {-1.0, 1.0} == set(np.sign(read - was)[hit])
+    assert hit.mean() == pytest.approx(SPIKE_SHARE, abs=0.015)
+    _, read, _ = spoilt(healthy, "cylinder_1.sensor:dropout:0.4")
+    assert np.isnan(read).mean() == pytest.approx(0.4, abs=0.06)
+    assert np.isnan(spoilt(healthy, "joint_1.sensor:dropout:1")[1]).all()
+
+
+def test_late_angles_keep_their_values(healthy):
+    session, _, _ = spoilt(healthy, "joint_angles.delay:late:0.03")
+    late = session.angle_stamps - healthy.stamps
+    assert np.array_equal(late, np.where(healthy.truth["t"] >= ONSET, 30_000_000, 0))
+    assert all(np.array_equal(getattr(session, name), getattr(healthy, name)) for name in ARRAYS[:-1])
+    samples = samples_of(*(getattr(session, name) for name in ARRAYS))
+    stamps = [sample.stamp for sample in samples]
+    assert stamps == sorted(stamps) and len(samples) == 6000
+    angles = [sample.stamp for sample in samples if sample.stream is Stream.ANGLES]
+    assert angles == session.angle_stamps.tolist()
+
+
+@pytest.mark.parametrize("cause, stream", [("joint_angles", Stream.ANGLES), ("cylinder_strokes", Stream.STROKES)])
+def test_missing_messages_are_not_there(healthy, cause, stream):
+    session = spoil(healthy, [parse(f"{cause}.dropout:missing:0.5@{ONSET:g}")], 1)
+    kept = [s for s in samples_of(*(getattr(session, name) for name in ARRAYS)) if s.stream is stream]
+    assert all(np.isfinite(sample.values).all() for sample in kept)
+    assert len(kept) == pytest.approx(800 + 0.5 * 1200, abs=80)
+
+
+def test_seed_repeats(healthy):
+    faults = [parse("joint_1.sensor:spikes:0.1"), parse("joint_2.sensor:dropout:0.5"), parse("cylinder_2.k:softer:0.3")]
+    one, same, other = (spoil(healthy, faults, seed).joints for seed in (3, 3, 4))
+    assert np.array_equal(one, same, equal_nan=True) and not np.array_equal(one, other, equal_nan=True)
+    alone = spoil(healthy, faults[:1], 3).joints
+    assert np.array_equal(one[:, 0], alone[:, 0])

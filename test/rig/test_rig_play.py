@@ -1,0 +1,97 @@
+"""A rod pin with play in Exudyn: against the geometry, against the twin at rest and in a move, and let go by its load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("exudyn")
+
+from boom_twin.analysis.simulate import simulate
+from boom_twin.analysis.statics import statics
+from boom_twin.errors import UsageError
+from boom_twin.rig import Move, Programme, at_rest, move
+from boom_twin.rig.play import contact_of
+from boom_twin.rig.probes import read
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.parts import Clearance, Pin, Scene
+
+
+def worn(at: str, play: float, radius: float = 0.025) -> Scene:
+    """The default scene with one pin that has radial `play` (m)."""
+    pin = Pin(at=at, pin_radius=radius, radial_clearance=play)
+    return load_scene().model_copy(update={"clearance": Clearance(pins=(pin,))})
+
+
+@pytest.mark.parametrize("posture", ["arch", "horizontal"])
+@pytest.mark.parametrize("cylinder", [1, 2, 3, 4])
+def test_rest(posture, cylinder):
+    """The journal lies off by clearance and penetration, on the side where its cylinder presses; the twin says the same."""
+    scene = worn(f"cylinder_{cylinder}.rod", 5e-4)
+    resting = at_rest(scene, strokes_of_posture(scene, posture), 8, nodally_exact=True)
+    (bush,) = resting.boom.bushes
+    offset, force = bush.offset(resting.boom.system), resting.forces[cylinder - 1]
+    contact = contact_of(scene, scene.clearance.pins[0])
+    depth = (abs(force) / contact.stiffness) ** (1.0 / contact.exponent)
+    assert abs(offset) == pytest.approx(5e-4 + depth, rel=0.03)  # the pin bears the rod's weight too
+    expected = statics(scene, posture=posture)
+    assert force == pytest.approx(expected.cylinder_forces[cylinder - 1], abs=2.0)
+    drop = statics(load_scene(), posture=posture).tip - expected.tip
+    still = at_rest(load_scene(), strokes_of_posture(scene, posture), 8, nodally_exact=True)
+    assert tip(still) - tip(resting) == pytest.approx(drop, abs=2e-6)
+
+
+def tip(resting):
+    """Tip (m) of a boom at rest."""
+    return read(resting.boom, resting.probes, at_rest=True)["tip"][-1]
+
+
+def test_lever_of_the_rigid_boom(one_rigid):
+    """Length of the cylinder grows or shrinks by the journal's offset: the boom turns as by that much less stroke."""
+    one_rigid["clearance"] = {"pins": [{"at": "cylinder_1.rod", "pin_radius": 0.025, "radial_clearance": 1e-3}]}
+    one_rigid["joints"][0]["cylinder"]["rod"] = {"mass": 1e-3, "inertia": 1e-4, "com": 0.1}
+    loose = Scene.model_validate(one_rigid)
+    tight = loose.model_copy(update={"clearance": None})
+    strokes = strokes_of_posture(loose, "up")
+    resting = at_rest(loose, strokes, 1)
+    (bush,) = resting.boom.bushes
+    shorter = at_rest(tight, strokes - abs(bush.offset(resting.boom.system)), 1)
+    assert tip(resting) == pytest.approx(tip(shorter), abs=2e-8)
+
+
+def test_move_that_stays_in_contact():
+    scene = worn("cylinder_2.rod", 1e-3)
+    first = strokes_of_posture(scene, "arch")
+    drive = Programme(tuple(first), (Move(0, 0.0, 0.4, first[0] + 0.01), Move(1, 0.1, 0.3, first[1] + 0.01)))
+    rows, _ = move(at_rest(scene, first, 8, nodally_exact=True), drive, 0.5, 1e-3, 5e-3)
+    found = simulate(scene, rows["t_s"], drive(rows["t_s"])[0], dt=1e-3)
+    assert found.lost_contacts.tolist() == [0]
+    joints = np.column_stack([rows[f"joint_{i}_rad"] for i in range(1, 5)])
+    assert joints == pytest.approx(found.joints, abs=4e-5)
+    assert rows["cylinder_force_2_N"] == pytest.approx(found.cylinder_forces[:, 1], rel=2e-3)
+
+
+def test_load_that_turns_lets_it_cross():
+    """Cylinder 4 is pushed, then pulled: the journal crosses its bush, and the joint follows by twice the play and more."""
+    scene, first = worn("cylinder_4.rod", 1e-3), strokes_of_posture(load_scene(), "low")
+    drive = Programme(tuple(first), (Move(3, 0.2, 1.5, 0.10),))
+    resting = at_rest(scene, first, 4, nodally_exact=True)
+    rows, _ = move(resting, drive, 3.0, 1e-3, 5e-3)
+    ideal, _ = move(at_rest(load_scene(), first, 4, nodally_exact=True), drive, 3.0, 5e-3, 5e-3)
+    force = rows["cylinder_force_4_N"]
+    assert force[0] < 0.0 < force[-1]
+    lag = rows["joint_4_rad"] - ideal["joint_4_rad"]
+    assert lag[0] > 5e-3 and lag[-1] < -5e-3
+    again, _ = move(resting, drive, 3.0, 1e-3, 5e-3)
+    assert np.array_equal(rows["joint_4_rad"], again["joint_4_rad"])
+
+
+def test_what_it_does_not_know_is_refused():
+    with pytest.raises(UsageError, match=r"clearance.pins = joint_2.pivot: the virtual rig knows play in rod pins only"):
+        at_rest(worn("joint_2.pivot", 1e-4), strokes_of_posture(load_scene(), "arch"), 2)
+    scene = worn("cylinder_1.rod", 1e-4)
+    joint = scene.joints[0]
+    bare = joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update={"rod": None})})
+    with pytest.raises(UsageError, match=r"the rod has no mass.*Give joints\[0\].cylinder.rod a mass"):
+        at_rest(scene.model_copy(update={"joints": (bare, *scene.joints[1:])}), strokes_of_posture(scene, "arch"), 2)
