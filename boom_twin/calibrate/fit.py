@@ -88,10 +88,14 @@ def fitted(problem: Problem, tell: Tell) -> Fit:
 
 
 def _scatter(noise: list[Array], whitening: Whitening, slopes: Array) -> Array:
-    """Covariance of J^T w over realisations that the filter was not made from."""
-    white = np.concatenate([whitening(each[1::2]).reshape(len(each[1::2]), -1) for each in noise], axis=1)
-    pulls = white @ slopes
-    return np.asarray(pulls.T @ pulls / len(pulls))
+    """Covariance of J^T w over realisations that the filter was not made from; sessions are independent, so theirs add up."""
+    found, first = np.zeros((slopes.shape[1], slopes.shape[1])), 0
+    for each in noise:
+        white = whitening(each[1::2]).reshape(len(each[1::2]), -1)
+        pulls = white @ slopes[first : first + white.shape[1]]
+        found += pulls.T @ pulls / len(pulls)
+        first += white.shape[1]
+    return found
 
 
 def _in_holds(problem: Problem) -> Evaluate:
