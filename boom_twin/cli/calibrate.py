@@ -26,7 +26,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
     parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
     parser.add_argument("--stiffness", action="store_true", help="besides: bending stiffness EI of sections")
-    parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help="of all sensors, of all but the strokes, of none")
+    whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
+    parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
     parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
