@@ -25,6 +25,8 @@ from .unknowns import Unknown, unknowns_of, usual_names
 
 KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 MOVED = 0.01  # m, least travel of some stroke
+MISFIT = 1.5  # from which on the fit is remarked on
+GROWN = 1.1  # of residuals on what was held out, likewise
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
 Progress = Callable[[float, str], None]
@@ -156,7 +158,7 @@ def calibrate(
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
         better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, sessions, mounts, imu)),
+        tuple(_remarks(problem, fit, sessions, mounts, imu) + _worse(before, after)),
     )  # fmt: skip
 
 
@@ -225,7 +227,14 @@ def _estimates(problem: Problem, fit: Fit, groups: Sequence[Group]) -> tuple[Est
     return tuple(found)
 
 
-MISFIT = 1.5
+def _worse(before: Judged, after: Judged) -> list[str]:
+    worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
+    if not worse:
+        return []
+    return [
+        f"On what was held out the residuals of {', '.join(worse)} have grown: do not use this result. Record a session that "
+        "tells what was left as before, or estimate fewer parameters."
+    ]
 
 
 def _remarks(problem: Problem, fit: Fit, sessions: Sequence[Measured], mounts: Sequence[object], imu: bool) -> list[str]:

@@ -36,9 +36,9 @@ class Kind:
 
 KINDS = {
     "k": Kind("N/m", 0.3, 0.1, relative=True),
-    "d": Kind("N s/m", 1.0, 0.5, relative=True),
+    "d": Kind("N s/m", 1.0, 0.2, relative=True),
     "EI": Kind("N m^2", 0.3, 0.1, relative=True),
-    "beta": Kind("s", 1.0, 0.5, relative=True),
+    "beta": Kind("s", 1.0, 0.2, relative=True),
     "mass": Kind("kg", 0.1, 0.05, relative=True),
     "tip.payload": Kind("kg", 50.0, 5.0),
     "line_fill": Kind("kg/m", 10.0, 1.0),
