@@ -1,0 +1,100 @@
+"""``boom_twin calibrate``: parameters of a scene from healthy sessions."""
+
+from __future__ import annotations
+
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .. import __version__
+from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..calibrate.run import Calibration, Progress
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
+    add_scene(parser, option=True)
+    parser.add_argument("--out", required=True, type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
+    parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
+    parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
+    parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
+    parser.add_argument("--stiffness", action="store_true", help="besides: bending stiffness EI of sections")
+    whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
+    parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
+    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
+    parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
+    parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
+    parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Calibrate, write, tell."""
+    from ..calibrate.run import Choice, calibrate
+    from ..calibrate.words import as_object, as_text
+    from ..calibrate.written import refuse_overwriting, write_mapping, write_scene
+    from ..settings import load_settings
+
+    refuse_overwriting(args.out, args.scene, args.force)
+    scene = open_scene(args.scene)
+    settings = load_settings(Path(args.params) if args.params else None)
+    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
+    choice, date = Choice(names, args.load, args.damping, args.stiffness, args.zeros), args.date or time.strftime("%Y-%m-%d")
+    began = time.perf_counter()
+    with _bar() as progress:
+        found = calibrate(args.bags, scene, choice, settings, args.mapping, progress)
+    wall = time.perf_counter() - began
+    credit = f"{date} by boom_twin {__version__}"
+    write_scene(found, scene, args.scene, args.out, credit)
+    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.joints))
+    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
+    if args.json:
+        print_json(as_object(found) | {"wall_s": wall, "files": [str(path) for path in files]})
+        return 0
+    print("\n".join([*as_text(found), f"{wall:.1f} s", *map(str, files)]))
+    return 0
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    from tqdm import tqdm
+
+    form = "{l_bar}{bar}| {elapsed}"
+    with tqdm(total=100, desc="calibrate", disable=None, bar_format=form, file=sys.stderr) as bar:
+
+        def progress(share: float, what: str) -> None:
+            bar.set_description_str(f"calibrate: {what}", refresh=False)
+            bar.update(100.0 * share - bar.n)
+
+        yield progress
+
+
+def _draw(found: Calibration, out: Path) -> list[Path]:
+    """Pictures beside the scene."""
+    from ..calibrate.words import shown
+    from ..view.calibration import Interval, parameters_picture, residuals_picture
+
+    note = f"held out: {found.held_out}"
+    judged = (found.before, found.after)
+    paths = [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
+    times = (found.before.times, found.after.times)
+    normalised = (found.before.values / found.before.sigmas, found.after.values / found.after.sigmas)
+    residuals_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)
+    intervals = []
+    for estimate in found.estimates:
+        factor, unit = shown(estimate)
+        before, *found_values = (factor * v for v in (estimate.unknown.present, estimate.value, estimate.low, estimate.high))
+        if estimate.unknown.kind.relative:
+            unit, found_values, before = "change, %", [100.0 * (value / before - 1.0) for value in found_values], 0.0
+        now, low, high = found_values
+        intervals.append(Interval(estimate.unknown.name, unit, before, now, low, high, estimate.told))
+    parameters_picture(paths[1], f"{out.name}: parameters", note, intervals)
+    return paths
