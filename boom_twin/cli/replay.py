@@ -23,6 +23,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
+    usual = "what is known of this rig while all is well; by default the package's"
+    parser.add_argument("--baseline", metavar="FILE", help=usual)
+    parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     add_json(parser)
 
@@ -35,7 +38,9 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    result = replay(args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes)
+    result = replay(
+        args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
+    )
     pictures = []
     if not args.no_pictures:
         from ..pictures import draw  # with the plotting library
@@ -80,5 +85,11 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         ]
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
-    alarms = len(summary["alarms"])
-    return [*lines, f"alarms             {alarms or 'none'}"]
+    alarms = summary["alarms"]
+    return [*lines, f"alarms             {len(alarms) or 'none'}", *map(alarm_as_text, alarms)]
+
+
+def alarm_as_text(alarm: dict[str, Any]) -> str:
+    """One line for an alarm of ``summary.json``."""
+    end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
+    return f"  {alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"

@@ -31,7 +31,7 @@ LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-SHOWN = frozenset(Output) - {Output.CHANGES}
+SHOWN = frozenset(Output) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 Role = Stream | Output
