@@ -17,6 +17,7 @@ from .health.judge import Judge
 from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
+from .plausible import Plausible
 from .recent import Recent
 from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .requests import Requests
@@ -36,6 +37,8 @@ EVENTS = {
     "restart": "pause too long to bridge; started again from rest",
     "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
     "jump back": "time was set back; everything started again",
+    "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
+    "held": "a stroke missing for long; taken to stay where it was",
     "model": "the model failed; it starts again with the next full sample",
     "reset": "asked for; the model started again from rest",
     "load": "payload or line fill changed; the model started again from rest",
@@ -63,6 +66,7 @@ class _Run:
     interval: float = 0.0
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
+    plausible: Plausible = field(default_factory=Plausible)
 
 
 class Twin:
@@ -89,6 +93,8 @@ class Twin:
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
+    judge : Judge or None
+        Of the rig's health; None without a baseline.
 
     Notes
     -----
@@ -151,7 +157,7 @@ class Twin:
         scene = loaded(self.scene, *self.settings.load)
         self._boom = Following(scene, self.settings)
         self.plan = self._boom.plan
-        self._judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
+        self.judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -177,8 +183,8 @@ class Twin:
         self._run = None
         self._zeros.forget_past()
         self._recent.clear()
-        if self._judge is not None:
-            self._judge.begin()
+        if self.judge is not None:
+            self.judge.begin()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -240,7 +246,9 @@ class Twin:
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
-        status = self._boom.step((sample.stamp - run.epoch) * NANO, sample.values)
+        values, oddities = run.plausible.of(sample.stamp, sample.values, self.settings)
+        events += oddities
+        status = self._boom.step((sample.stamp - run.epoch) * NANO, values)
         if status != OK:
             self.reset()
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
@@ -248,12 +256,13 @@ class Twin:
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
         before, run.newest, run.slot = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
+        run.plausible.estimate = prediction.strokes
         self._remember(run, prediction)
         self.counts.update(events)
-        if self._judge is not None:
-            self._judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
+        if self.judge is not None:
+            self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
         residuals = self._settle_pending(run)
-        health = None if self._judge is None else self._judge.judge(sample.stamp)
+        health = None if self.judge is None else self.judge.judge(sample.stamp)
         return Report(sample.stamp, True, prediction, residuals, tuple(events), passes=self._boom.passes, health=health)
 
     def _remember(self, run: _Run, prediction: Prediction) -> None:
@@ -310,8 +319,8 @@ class Twin:
         if zeros is not None:
             values = values - zeros
         residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
-        if self._judge is not None:
-            self._judge.measured(residuals, sample.values)
+        if self.judge is not None:
+            self.judge.measured(residuals, sample.values)
         return residuals
 
     def _hold(self, sample: Sample) -> Report:

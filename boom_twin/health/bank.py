@@ -9,9 +9,10 @@ a fault with prior N(0, F) in some parameters f is more probable than none by th
 
     ln B = l_f^T (L_ff + F^-1)^-1 l_f / 2 - ln det(I + F L_ff) / 2,
 
-and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay, Information
-Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with what noise
-leaves; where it is more, all logarithms are divided by the ratio, so that a model that is not quite right is not quite sure.
+and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay,
+Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with
+what noise leaves; where it is more, all logarithms are divided by the ratio, so that a model that is not quite right is not
+quite sure.
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ class Evidence:
     def of(white: Array, log: float, unknown: float) -> Evidence:
         """Of one block, from whitened innovations, shape (rows, 1 + parameters)."""
         left, signature = white[:, 0], white[:, 1:]
-        return Evidence(signature.T @ signature, signature.T @ left, float(left @ left), len(left), log, unknown)
+        matrix, vector = np.asarray(signature.T @ signature), np.asarray(signature.T @ left)
+        return Evidence(matrix, vector, float(left @ left), len(left), log, unknown)
 
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(
@@ -75,17 +77,16 @@ class Evidence:
         )  # fmt: skip
 
     def given(self, mean: Array, covariance: Array) -> Evidence:
-        """With healthy deviations of all parameters integrated out: L', l', the squares and the logarithm that are then left."""
+        """With healthy deviations of all parameters integrated out: L', l', squares and logarithm that are then left."""
         vector = self.vector - self.matrix @ mean
         spread = np.eye(len(mean)) + self.matrix @ covariance
         solved = np.linalg.solve(spread, np.column_stack([self.matrix, vector]))
         matrix, reduced = solved[:, :-1], solved[:, -1]
         _, log_det = np.linalg.slogdet(spread)
         fitted = 2.0 * float(self.vector @ mean) - float(mean @ self.matrix @ mean) + float(vector @ covariance @ reduced)
-        return Evidence(
-            0.5 * (matrix + matrix.T), reduced, self.squares - fitted, self.rows, self.log + 0.5 * (fitted - float(log_det)),
-            self.unknown,
-        )  # fmt: skip
+        log = self.log + 0.5 * (fitted - float(log_det))
+        matrix, reduced = 0.5 * (matrix + matrix.T), np.asarray(reduced, float)
+        return Evidence(matrix, reduced, self.squares - fitted, self.rows, log, self.unknown)
 
 
 @dataclass(frozen=True)
@@ -163,6 +164,14 @@ class Bank:
         order = np.argsort(-weights)
         shares = np.exp(weights[order] - weights.max())
         return Verdict(tuple(found[i] for i in order), shares / shares.sum(), excess)
+
+    def support(self, evidence: Evidence, each: Explanation, mean: Array, covariance: Array) -> float:
+        """ln of how much more probable `evidence` is with that fault, of the size that is estimated, than without any."""
+        healthy = evidence.given(mean, covariance)
+        if each.cause == UNKNOWN:
+            return healthy.unknown - healthy.log
+        matrix, vector = healthy.matrix[np.ix_(each.places, each.places)], healthy.vector[list(each.places)]
+        return float(vector @ each.values - 0.5 * each.values @ matrix @ each.values)
 
     def _explain(self, each: Hypothesis, healthy: Evidence) -> Explanation:
         places = list(each.places)

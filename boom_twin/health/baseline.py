@@ -32,10 +32,10 @@ class Baseline(BaseModel):
     names: tuple[str, ...] = Field(default=(), description="parameters that were learnt, cause:kind")
     mean: Row = Field(default=[], description="of these")
     covariance: list[Row] = Field(default=[], description="of these")
-    angle_error: Positive = Field(default=1.5e-4, description="deviation of the model's error of an angle in one posture, rad")
+    angle_error: Positive = Field(default=5e-5, description="deviation of the model's error of an angle in one posture, rad")
     force_error: Positive = Field(default=0.02, description="likewise of the IMU's readings, m/s^2")
     angle_noise: Positive = Field(default=1.0, description="noise of the angles over what sensors are stated to have")
-    force_noise: Positive = Field(default=1.5, description="likewise of the IMU; the look ahead adds to it")
+    force_noise: Positive = Field(default=1.9, description="likewise of the IMU; the look ahead adds to it")
     detuning: Positive = Field(default=0.01, description="share by which natural frequencies may be wrong")
 
     def errors(self, joints: int) -> Array:

@@ -1,4 +1,4 @@
-"""Gathers what is predicted and measured into blocks of 50 ms, by stamps."""
+"""Gathers what is predicted and measured into blocks of 0.1 s, by stamps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..records import Array, Prediction, Residuals, Stream
 
-BLOCK = 50_000_000  # ns
+BLOCK = 100_000_000  # ns
 GRACE = 100_000_000  # ns that a block waits for late samples
 NANO = 1e-9
 

@@ -22,7 +22,7 @@ from ..records import Array
 
 ALLOWANCE = 1.0  # deviations by which the mean may be off
 CUT = 4.0  # a single innovation counts no more than this
-WINDOW = 40  # blocks of the window: 2 s
+WINDOW = 20  # blocks of the window: 2 s
 EXCESS = 1.5  # times the variance that model error may have
 
 

@@ -15,7 +15,6 @@ from .residual_watch import ResidualWatch
 from .sensor_watch import SensorWatch
 from .sensors import SensorCheck
 
-FASTEST = 0.5  # m/s, no cylinder of a boom is faster
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 
 
@@ -56,7 +55,7 @@ class Judge:
         self._blocks = Blocks()
         self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
         zero = np.zeros(self._n)
-        self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, FASTEST)
+        self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
         self._rates: Array | None = None
         ended = self.residuals.close(self._told)
         if ended is not None:

@@ -1,8 +1,8 @@
 """Learns a baseline from healthy sessions: what parameters are off by, and how large the errors are that stay.
 
-The errors (deviation of the model's error of angles and of the IMU, their noise, the detuning) are those under which the innovations
-of all sessions are most probable, found by coordinate search on a grid of ratios; with them, the regression of all sessions one
-after the other gives the parameters.
+The errors (deviation of the model's error of angles and of the IMU, their noise, the detuning) are those under which the
+innovations of all sessions are most probable, found by coordinate search on a grid of ratios; with them, the regression of all
+sessions one after the other gives the parameters.
 """
 
 from __future__ import annotations
@@ -89,9 +89,7 @@ def _climb(
     return start.model_copy(update={key: float(f"{value:.3g}")})
 
 
-def _run(
-    sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, trial: Baseline
-) -> tuple[Regression, float]:
+def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, trial: Baseline) -> tuple[Regression, float]:
     """Regression over all sessions, and the logarithm of the probability of their innovations."""
     regression, log = Regression(*Baseline().healthy(known)), 0.0
     errors2, noise2 = trial.errors(joints) ** 2, trial.noise(joints) ** 2

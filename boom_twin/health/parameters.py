@@ -108,13 +108,11 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
         Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0),
         Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0),
     ]
-    found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 2e-4, 5e-3) for i in each]
+    found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
     found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 5e-5, 3e-3) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 2e-4, 0.03) for i in each]
-    found += [
-        Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 5e-4, one_sided=True) for i in each
-    ]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 5e-4, one_sided=True) for i in each]
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05))
     if has_imu:
         found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]

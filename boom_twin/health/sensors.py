@@ -138,14 +138,15 @@ class SensorCheck:
             lasting = 0.5 * (left[2:-1] + left[3:]) - 0.5 * (left[:-3] + left[1:-2])
             least = np.maximum(JUMP * self._sigma, self._fastest * (times[2:-1] - times[1:-2]))[:, None]
             sudden = (np.abs(measured) > least) & (np.abs(step) > least) & (np.abs(lasting) > 0.7 * np.abs(step))
-            sudden &= (np.abs(left[3:] - left[2:-1]) < 0.3 * np.abs(step)) & (np.abs(left[1:-2] - left[:-3]) < 0.3 * np.abs(step))
+            calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
+            sudden &= calm < 0.3 * np.abs(step)
         return np.where(sudden.any(axis=0), np.where(sudden, step, 0.0).sum(axis=0), 0.0)
 
 
 def _newest(stamps: Array, raw: Array, before: Array) -> Array:
     """Times of the newest readings, shape (channels,)."""
     seen = np.where(np.isfinite(raw), stamps[:, None], -np.inf).max(axis=0)
-    return np.where(np.isnan(before), np.where(np.isfinite(seen), seen, stamps[0]), np.maximum(before, seen))
+    return np.asarray(np.where(np.isnan(before), np.where(np.isfinite(seen), seen, stamps[0]), np.maximum(before, seen)))
 
 
 def repeats(sigma: float, resolution: float) -> int:

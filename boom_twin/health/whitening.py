@@ -1,15 +1,18 @@
 """The whitening filter: residuals less the vibration and the slow errors that a good model still leaves in them.
 
-Two kinds of deviation are no fault. What strokes' noise shakes out of the natural modes, and what a model leaves of a vibration
-whose frequency it has a little wrong: per mode a coordinate eta with eta'' + 2 zeta omega eta' + omega^2 eta = w; w is white, of the
-density that
+Two kinds of deviation are no fault. What strokes' noise shakes out of the natural modes, and what a model leaves of a
+vibration whose frequency it has a little wrong: per mode a coordinate eta with eta'' + 2 zeta omega eta' + omega^2 eta = w;
+w is white, of the density that
 
 - gives eta the variance that stroke noise collects in the mode (see `boom_twin.analysis.noise`), and
 - lets a vibration of the predicted size lose step with the real one as if its frequency were wrong by the share `detuning`
   within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
 
-And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of a
-given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
+The shape of a mode is then wrong, too: every channel has a noise of its own, of `SHAPE` detuning times what it reads of that
+vibration.
+
+And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
+a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
 
 A Kalman filter on all these turns the means of residuals in blocks into innovations: white and of unit variance while all is
 well, but for what parameters add. Its gains do not depend on what is measured, so the same filter run over the signature of a
@@ -33,6 +36,7 @@ from .reading import Reading
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
 LEAST_DAMPING = 2e-4  # of omega, so that every mode has a finite variance
+SHAPE = 0.5  # see above
 REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
 
@@ -45,12 +49,14 @@ class Modes(NamedTuple):
     frequencies : ndarray, shape (m,)
         Hz.
     turn, least, driven : ndarray, shape (2 m, 2 m)
-        What coordinates and their rates become within a block; covariance that stroke noise adds, and that wrong frequencies add
-        for a mean square of the tip's acceleration of 1 (m/s^2)^2 and a detuning of 1.
+        What coordinates and their rates become within a block; covariance that stroke noise adds, and that wrong frequencies
+        add for a mean square of the tip's acceleration of 1 (m/s^2)^2 and a detuning of 1.
     rest : ndarray, shape (2 m, 2 m)
         Their covariance after long shaking by stroke noise.
     shown : ndarray, shape (c, 2 m)
         How the means of the channels read them.
+    shaken : ndarray, shape (c,)
+        Mean square of what they read while the mean square of the tip's acceleration is 1 (m/s^2)^2.
     """
 
     frequencies: Array
@@ -59,6 +65,7 @@ class Modes(NamedTuple):
     driven: Array
     rest: Array
     shown: Array
+    shaken: Array
 
 
 def modes_of(
@@ -68,7 +75,7 @@ def modes_of(
     kept = [j for j, mode in enumerate(noise.modes) if mode.frequency < HIGHEST]
     size, n, tip, h = len(kept), plan.joints, plan.tables.tip, block
     turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
-    shown = np.zeros((n + 2, 2 * size))
+    shown, shaken = np.zeros((n + 2, 2 * size)), np.zeros(n + 2)
     for k, j in enumerate(kept):
         mode, omega, at = noise.modes[j], 2.0 * math.pi * noise.modes[j].frequency, slice(2 * k, 2 * k + 2)
         turn[at, at] = own = oscillation(omega, max(noise.decay[j], LEAST_DAMPING * omega), h)
@@ -79,7 +86,8 @@ def modes_of(
         shown[:, 2 * k] = np.sinc(mode.frequency * h) * _shown(plan, state, work, mode, reading)
         if before is not None and 2 * k < before.shown.shape[1] and shown[:, 2 * k] @ before.shown[:, 2 * k] < 0.0:
             shown[:, 2 * k] *= -1.0
-    return Modes(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown)
+        shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
+    return Modes(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown, shaken)
 
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
@@ -148,6 +156,7 @@ class Whitening:
         x[at], p[np.ix_(at, at)] = self._x[places], self._p[np.ix_(places, places)]
         self._x, self._p, self._modes = x, p, size
         self._turn, self._least, self._driven = modes.turn, modes.least, self._detuning2 * modes.driven
+        self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         self._shown = np.hstack([modes.shown, np.eye(c)])
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
@@ -172,7 +181,8 @@ class Whitening:
             return Innovations(table[:0], 0.0)
         shown = self._shown[rows]
         cross = self._p @ shown.T
-        root = np.linalg.cholesky(shown @ cross + noise[np.ix_(rows, rows)])
+        own = (noise + np.diag(shaking * self._shaken))[np.ix_(rows, rows)]
+        root = np.linalg.cholesky(shown @ cross + own)
         white = np.linalg.solve(root, np.hstack([table[rows] - shown @ self._x, cross.T]))
         innovation, cross = white[:, : table.shape[1]], white[:, table.shape[1] :]
         self._x = self._x + cross.T @ innovation

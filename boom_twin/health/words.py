@@ -12,7 +12,7 @@ from .bank import UNKNOWN, Explanation, Verdict
 from .parameters import Form, Parameter, physical
 from .signatures import Signature, Signatures
 
-NAMED = 0.95  # probability of a cause beside the others that is taken for certain
+NAMED, KEPT = 0.95, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
@@ -40,14 +40,25 @@ class Teller:
         found, probabilities = verdict.found, verdict.probabilities
         likely = [i for i, p in enumerate(probabilities) if p >= LISTED][:MOST]
         ranks = tuple(self._ranked(found[i], float(probabilities[i]), verdict.excess) for i in likely)
+        certain = self._certain(alarm, verdict)
         if found[0].cause == UNKNOWN and probabilities[0] > 0.5:
             told = f"{alarm.channel} deviates as no single fault that is known would make it"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
-        if probabilities[0] >= NAMED:
-            best = max(ranks[0].parts, key=lambda part: abs(part[1]) / part[2])
-            return replace(alarm, kind=best[0], cause=found[0].cause, told=self._sentence(ranks[0], best), ranked=ranks)
+        if certain is not None:
+            rank = next(rank for rank in ranks if rank.cause == certain)
+            best = max(rank.parts, key=lambda part: abs(part[1]) / part[2])
+            return replace(alarm, kind=best[0], cause=certain, told=self._sentence(rank, best), ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         return replace(alarm, kind="residual", cause=None, told=told + self._advised_move(found, signature), ranked=ranks)
+
+    @staticmethod
+    def _certain(alarm: Alarm, verdict: Verdict) -> str | None:
+        """The cause that is named: one that is probable enough; one that was is kept while it is still quite probable."""
+        share = {each.cause: float(p) for each, p in zip(verdict.found, verdict.probabilities, strict=True)}
+        best = verdict.found[0].cause
+        if best != UNKNOWN and share[best] >= NAMED:
+            return best
+        return alarm.cause if alarm.cause is not None and share[alarm.cause] >= KEPT else None
 
     def _ranked(self, each: Explanation, probability: float, excess: float) -> Ranked:
         parts = tuple(

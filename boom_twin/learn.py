@@ -1,0 +1,45 @@
+"""A baseline from samples of healthy sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from .health.baseline import Baseline
+from .health.learning import learn
+from .health.linear import Problem
+from .health.parameters import parameters
+from .load import loaded
+from .records import Mount, Sample
+from .scene.parts import Scene
+from .settings import Settings
+from .twin import Twin
+
+
+def learn_baseline(
+    scene: Scene,
+    settings: Settings,
+    sessions: Iterable[Iterable[Sample]],
+    names: Sequence[str],
+    mounts: Sequence[Mount | None] = (),
+) -> Baseline:
+    """What model and sensors are off by in `sessions`, called `names`, in which all was well.
+
+    Raises
+    ------
+    UsageError
+        Less than a minute of usable samples in all.
+    """
+    problems = [_problems(scene, settings, session, mounts) for session in sessions]
+    scene = loaded(scene, *settings.load)
+    return learn(problems, parameters(scene), len(scene.joints), names)
+
+
+def _problems(scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]) -> list[Problem]:
+    """The linear problems that a twin makes of one session."""
+    twin = Twin(scene, settings, mounts, Baseline())
+    assert twin.judge is not None
+    found: list[Problem] = []
+    twin.judge.residuals.listener = found.append
+    for sample in session:
+        twin.update(sample)
+    return found

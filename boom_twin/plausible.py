@@ -1,0 +1,58 @@
+"""Keeps single wrong strokes from the model, and holds a stroke that has fallen silent."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .records import Array
+from .settings import Settings
+
+MOST = 5  # readings in a row that are not believed; the next one is
+FAR = 8.0  # deviations of the noise
+SILENT = 100_000_000  # ns after which a missing stroke is taken to stay where it was
+NANO = 1e-9
+Flags = NDArray[np.bool_]
+
+
+class Plausible:
+    """Looks at the strokes of one run, sample by sample.
+
+    Attributes
+    ----------
+    estimate : ndarray, shape (n,), or None
+        Strokes (m) as estimated at the sample before; None at the first one.
+    """
+
+    def __init__(self) -> None:
+        self.estimate: Array | None = None
+        self._stamp = 0
+
+    def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
+        """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events."""
+        if self.estimate is None:
+            self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
+            self._stamp = stamp
+            return values, []
+        span, self._stamp = (stamp - self._stamp) * NANO, stamp
+        limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
+        far: Flags = np.abs(values - self.estimate) > limit
+        if not far.any() and np.isfinite(values.sum()):
+            self._strange[:] = 0
+            self._seen[:] = stamp
+            return values, []
+        return self._doubted(stamp, values, far)
+
+    def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
+        assert self.estimate is not None
+        self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
+        implausible = far & (self._strange <= MOST)
+        taken = np.where(implausible, np.nan, values)
+        self._strange[far & ~implausible] = 0
+        self._seen = np.where(np.isfinite(taken), stamp, self._seen)
+        silent = np.isnan(taken) & (stamp - self._seen > SILENT)
+        events = ["implausible"] if implausible.any() else []
+        if silent.any():
+            taken = np.where(silent, self.estimate, taken)
+            events.append("held")
+        return taken, events
