@@ -1,4 +1,4 @@
-"""Bending moments of the flexible parts, from the bending coordinates: M = EI kappa, exact where the curvature is at most quadratic.
+"""Bending moments of the flexible parts, from their bending coordinates: M = EI times curvature.
 
 In the default basis the curvature at xi = s/length of a part is sum_k P_k(2 xi - 1) q_k / length with Legendre polynomials P_k,
 and K_00 = EI / length is the part's stiffness (notes at `boom_twin.physics.modes`). Three shapes so hold what weight spread

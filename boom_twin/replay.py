@@ -278,6 +278,12 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     ]
 
 
+def alarm_as_text(alarm: dict[str, Any]) -> str:
+    """An alarm of ``summary.json`` in words."""
+    end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
+    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
+
+
 def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
     """How often each pin with clearance lost contact from one sample to the next; nothing without such pins."""
     if not twin.plan.pins:

@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
-from ..pictures import draw
+from ..pictures import draw, history_of
 from ..records import Stream
 from ..replay import Replay, replay
 from ..scene import load_scene
@@ -59,7 +59,7 @@ def main() -> int:
         again = replay(recorded, scene, args.out / "replay")
         about = f"{session.path.name} ({_origin(session)})"
         print("\n".join(card.as_text(about, sent[Stream.STROKES.value], _equal(card, again))))
-        for path in [recorded, *draw(again, scene, args.out)]:
+        for path in [recorded, *draw(again, history_of(again.recording, scene), args.out)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -m boom_twin.cli.main monitor --bag {recorded}")
         return 0

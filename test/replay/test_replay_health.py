@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
-from boom_twin.cli.replay import alarm_as_text
 from boom_twin.errors import UsageError
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import Output, load_topics
+from boom_twin.replay import alarm_as_text
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
@@ -41,7 +41,7 @@ def test_a_stuck_sensor_is_in_the_summary(result):
     stuck = next(alarm for alarm in alarms if alarm["channel"] == "joint_3" and alarm["kind"] == "stuck")
     assert stuck.keys() == {"channel", "kind", "from_s", "to_s", "cause", "told", "ranked"}
     assert stuck["cause"] == "joint_3.sensor" and stuck["to_s"] is None and 2.9 < stuck["from_s"] < 4.0
-    assert alarm_as_text(stuck) == f"  joint_3, {stuck['from_s']:.2f} s to the end: {stuck['told']}"
+    assert alarm_as_text(stuck) == f"joint_3, {stuck['from_s']:.2f} s to the end: {stuck['told']}"
 
 
 def test_every_alarm_is_there_once(result):
