@@ -68,8 +68,10 @@ class Baseline(BaseModel):
         return mean, covariance
 
 
-def load_baseline(path: Path) -> Baseline:
-    """A baseline from its file (YAML); UsageError names every value that cannot be."""
+def load_baseline(path: Path | None = None) -> Baseline:
+    """A baseline from its file (YAML), the package's own if no path is given; UsageError names every value that cannot be."""
+    if path is None:
+        return Baseline()
     content = read_plain(path, UsageError, "Give a file written by `boom_twin calibrate --baseline`.")
     if not isinstance(content, dict):
         raise UsageError(f"{path}: not a baseline. Give a file written by `boom_twin calibrate --baseline`.")

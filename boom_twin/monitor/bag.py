@@ -33,7 +33,7 @@ LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-SHOWN = frozenset(Output) - {Output.CHANGES}
+SHOWN = frozenset(Output) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
 TURN = 0.04
 """Seconds of reading at a time, after which the pages have their turn."""
 

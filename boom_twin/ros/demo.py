@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
-from ..pictures import draw
+from ..pictures import draw, history_of
 from ..records import Stream
 from ..replay import Replay, replay
 from ..scene import load_scene
@@ -44,7 +44,7 @@ def main() -> int:
         card, scene = score(recorded), load_scene()
         again = replay(recorded, scene, args.out / "replay")
         print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
-        for path in [recorded, *draw(again, scene, args.out)]:
+        for path in [recorded, *draw(again, history_of(again.recording, scene), args.out)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -m boom_twin.cli.main monitor --bag {recorded}")
         return 0

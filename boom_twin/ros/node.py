@@ -24,7 +24,7 @@ from ..settings import Settings
 from ..twin import Twin
 from .diagnostics import Diagnostics
 from .page import Page
-from .parameters import declare, guard, mapping_path, scene_path, settings_of, thresholds_of
+from .parameters import baseline_of, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
 from .services import Services
 from .started import Started
@@ -141,13 +141,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self.get_logger().warning(str(oddity))
         settings, joints = settings_of(self), len(scene.joints)
         topics = load_mapping(mapping_path(self), joints)
-        twin = Twin(scene, settings, topics.mounts(joints))
+        twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
-        self._asked = Services(self, twin, lambda: bool(self._subscriptions_in))
+        self._asked = Services(self, twin, self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in))
         self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")

@@ -32,7 +32,7 @@ def main(path: Path) -> None:
 def healthy(outcomes: list[Outcome]) -> list[str]:
     """False alarms per group."""
     lines = ["| sessions | hours | false alarms | per day, 95 % |", "|---|---|---|---|"]
-    for group, name in (("test", "healthy, model wrong by 2 %, learnt baseline"), ("right", "healthy, right model, own baseline")):
+    for group, name in (("test", "healthy, wrong by 2 %, learnt baseline"), ("right", "healthy, right model, own baseline")):
         own = [outcome for outcome in outcomes if outcome["group"] == group]
         hours = sum(outcome["seconds"] for outcome in own) / 3600.0
         count = sum(len(alarms(outcome)) for outcome in own)
