@@ -17,7 +17,7 @@ DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-NODE_ONLY = ("scene", "mapping", "health", "baseline", "autostart")
+NODE_ONLY = ("scene", "mapping", "health", "baseline", "autostart", "monitor")
 LIVE = "live"
 """Marks what can change while the twin runs."""
 Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]

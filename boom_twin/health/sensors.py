@@ -19,6 +19,7 @@ QUIET = 0.3  # of the noise that is stated: a channel with less gives clean read
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s
+MISSING = 0.1  # share of the readings
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class SensorCheck:
         self._stamps = np.zeros(3)
         self._run, self._since = np.zeros(count, dtype=np.int64), np.zeros(count)
         self._heard = np.full(count, np.nan)
-        self._power, self._weight = np.full(count, np.nan), 0.0
+        self._power, self._missing = np.full(count, np.nan), np.zeros(count)
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> Findings:
         """Take the readings of a block.
@@ -91,7 +92,7 @@ class SensorCheck:
             noisy=self._power > (NOISY * self._sigma) ** 2,
             spikes=spikes,
             jumped=self._jumps(times, all_raw, left),
-            silent=now - self._heard > SILENT_FOR,
+            silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, stamps[-1] - stamps[0]),
             outside=((raw < self._low) | (raw > self._high)).mean(axis=0) > 0.5,
         )
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
@@ -119,6 +120,12 @@ class SensorCheck:
         fresh = np.isnan(self._power)
         mixed = np.where(fresh, np.minimum(power, self._sigma**2), self._power + share * (power - self._power))
         self._power = np.where(np.isnan(power), self._power, mixed)
+
+    def _lacks(self, raw: Array, span: float) -> Flags:
+        """Channels of which too many readings are missing, in messages that come."""
+        share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
+        self._missing += share * (np.isnan(raw).mean(axis=0) - self._missing)
+        return np.asarray(self._missing > MISSING)
 
     def _stuck(self, times: Array, raw: Array) -> Flags:
         """One reading again and again, while others of the stream are alive with noise."""

@@ -49,6 +49,7 @@ TABLE = (
     Row("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
     Row("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
     Row("autostart", True, "the node configures and activates itself", AT_START),
+    Row("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
     *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
     *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
 )

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ..retouch import yaml_text
 from ..scene.parts import Scene
 from ..scene.read import Place, words
 
@@ -25,11 +26,6 @@ class Edit:
         if self.value is None:
             return f"remove {words(self.place)}"
         return f"{words(self.place)}: {yaml_text(self.value)}"
-
-
-def yaml_text(value: Value) -> str:
-    """A value in the spelling of the file."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def edited(scene: Scene, edits: Iterable[Edit]) -> Scene:

@@ -1,0 +1,8 @@
+"""Parameters of a boom from recorded sessions: nonlinear least squares on the twin's model, with intervals.
+
+See docs/calibrate.md for what it does and what sessions it needs.
+"""
+
+from .run import Calibration, Choice, Estimate, calibrate
+
+__all__ = ["Calibration", "Choice", "Estimate", "calibrate"]

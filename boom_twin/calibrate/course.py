@@ -1,0 +1,138 @@
+"""How the drives went, as a calibration takes it: smoothed forth and back on a uniform grid, which needs no estimate of now.
+
+The filter is Butterworth's of third order run in both directions, so that its gain is 1 / (1 + (omega/omega_c)^6) without any
+lag: that of the twin's smoother for strokes that are integrated white jerk, with its corner omega_c = (q / (r T))^(1/6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from ..errors import BagError
+from ..records import Array, Stream
+from ..settings import Settings
+from .measured import NANO, Measured, Series
+
+LARGEST_GAP = 0.5  # s between strokes; a session is used from one such gap to the next
+REST, SPEED = 1.0, 1e-3  # a course starts where no stroke has gone faster (m/s) than this for so long (s)
+SHORTEST = 15.0  # s
+HIGHEST = 0.4  # of the grid's frequency, bound of the corner
+
+
+@dataclass(frozen=True)
+class Course:
+    """Strokes of a stretch of a session on a uniform grid.
+
+    Attributes
+    ----------
+    start : int
+        Stamp of its first instant, ns.
+    step : float
+        s.
+    strokes : ndarray, shape (m, n)
+        As measured, smoothed; m.
+    stamps : ndarray of int
+        Of the samples that it was made from.
+    corner : float
+        Of the smoothing, Hz.
+    """
+
+    start: int
+    step: float
+    strokes: Array
+    stamps: NDArray[np.int64]
+    corner: float
+
+    @property
+    def times(self) -> Array:
+        """Of the grid, s after `start`."""
+        return np.asarray(self.step * np.arange(len(self.strokes)))
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last instant, s."""
+        return self.step * (len(self.strokes) - 1)
+
+    def until(self, time: float) -> Course:
+        """The part up to `time` (s)."""
+        count = 1 + int(time / self.step)
+        end = self.start + round(time / NANO)
+        return Course(self.start, self.step, self.strokes[:count], self.stamps[self.stamps <= end], self.corner)
+
+    def smoothed(self, values: Array) -> Array:
+        """What became of values at `stamps`, shape (k, ..), on the grid, shape (m, ..)."""
+        return _smoothed(np.asarray((self.stamps - self.start) * NANO), values, self.times, self.corner)
+
+
+def course_of(session: Measured, settings: Settings) -> Course:
+    """The longest stretch of a session without a gap, from where the boom rests.
+
+    Raises
+    ------
+    BagError
+        There is none that is long enough.
+    """
+    series = _longest(session.series[Stream.STROKES])
+    times: Array = np.asarray((series.stamps - series.stamps[0]) * NANO)
+    step = settings.step
+    grid: Array = np.asarray(step * np.arange(int(times[-1] / step) + 1))
+    refuse_short(session.name, float(grid[-1]), "without a gap in the strokes")
+    spectrum = settings.stroke_variance * float(np.median(np.diff(times)))
+    corner = min((settings.jerk_density / spectrum) ** (1.0 / 6.0) / (2.0 * np.pi), HIGHEST / step)
+    strokes = _smoothed(times, filled(times, series.values), grid, corner)
+    first = _rest(np.abs(np.gradient(strokes, step, axis=0)).max(axis=1), round(REST / step))
+    if first is None:
+        raise BagError(f"{session.name}: the boom never rests for {REST:g} s, where a calibration starts. Record a hold first.")
+    refuse_short(session.name, step * (len(grid) - 1 - first), "from the first rest on")
+    start = int(series.stamps[0] + round(grid[first] / NANO))
+    return Course(start, step, strokes[first:], series.stamps[series.stamps >= start], corner)
+
+
+def refuse_short(name: str, duration: float, where: str) -> None:
+    """BagError for a stretch that is too short."""
+    if duration < SHORTEST:
+        raise BagError(
+            f"{name}: {duration:.1f} s {where}, {SHORTEST:g} s are needed. Record a minute with moves that change loads."
+        )
+
+
+def _smoothed(times: Array, values: Array, grid: Array, corner: float) -> Array:
+    flat = values.reshape(len(values), -1)
+    on_grid = np.column_stack([np.interp(grid, times, column) for column in flat.T])
+    step = float(grid[1] - grid[0])
+    sections = butter(3, corner, fs=1.0 / step, output="sos")
+    padding = min(len(grid) - 1, round(1.0 / (corner * step)))
+    found = sosfiltfilt(sections, on_grid, axis=0, padtype="even", padlen=padding)
+    return np.asarray(found.reshape(len(grid), *values.shape[1:]))
+
+
+def _longest(series: Series) -> Series:
+    """The longest stretch between gaps."""
+    cuts = np.flatnonzero(np.diff(series.stamps) * NANO > LARGEST_GAP) + 1
+    bounds = np.concatenate([[0], cuts, [len(series.stamps)]])
+    lengths = [series.stamps[b - 1] - series.stamps[a] for a, b in pairwise(bounds)]
+    first = int(np.argmax(lengths))
+    part = slice(int(bounds[first]), int(bounds[first + 1]))
+    return Series(series.stamps[part], series.values[part])
+
+
+def filled(times: Array, values: Array) -> Array:
+    """Values (m, c) at `times` (m,), missing ones on the line between their neighbours; a column without any stays."""
+    columns = values.T.copy()
+    for column in columns:
+        known = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(times[~known], times[known], column[known])
+    return np.asarray(columns.T)
+
+
+def _rest(speeds: Array, count: int) -> int | None:
+    """First place from where on `count` speeds in a row are low."""
+    fast = np.concatenate([[0], np.cumsum(speeds > SPEED)])
+    quiet = np.flatnonzero(fast[count:] == fast[:-count])
+    return int(quiet[0]) if len(quiet) else None

@@ -1,0 +1,91 @@
+"""Residuals of the twin itself on what was kept from the fit, before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from heapq import merge
+
+import numpy as np
+
+from ..errors import BagError
+from ..records import Array, Mount, Residuals, Sample, Stream, channels_of
+from ..scene.parts import Scene
+from ..settings import Settings
+from ..twin import Twin
+from .measured import NANO, Measured
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Residuals of k samples in c channels, NaN where not measured.
+
+    Attributes
+    ----------
+    names : tuple of str
+    times : ndarray, shape (k,)
+        s after the first of them.
+    values, sigmas : ndarray, shape (k, c)
+        In the unit of the sensor, and expected.
+    """
+
+    names: tuple[str, ...]
+    times: Array
+    values: Array
+    sigmas: Array
+
+    @property
+    def spread(self) -> Array:
+        """Root mean square of the normalised residuals of every channel, shape (c,); 1 where all is as expected."""
+        return np.array([_rms(column) for column in (self.values / self.sigmas).T])
+
+
+def judged(
+    scene: Scene, settings: Settings, mounts: Sequence[Mount | None], session: Measured, zeros: Mapping[str, float], start: int
+) -> Judged:
+    """Run a session through the twin of `scene`, and keep the residuals from stamp `start` on.
+
+    Parameters
+    ----------
+    zeros : dict of str to float
+        What sensors read too much, by channel.
+
+    Raises
+    ------
+    BagError
+        The twin predicts nothing there.
+    """
+    twin = Twin(scene, settings, mounts)
+    found: dict[Stream, list[Residuals]] = {Stream.ANGLES: [], Stream.IMU: []}
+    for sample in _samples(session, zeros, len(scene.joints)):
+        for residuals in twin.update(sample).residuals:
+            if residuals.stamp >= start:
+                found[residuals.stream].append(residuals)
+    every = [residuals for group in found.values() for residuals in group]
+    if not every:
+        raise BagError(f"{session.name}: the twin predicts nothing in the part held out. Are the strokes within the travel?")
+    first = min(residuals.stamp for residuals in every)
+    names = tuple(name for group in found.values() if group for name in group[0].names)
+    times = np.array([(residuals.stamp - first) * NANO for residuals in every])
+    values, sigmas = np.full((2, len(every), len(names)), np.nan)
+    for row, residuals in enumerate(every):
+        at = names.index(residuals.names[0])
+        values[row, at : at + len(residuals.names)] = residuals.values
+        sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
+    return Judged(names, times, values, sigmas)
+
+
+def _samples(session: Measured, zeros: Mapping[str, float], joints: int) -> list[Sample]:
+    """All samples of a session in the order of their stamps, strokes first."""
+    streams = []
+    for order, (stream, names) in enumerate(channels_of(joints).items()):
+        if stream in session.series:
+            series, shift = session.series[stream], np.array([zeros.get(name, 0.0) for name in names])
+            pairs = zip(series.stamps.tolist(), series.values - shift, strict=True)
+            streams.append([(stamp, order, Sample(stream, stamp, row)) for stamp, row in pairs])
+    return [sample for _, _, sample in merge(*streams, key=lambda item: item[:2])]
+
+
+def _rms(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")

@@ -1,0 +1,138 @@
+"""Residuals of sessions as a function of the unknowns, with their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import BagError
+from ..records import Array
+from ..scene.parts import Scene
+from ..settings import Settings
+from .blocks import Blocks
+from .course import Course
+from .forward import Forward
+from .unknowns import Unknown
+from .whitening import Whitening
+
+DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths
+REALISATIONS = 48  # of the noise, over all sessions
+START = 0.02  # prior deviations off a bound
+PRESENT = 0.5  # share of blocks that a channel must have
+
+Parts = Sequence[tuple[Course, Blocks]]
+
+
+class Problem:
+    """What is compared.
+
+    Parameters
+    ----------
+    scene : Scene
+    unknowns : sequence of Unknown
+    parts : sequence of (Course, Blocks)
+        What of every session is used.
+    channels : sequence of str
+        Of the blocks.
+    settings : Settings
+        Noise of the sensors.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Those that all sessions have.
+    deviations : ndarray, shape (c,)
+        Of a single sample of each of them.
+    length : float
+        Of a block, s.
+
+    Raises
+    ------
+    BagError
+        No channel has enough values.
+    """
+
+    def __init__(
+        self, scene: Scene, unknowns: Sequence[Unknown], parts: Parts, channels: Sequence[str], settings: Settings
+    ) -> None:
+        self.scene, self.unknowns, self.parts = scene, tuple(unknowns), tuple(parts)
+        present = np.all([np.isfinite(blocks.measured).mean(axis=0) > PRESENT for _, blocks in parts], axis=0)
+        self.used = np.flatnonzero(present)
+        if not len(self.used):
+            raise BagError("no angle sensor has values throughout all sessions. Record strokes and joint angles together.")
+        self.channels = tuple(channels[int(i)] for i in self.used)
+        variances = [settings.imu_sigma**2 if name.startswith("tip") else settings.angle_variance for name in self.channels]
+        self.deviations = np.sqrt(variances)
+        self._direct = [self._effect(unknown) for unknown in unknowns]
+        self.length = float(np.diff(parts[0][1].times[:2])[0])
+        self._stroke_deviation = float(np.sqrt(settings.stroke_variance))
+
+    @property
+    def start(self) -> Array:
+        """Deviations of the present values; a load that is not there begins a little off its bound."""
+        return np.array([max(0.0, unknown.least + START) for unknown in self.unknowns])
+
+    def values(self, deviations: Array) -> dict[str, float]:
+        """Values of the unknowns by name."""
+        return {unknown.name: unknown.value(float(d)) for unknown, d in zip(self.unknowns, deviations, strict=True)}
+
+    def moving(self, deviations: Array, whitening: Whitening) -> tuple[Array, Array]:
+        """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
+        forward = Forward(self.scene, self._trials(deviations))
+        residuals, slopes = [], []
+        for course, blocks in self.parts:
+            means = np.array([blocks.averaged(*streams) for streams in zip(*forward.move(course), strict=True)])
+            predicted, slope = self._with_slopes(means, deviations)
+            left = blocks.measured[:, self.used] - predicted
+            gaps = np.where(np.isfinite(left), 0.0, np.nan)
+            residuals.append(whitening(left).ravel())
+            slopes.append(-whitening(slope + gaps).reshape(len(self.unknowns), -1))
+        return np.concatenate(residuals), np.concatenate(slopes, axis=1).T
+
+    def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
+        """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
+        forward = Forward(self.scene, self._trials(deviations))
+        angles, force = (np.concatenate(each, axis=1) for each in zip(*map(forward.rest, strokes), strict=True))
+        return self._with_slopes(np.concatenate([angles, force], axis=2), deviations)
+
+    def noise(self, deviations: Array) -> list[Array]:
+        """Realisations of the noise of block means, one array (k, b, c) for every session.
+
+        The strokes' noise shakes the natural modes, so it depends on the unknowns.
+        """
+        rng = np.random.default_rng(0)
+        count = -(-REALISATIONS // len(self.parts))
+        forward = Forward(self.scene, [self.values(deviations)] * (count + 1))
+        found = []
+        for course, blocks in self.parts:
+            noise = np.zeros((len(course.stamps), count + 1, course.strokes.shape[1]))
+            noise[:, 1:] = self._stroke_deviation * rng.standard_normal(noise[:, 1:].shape)
+            readings = forward.move(course, course.smoothed(noise).swapaxes(0, 1))
+            means = np.array([blocks.averaged(*streams) for streams in zip(*readings, strict=True)])[..., self.used]
+            own = self.deviations / np.sqrt(np.maximum(blocks.counts[:, self.used], 1.0))
+            found.append(means[1:] - means[0] + own * rng.standard_normal(means[1:].shape))
+        return found
+
+    def _trials(self, deviations: Array) -> list[dict[str, float]]:
+        """The values themselves, and with every unknown moved that acts through the boom."""
+        moved = [deviations]
+        for i, direct in enumerate(self._direct):
+            if direct is None:
+                moved.append(deviations.copy())
+                moved[-1][i] += DIFFERENCE
+        return [self.values(each) for each in moved]
+
+    def _with_slopes(self, readings: Array, deviations: Array) -> tuple[Array, Array]:
+        """From readings (trials, b, channels) those of the channels used, (b, c), and their derivatives (p, b, c)."""
+        readings = readings[..., self.used]
+        acting = iter((readings[1:] - readings[0]) / DIFFERENCE)
+        slopes = np.array([next(acting) if d is None else np.broadcast_to(d, readings[0].shape) for d in self._direct])
+        zeros = sum((d * at for d, at in zip(self._direct, deviations, strict=True) if d is not None), np.zeros(len(self.used)))
+        return readings[0] + zeros, slopes
+
+    def _effect(self, unknown: Unknown) -> Array | None:
+        """What a prior deviation adds to each channel (c,), for a zero of an angle sensor or of the IMU; else None."""
+        if unknown.channel is None or unknown.channel.startswith("cylinder"):
+            return None
+        return unknown.kind.prior * np.array([channel == unknown.channel for channel in self.channels], dtype=float)

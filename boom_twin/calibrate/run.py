@@ -1,0 +1,257 @@
+"""A whole calibration: read, hold out, fit, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BagError, UsageError
+from ..io.mapping import Mapped, mapping_of
+from ..records import Stream
+from ..scene.named import with_parameters
+from ..scene.parts import Scene
+from ..settings import Settings
+from .blocks import block_length, blocks_of, channel_names, has_imu
+from .course import Course, course_of, refuse_short
+from .fit import Fit, fitted
+from .heldout import Judged, judged
+from .measured import NANO, Measured, read_sessions
+from .problem import Problem
+from .telling import Group, groups_of
+from .unknowns import Unknown, unknowns_of, usual_names
+
+KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
+MOVED = 0.01  # m, least travel of some stroke
+MISFIT = 1.5  # from which on the fit is remarked on
+GROWN = 1.1  # of residuals on what was held out, likewise
+BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is to be estimated: `names`, or if there are none the usual ones with what else is asked for.
+
+    See `boom_twin.calibrate.unknowns.usual_names`.
+    """
+
+    names: tuple[str, ...] = ()
+    load: str | None = None
+    damping: str | None = None
+    stiffness: bool = False
+    zeros: str = "all"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter, SI: present value, estimate, 95 % interval, and whether the sessions tell it."""
+
+    unknown: Unknown
+    value: float
+    low: float
+    high: float
+    told: bool
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Result.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the estimates that the sessions tell; all else as it was.
+    zeros : dict of str to float
+        What sensors read too much (SI) beyond the mapping, by channel; likewise.
+    estimates : tuple of Estimate
+    groups : tuple of Group
+        What the sessions do not tell.
+    misfit : float
+        Root mean square of the white residuals of the fit; 1 where the model explains all but noise.
+    passes : int
+    sessions : tuple of Measured
+    held_out : str
+        What was not used for the fit.
+    before, after : Judged
+        The twin's residuals there.
+    mapped : Mapped
+        How the sensors of the sessions were read.
+    remarks : tuple of str
+        What a reader should know.
+    """
+
+    scene: Scene
+    zeros: dict[str, float]
+    estimates: tuple[Estimate, ...]
+    groups: tuple[Group, ...]
+    misfit: float
+    passes: int
+    sessions: tuple[Measured, ...]
+    held_out: str
+    before: Judged
+    after: Judged
+    mapped: Mapped
+    remarks: tuple[str, ...]
+
+
+def calibrate(
+    bags: Sequence[str | Path],
+    scene: Scene,
+    choice: Choice | None = None,
+    settings: Settings | None = None,
+    mapping: str | Path | None = None,
+    progress: Progress = lambda share, what: None,
+) -> Calibration:
+    """Estimate parameters of `scene` from healthy sessions of its boom.
+
+    Parameters
+    ----------
+    bags : sequence of path
+        Recorded sessions, each begun at rest. The last one is held out; of a single one, its last third.
+    choice : Choice, optional
+    settings : Settings, optional
+        Noise of the sensors; the package's own by default.
+    mapping : path, optional
+        Of topics and sensors; by default as the sessions were recorded, see `boom_twin.io.mapping`.
+    progress : callable, optional
+        Told the share done and what comes next.
+
+    Raises
+    ------
+    UsageError
+        A parameter that the scene lacks; sessions with different mappings; nothing that the sessions could tell.
+    BagError
+        A session that cannot be used.
+    SolverError
+        The model fails on a session.
+    """
+    settings, choice = settings or Settings(), choice or Choice()
+    progress(0.0, "reading")
+    paths, joints = [Path(bag) for bag in bags], len(scene.joints)
+    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
+    sessions = read_sessions(paths, mapped.topics, joints)
+    imu = has_imu(sessions)
+    names = choice.names or usual_names(scene, imu, choice.load, choice.damping, choice.stiffness, choice.zeros)
+    unknowns = unknowns_of(scene, names)
+    problem, kept_from = _problem(scene, unknowns, sessions, mapped, settings)
+    progress(0.1, "fit, holds")
+    passes = iter(range(1, 1000))
+    fit = fitted(problem, lambda: _tell_pass(progress, next(passes)))
+    progress(0.75, "what can be told apart")
+    groups = groups_of(problem, fit)
+    estimates = _estimates(problem, fit, groups)
+    told = {estimate.unknown.name: estimate.value for estimate in estimates if estimate.told}
+    if not told:
+        raise UsageError("the sessions tell none of the parameters:\n" + "\n".join(f"  {group}" for group in groups))
+    zeros = {name.removesuffix(".zero"): value for name, value in told.items() if name.endswith(".zero")}
+    better = with_parameters(scene, {name: value for name, value in told.items() if not name.endswith(".zero")})
+    progress(0.8, "held out, before")
+    mounts = mapped.topics.mounts(joints)
+    before = judged(scene, settings, mounts, sessions[-1], {}, kept_from)
+    progress(0.9, "held out, after")
+    after = judged(better, settings, mounts, sessions[-1], zeros, kept_from)
+    progress(1.0, "done")
+    held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
+    return Calibration(
+        better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
+        tuple(_remarks(problem, fit, sessions, mounts, imu) + _worse(before, after)),
+    )  # fmt: skip
+
+
+def _tell_pass(progress: Progress, number: int) -> None:
+    progress(0.15 + 0.6 * (1.0 - 0.85**number), f"fit, pass {number}")
+
+
+def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
+    """The mapping that all sessions have, or the one at `mapping`; UsageError if theirs differ."""
+    found = [mapping_of(path, mapping, joints) for path in paths]
+    for path, each in zip(paths, found, strict=True):
+        if each.topics != found[0].topics:
+            raise UsageError(
+                f"{path}: recorded with another mapping than {paths[0]}, so that zeros differ. Calibrate them apart, or give "
+                "the one that is right by --mapping."
+            )
+    return found[0]
+
+
+def _problem(
+    scene: Scene, unknowns: Sequence[Unknown], sessions: Sequence[Measured], mapped: Mapped, settings: Settings
+) -> tuple[Problem, int]:
+    """What is fitted, and the stamp from which on the last session is held out."""
+    joints, imu = len(scene.joints), has_imu(sessions)
+    courses = [course_of(session, settings) for session in sessions]
+    _refuse_other_boom(scene, sessions, courses)
+    kept_from = courses[-1].start
+    if len(sessions) == 1:
+        used = KEPT * courses[0].duration
+        refuse_short(sessions[0].name, used, "left for the fit, the last third being held out")
+        kept_from += round(used / NANO)
+        courses = [courses[0].until(used)]
+    fitting = list(zip(sessions, courses, strict=True))[: max(1, len(sessions) - 1)]
+    travel = max(float(np.ptp(course.strokes, axis=0).max()) for _, course in fitting)
+    between = np.ptp([course.strokes.mean(axis=0) for _, course in fitting], axis=0).max()
+    if max(travel, float(between)) < MOVED:
+        raise BagError(
+            f"{', '.join(session.name for session, _ in fitting)}: no stroke moves by more than {1e3 * MOVED:g} mm, so loads "
+            "do not change and stiffness looks like a zero. Record moves of every cylinder, with holds between them."
+        )
+    length = block_length(sessions, imu)
+    mounts = mapped.topics.mounts(joints)
+    parts = [(course, blocks_of(session, course, length, imu, mounts)) for session, course in fitting]
+    return Problem(scene, unknowns, parts, channel_names(joints, imu), settings), kept_from
+
+
+def _refuse_other_boom(scene: Scene, sessions: Sequence[Measured], courses: Sequence[Course]) -> None:
+    """BagError where strokes are beyond what the scene's cylinders travel."""
+    for session, course in zip(sessions, courses, strict=True):
+        for i, joint in enumerate(scene.joints):
+            low, high = float(course.strokes[:, i].min()), float(course.strokes[:, i].max())
+            most = joint.cylinder.max_stroke
+            if low < -MOVED or high > most + MOVED:
+                raise BagError(
+                    f"{session.name}: cylinder_{i + 1} reads {low:.3f} to {high:.3f} m, the scene's travels 0 to {most:g} m. "
+                    "Give a session of this boom, or a mapping with its unit and zero."
+                )
+
+
+def _estimates(problem: Problem, fit: Fit, groups: Sequence[Group]) -> tuple[Estimate, ...]:
+    untold = {name for group in groups for name in group.names}
+    reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
+    found = []
+    for unknown, at, half in zip(problem.unknowns, fit.deviations.tolist(), reach.tolist(), strict=True):
+        values = (unknown.value(at), unknown.value(max(at - half, unknown.least)), unknown.value(at + half))
+        found.append(Estimate(unknown, *values, unknown.name not in untold))
+    return tuple(found)
+
+
+def _worse(before: Judged, after: Judged) -> list[str]:
+    worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
+    if not worse:
+        return []
+    return [
+        f"On what was held out the residuals of {', '.join(worse)} have grown: do not use this result. Record a session that "
+        "tells what was left as before, or estimate fewer parameters."
+    ]
+
+
+def _remarks(problem: Problem, fit: Fit, sessions: Sequence[Measured], mounts: Sequence[object], imu: bool) -> list[str]:
+    found = []
+    if fit.misfit > MISFIT:
+        found.append(
+            f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "
+            "parameters cannot make (a fault, another boom, a load that changed). Intervals are widened by it."
+        )
+    if any(session.changed for session in sessions):
+        found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")
+    if any(mounts):
+        found.append("Inclinometers are not used by the fit, only encoders.")
+    if not imu and any(Stream.IMU in session.series for session in sessions):
+        found.append("Not every session has a tip IMU, so none is used.")
+    lacking = [name for name in channel_names(len(problem.scene.joints), imu) if name not in problem.channels]
+    if lacking:
+        found.append(f"Not measured throughout, and left out: {', '.join(lacking)}.")
+    return found

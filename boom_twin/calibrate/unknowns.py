@@ -1,0 +1,132 @@
+"""What a calibration may estimate: names, units, and what is taken to be likely before anything is measured."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..errors import UsageError
+from ..records import Stream, channels_of
+from ..scene.named import parameter, parameter_names
+from ..scene.parts import Scene
+
+LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of parameter.
+
+    Attributes
+    ----------
+    unit : str
+    prior, useful : float
+        Deviation that is expected of the present value, and the one from which an estimate is of use.
+    relative : bool
+        Whether these two are shares of the value, which stays positive; else they have its unit.
+    """
+
+    unit: str
+    prior: float
+    useful: float
+    relative: bool = False
+
+
+KINDS = {
+    "k": Kind("N/m", 0.3, 0.1, relative=True),
+    "d": Kind("N s/m", 1.0, 0.2, relative=True),
+    "EI": Kind("N m^2", 0.3, 0.1, relative=True),
+    "beta": Kind("s", 1.0, 0.2, relative=True),
+    "mass": Kind("kg", 0.1, 0.05, relative=True),
+    "tip.payload": Kind("kg", 50.0, 5.0),
+    "line_fill": Kind("kg/m", 10.0, 1.0),
+    "joint": Kind("rad", math.radians(2.0), math.radians(0.05)),
+    "cylinder": Kind("m", 0.01, 5e-4),
+    "tip_imu": Kind("m/s^2", 0.3, 0.03),
+}
+"""By the last word of a parameter's name; of zeros, by the sensor's."""
+
+_ZERO = re.compile(r"(?P<channel>(?P<sensor>joint|cylinder|tip_imu)_\w+)\.zero")
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One parameter to be estimated, with the value that it has at present (SI)."""
+
+    name: str
+    present: float
+
+    @property
+    def channel(self) -> str | None:
+        """The channel whose zero it is; None for a parameter of the scene."""
+        match = _ZERO.fullmatch(self.name)
+        return match["channel"] if match else None
+
+    @property
+    def kind(self) -> Kind:
+        """Unit and likely deviations."""
+        match = _ZERO.fullmatch(self.name)
+        return KINDS[match["sensor"] if match else self.name if self.name in KINDS else self.name.rpartition(".")[2]]
+
+    @property
+    def least(self) -> float:
+        """Lower bound in deviations from the present value; loads cannot be negative."""
+        return (LEAST_LOAD - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
+
+    def value(self, deviation: float) -> float:
+        """The value that is so many prior deviations off the present one."""
+        step = deviation * self.kind.prior
+        return self.present * math.exp(step) if self.kind.relative else self.present + step
+
+
+def usual_names(
+    scene: Scene, imu: bool, load: str | None = None, damping: str | None = None, stiffness: bool = False, zeros: str = "all"
+) -> list[str]:
+    """What is estimated if nobody names it: stiffness of every cylinder, zero of every sensor, and what is asked for.
+
+    Parameters
+    ----------
+    imu : bool
+        Whether there is one.
+    load : {"payload", "line_fill"}, optional
+    damping : {"d", "beta"}, optional
+        Of cylinders, or of sections.
+    stiffness : bool
+        Bending stiffness of the sections.
+    zeros : {"all", "angles", "none"}
+        Of all sensors, of all but the stroke transducers, which are then taken to be right, or none.
+    """
+    ends = [".k", *([f".{damping}"] if damping else []), *([".EI"] if stiffness else [])]
+    names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
+    names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[load]
+    trusted = {"all": (), "angles": ("cylinder",), "none": ("joint", "cylinder", "tip_imu")}[zeros]
+    return names + [name for name in zero_names(scene, imu) if not name.startswith(trusted)]
+
+
+def zero_names(scene: Scene, imu: bool = True) -> list[str]:
+    """Zeros of angle sensors, stroke transducers, and the IMU."""
+    channels = channels_of(len(scene.joints))
+    streams = [Stream.ANGLES, Stream.STROKES, *([Stream.IMU] if imu else [])]
+    return [f"{channel}.zero" for stream in streams for channel in channels[stream]]
+
+
+def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
+    """The unknowns of these names; zeros are 0 at present, for a mapping has taken what it knows of them.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such parameter, or a name stands there twice; none at all.
+    """
+    known = [*parameter_names(scene), *zero_names(scene)]
+    if not names:
+        raise UsageError(f"parameters: none to be estimated. The scene has {', '.join(known)}.")
+    for name in names:
+        if name not in known:
+            raise UsageError(f"{name}: the scene has no such parameter. It has {', '.join(known)}.")
+        if names.count(name) > 1:
+            raise UsageError(f"{name}: named {names.count(name)} times. Name it once.")
+    zeros = set(zero_names(scene))
+    return tuple(Unknown(name, 0.0 if name in zeros else parameter(scene, name)) for name in names)

@@ -1,0 +1,132 @@
+"""``boom_twin calibrate``: parameters of a scene from healthy sessions."""
+
+from __future__ import annotations
+
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .. import __version__
+from ..errors import UsageError
+from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..calibrate.run import Calibration, Progress
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
+    add_scene(parser, option=True)
+    result = parser.add_mutually_exclusive_group(required=True)
+    result.add_argument("--out", type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
+    learn = "learn what is healthy on this rig, for alarms (replay --baseline, the node's parameter); changes no scene"
+    result.add_argument("--baseline", type=Path, metavar="FILE", help=learn)
+    parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
+    parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
+    parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
+    parser.add_argument("--stiffness", action="store_true", help="besides: bending stiffness EI of sections")
+    whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
+    parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
+    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
+    parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
+    parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
+    parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Calibrate, or learn a baseline; write, tell."""
+    return _learn(args) if args.baseline else _calibrate(args)
+
+
+def _learn(args: Namespace) -> int:
+    from ..calibrate.baseline import baseline_of, write_baseline
+    from ..settings import load_settings
+
+    scene, settings = open_scene(args.scene), load_settings(Path(args.params) if args.params else None)
+    if args.baseline.exists() and not args.force:
+        raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
+    with _bar() as progress:
+        learnt = baseline_of(args.bags, scene, settings, args.mapping, progress)
+    write_baseline(learnt, args.baseline, _credit(args), args.force)
+    if args.json:
+        print_json(learnt.model_dump(exclude={"mean", "covariance", "names"}))
+        return 0
+    for name, mean, row, i in zip(learnt.names, learnt.mean, learnt.covariance, range(len(learnt.names)), strict=True):
+        print(f"{name:28s} {mean:+.2e} +- {row[i] ** 0.5:.1e}")
+    print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {learnt.detuning:.1%}")
+    print(args.baseline)
+    return 0
+
+
+def _credit(args: Namespace) -> str:
+    return f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
+
+
+def _calibrate(args: Namespace) -> int:
+    from ..calibrate.run import Choice, calibrate
+    from ..calibrate.words import as_object, as_text
+    from ..calibrate.written import refuse_overwriting, write_mapping, write_scene
+    from ..settings import load_settings
+
+    refuse_overwriting(args.out, args.scene, args.force)
+    scene = open_scene(args.scene)
+    settings = load_settings(Path(args.params) if args.params else None)
+    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
+    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
+    began = time.perf_counter()
+    with _bar() as progress:
+        found = calibrate(args.bags, scene, choice, settings, args.mapping, progress)
+    wall = time.perf_counter() - began
+    credit = _credit(args)
+    write_scene(found, scene, args.scene, args.out, credit)
+    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.joints))
+    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
+    if args.json:
+        print_json(as_object(found) | {"wall_s": wall, "files": [str(path) for path in files]})
+        return 0
+    print("\n".join([*as_text(found), f"{wall:.1f} s", *map(str, files)]))
+    return 0
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    from tqdm import tqdm
+
+    form = "{l_bar}{bar}| {elapsed}"
+    with tqdm(total=100, desc="calibrate", disable=None, bar_format=form, file=sys.stderr) as bar:
+
+        def progress(share: float, what: str) -> None:
+            bar.set_description_str(f"calibrate: {what}", refresh=False)
+            bar.update(100.0 * share - bar.n)
+
+        yield progress
+
+
+def _draw(found: Calibration, out: Path) -> list[Path]:
+    """Pictures beside the scene."""
+    from ..calibrate.words import shown
+    from ..view.calibration import Interval, parameters_picture, residuals_picture
+
+    note = f"held out: {found.held_out}"
+    judged = (found.before, found.after)
+    paths = [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
+    times = (found.before.times, found.after.times)
+    normalised = (found.before.values / found.before.sigmas, found.after.values / found.after.sigmas)
+    residuals_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)
+    intervals = []
+    for estimate in found.estimates:
+        factor, unit = shown(estimate)
+        before, *found_values = (factor * v for v in (estimate.unknown.present, estimate.value, estimate.low, estimate.high))
+        if estimate.unknown.kind.relative:
+            unit, found_values, before = "change, %", [100.0 * (value / before - 1.0) for value in found_values], 0.0
+        now, low, high = found_values
+        intervals.append(Interval(estimate.unknown.name, unit, before, now, low, high, estimate.told))
+    parameters_picture(paths[1], f"{out.name}: parameters", note, intervals)
+    return paths

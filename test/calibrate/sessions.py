@@ -1,0 +1,51 @@
+"""Booms and sessions of the virtual rig for the tests of calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from oracle import booms
+
+from boom_twin import rig
+from boom_twin.io.session import write_session
+from boom_twin.scene.named import parameter, with_parameters
+from boom_twin.scene.parts import Scene
+
+ENCODERS = np.radians([0.1, -0.1, 0.1, -0.1])
+
+
+class Made(NamedTuple):
+    """A motion of the virtual rig: its boom, its programme and the rows of the simulation."""
+
+    truth: Scene
+    programme: rig.Programme
+    rows: dict[str, np.ndarray]
+
+    def write(self, path: Path, seed: int, zeros=0.0, imu=True, cut=slice(None)) -> Path:
+        """A session of it with the sensors' noise of `seed`, encoders reading `zeros` (rad) too much."""
+        seen = rig.observe(self.truth, self.programme, self.rows, rig.Sensors(), seed)
+        force, joints = seen.imu[cut] if imu else None, seen.joints[cut] + zeros
+        write_session(path, seen.stamps[cut], seen.strokes[cut], joints, force, {"origin": "synthetic, a test"})
+        return path
+
+
+def made(truth: Scene, posture: str, duration: float, seed: int) -> Made:
+    """Random moves; steps of 1 ms and 12 elements a section leave less error than the sensors' noise."""
+    programme = rig.random_programme(truth, posture, duration, seed)
+    return Made(truth, programme, rig.simulate(truth, programme, duration, 1e-3, 2e-3, 12))
+
+
+def off(scene: Scene, *factors: float, **others: float) -> Scene:
+    """The scene with other cylinder stiffnesses."""
+    values = {f"cylinder_{i}.k": factor * parameter(scene, f"cylinder_{i}.k") for i, factor in enumerate(factors, start=1)}
+    return with_parameters(scene, values | others)
+
+
+def cut_to(sections: int) -> Scene:
+    """The first sections of the default boom."""
+    spec = booms.document()
+    spec["sections"], spec["joints"] = spec["sections"][:sections], spec["joints"][:sections]
+    spec["postures"] = {name: angles[:sections] for name, angles in spec["postures"].items()}
+    return booms.scene_of(spec)

@@ -1,0 +1,99 @@
+"""What the command writes and tells."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene
+from boom_twin.cli.main import main
+from boom_twin.io.mapping import load_mapping
+from boom_twin.scene.named import parameter
+
+TEXT = """# my boom
+description: "a test boom"
+{body}
+"""
+
+
+@pytest.fixture(scope="module")
+def source(two_sections, tmp_path_factory):
+    """The boom of two sections as a file with comments: the default one's text, cut."""
+    from boom_twin.scene.load import default_text
+
+    text = default_text()
+    for start, end in (("  - {length: 3.20", "# Joint i turns"), ("  - {kind: B2", "# Boom angles")):
+        text = text[: text.index(start)] + "\n" + text[text.index(end) :]
+    for name, angles in (("horizontal", "0, 0"), ("arch", "60, 20"), ("high", "80, 60"), ("low", "45, 0")):
+        line = next(line for line in text.splitlines() if line.startswith(f"  {name}:"))
+        text = text.replace(line, f"  {name}: [{angles}]  # my {name}")
+    path = tmp_path_factory.mktemp("scene") / "boom.yaml"
+    path.write_text(TEXT.format(body=text))
+    return path
+
+
+@pytest.fixture(scope="module")
+def ran(source, short, tmp_path_factory):
+    """The command's files, and what it said with --json."""
+    folder = tmp_path_factory.mktemp("run")
+    bag = short.write(folder / "bag", 2, zeros=np.array([2e-3, 0.0]))
+    arguments = ["calibrate", str(bag), "--scene", str(source), "--date", "2026-01-02", "--zeros", "angles"]
+    assert main([*arguments, "--out", str(folder / "new.yaml")]) == 0
+    return folder, arguments
+
+
+def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, short):
+    folder, _ = ran
+    old, new = source.read_text(), (folder / "new.yaml").read_text()
+    scene = load_scene(folder / "new.yaml")
+    assert parameter(scene, "cylinder_1.k") == pytest.approx(parameter(short.truth, "cylinder_1.k"), rel=0.03)
+    assert scene.description.startswith("a test boom\nCalibrated 2026-01-02 by boom_twin 0.")
+    before = "Before: cylinder_1.k 4e+07 N/m, cylinder_2.k 3e+07 N/m."
+    for part in ("from bag (sha256 ", "held out: the last third of bag", before):
+        assert part in scene.description
+    added, removed = set(new.splitlines()) - set(old.splitlines()), set(old.splitlines()) - set(new.splitlines())
+    assert len(removed) == 3 and all("k:" in line or "description" in line for line in removed)
+    assert all("k:" in line or line.startswith("  ") or "description" in line for line in added)
+
+
+def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
+    folder, _ = ran
+    sensors = load_mapping(folder / "new.mapping.yaml", 2).sensors
+    assert sensors["joint_1"].zero == pytest.approx(2e-3, abs=2e-4)
+    assert "cylinder_1" not in sensors
+    arguments = ["replay", str(folder / "bag"), "--scene", str(folder / "new.yaml"), "--out", str(folder / "replay")]
+    assert main([*arguments, "--mapping", str(folder / "new.mapping.yaml"), "--no-pictures"]) == 0
+    summary = json.loads((folder / "replay" / "summary.json").read_text())
+    assert np.abs(summary["joint_residual_normalised_mean"]).max() < 0.3
+
+
+def test_pictures_are_drawn(ran):
+    folder, _ = ran
+    for name in ("new.residuals.png", "new.parameters.png"):
+        assert (folder / name).stat().st_size > 20_000
+
+
+def test_it_overwrites_only_when_told(ran, source, capsys):
+    folder, arguments = ran
+    assert main([*arguments, "--out", str(folder / "new.yaml")]) == 1
+    assert "is there already. Name another file, or add --force" in capsys.readouterr().err
+    assert main([*arguments, "--out", str(source), "--force"]) == 1
+    assert "this is the scene that is read" in capsys.readouterr().err
+
+
+def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_path):
+    _, arguments = ran
+    (tmp_path / "own.yaml").write_text("sensors:\n  joint_1: {zero: 0.1, unit: deg, scale: 57.29577951308232}  # mine\n")
+    out = tmp_path / "again.yaml"
+    arguments = [*arguments, "--mapping", str(tmp_path / "own.yaml"), "--out", str(out), "--json", "--no-pictures"]
+    assert main(arguments) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert not any(isinstance(value, dict) for value in told.values())
+    assert told["cylinder_2.k_low"] < told["cylinder_2.k"] < told["cylinder_2.k_high"]
+    assert told["held_out_after_joint_1"] == pytest.approx(1.0, abs=0.2) and told["not_told"] == []
+    assert told["files"] == [str(out), str(out.with_suffix(".mapping.yaml"))]
+    text = out.with_suffix(".mapping.yaml").read_text()
+    assert "# mine" in text and "unit: deg" in text
+    assert load_mapping(out.with_suffix(".mapping.yaml"), 2).sensors["joint_1"].zero == pytest.approx(2e-3, abs=2e-4)

@@ -1,0 +1,125 @@
+"""Calibration finds what the virtual rig, an independent model, was made with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calibrate.sessions import ENCODERS, cut_to, made, off
+
+from boom_twin import load_scene, rig
+from boom_twin.calibrate import Choice, calibrate
+from boom_twin.calibrate.blocks import blocks_of, channel_names
+from boom_twin.calibrate.course import course_of
+from boom_twin.calibrate.fit import fitted
+from boom_twin.calibrate.measured import Measured, Series
+from boom_twin.calibrate.problem import Problem
+from boom_twin.calibrate.unknowns import unknowns_of, usual_names
+from boom_twin.records import Stream
+from boom_twin.scene.named import parameter
+from boom_twin.settings import Settings
+
+
+def expected(name, truth, zeros):
+    if not name.endswith(".zero"):
+        return parameter(truth, name)
+    kind, number = name.removesuffix(".zero").rsplit("_", 1)
+    return zeros[int(number) - 1] if kind == "joint" else 0.0
+
+
+def share_covered(found, truth, zeros, width=1.0):
+    """Of the estimates, those whose interval (widened by `width`) holds the truth."""
+    inside = []
+    for estimate in found.estimates:
+        middle, half = estimate.value, width * 0.5 * (estimate.high - estimate.low)
+        inside.append(abs(expected(estimate.unknown.name, truth, zeros) - middle) <= half)
+    return np.mean(inside)
+
+
+def errors(found, truth, zeros):
+    return {e.unknown.name: e.value - expected(e.unknown.name, truth, zeros) for e in found.estimates}
+
+
+def judge(found, joints):
+    """The twin with the result predicts what was held out as well as the sensors measure."""
+    assert np.all(found.after.spread[:joints] < 1.2) and np.all(found.after.spread[:joints] > 0.8)
+    assert 0.9 < found.misfit < 1.15
+
+
+@pytest.fixture(scope="module")
+def two_sessions(wrong_boom, tmp_path_factory):
+    """60 s to be fitted, and 60 s with other noise to be held out."""
+    folder = tmp_path_factory.mktemp("sessions")
+    return [wrong_boom.write(folder / f"s{seed}", seed, ENCODERS) for seed in (5, 6)]
+
+
+@pytest.mark.slow
+def test_stiffness_payload_and_encoders_when_transducers_are_right(wrong_boom, two_sessions):
+    found = calibrate(two_sessions, load_scene(), Choice(load="payload", zeros="angles"))
+    wrong = errors(found, wrong_boom.truth, ENCODERS)
+    for i, bound in enumerate((0.02, 0.02, 0.02, 0.08), start=1):
+        assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
+        assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
+    assert abs(wrong["tip.payload"]) < 2.0
+    assert share_covered(found, wrong_boom.truth, ENCODERS, 2.0) == 1.0
+    assert not found.groups
+    judge(found, 4)
+
+
+@pytest.mark.slow
+def test_everything_at_once_keeps_to_its_intervals(wrong_boom, two_sessions):
+    found = calibrate(two_sessions, load_scene(), Choice(load="payload"))
+    wrong = errors(found, wrong_boom.truth, ENCODERS)
+    for i, bound in enumerate((0.03, 0.02, 0.02, 0.08), start=1):
+        assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
+    assert abs(wrong["tip.payload"]) < 2.0
+    assert share_covered(found, wrong_boom.truth, ENCODERS) >= 0.6
+    assert share_covered(found, wrong_boom.truth, ENCODERS, 2.0) == 1.0
+    judge(found, 4)
+
+
+@pytest.mark.slow
+def test_a_right_model_stays_where_it_is(tmp_path):
+    scene = load_scene()
+    bag = made(scene, "arch", 60.0, 3).write(tmp_path / "bag", 7)
+    found = calibrate([bag], scene)
+    assert share_covered(found, scene, np.zeros(4), 2.0) == 1.0
+    judge(found, 4)
+    np.testing.assert_allclose(found.after.spread, found.before.spread, rtol=0.05)
+
+
+@pytest.mark.slow
+def test_three_sections_with_another_bending_stiffness(tmp_path):
+    scene = cut_to(3)
+    truth = off(scene, 1.05, 1.0, 0.95, **{"section_2.EI": 1.1 * parameter(scene, "section_2.EI")})
+    bag = made(truth, "arch", 45.0, 8).write(tmp_path / "bag", 8)
+    found = calibrate([bag], scene, Choice(stiffness=True, zeros="none"))
+    assert share_covered(found, truth, np.zeros(3), 2.0) == 1.0
+
+
+def test_two_sections_without_an_imu(short, two_sections, tmp_path):
+    found = calibrate([short.write(tmp_path / "bag", 1, imu=False)], two_sections, Choice(zeros="angles"))
+    wrong = errors(found, short.truth, np.zeros(2))
+    for i in (1, 2):
+        assert abs(wrong[f"cylinder_{i}.k"]) < 0.02 * parameter(short.truth, f"cylinder_{i}.k")
+        assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
+    judge(found, 2)
+
+
+@pytest.mark.slow
+def test_intervals_cover_over_many_sets_of_noise(short, two_sections):
+    settings, scores = Settings(), []
+    unknowns = unknowns_of(two_sections, usual_names(two_sections, imu=True))
+    truth = np.array([expected(unknown.name, short.truth, np.zeros(2)) for unknown in unknowns])
+    for seed in range(100, 130):
+        seen = rig.observe(short.truth, short.programme, short.rows, rig.Sensors(), seed)
+        values = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: seen.imu}
+        session = Measured("made", "", {stream: Series(seen.stamps, rows) for stream, rows in values.items()})
+        course = course_of(session, settings)
+        blocks = blocks_of(session, course, 0.05, True, [None, None])
+        problem = Problem(two_sections, unknowns, [(course, blocks)], channel_names(2, True), settings)
+        fit = fitted(problem, lambda: None)
+        off_by = np.array([u.value(d) for u, d in zip(unknowns, fit.deviations, strict=True)]) - truth
+        scale = [u.kind.prior * (at if u.kind.relative else 1.0) for u, at in zip(unknowns, truth, strict=True)]
+        scores.append(off_by / scale / np.sqrt(np.diag(fit.covariance())))
+    assert 0.90 <= np.mean(np.abs(scores) < 1.96) <= 0.99
+    assert 0.8 < np.std(scores) < 1.25
