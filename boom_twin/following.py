@@ -7,6 +7,7 @@ import numpy as np
 from .analysis.statics import outline, settle
 from .chain.program import State
 from .estimate.follower import Tuning, follow, new_track
+from .moments import moments_by_unknowns
 from .physics.linkage import cylinder_length
 from .plan.compile import compile_scene
 from .records import Array, Prediction
@@ -37,7 +38,7 @@ class Following:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
         self._anchor, self._work = self.plan.state(), self.plan.work()
-        self._undeflected = Undeflected(scene, self.plan)
+        self._undeflected, self._bending = Undeflected(scene, self.plan), moments_by_unknowns(self.plan)
         self._track = new_track(self.plan, np.array([section.length for section in scene.sections]))
         self._tuning = Tuning(
             settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
@@ -102,4 +103,5 @@ class Following:
             undeflected=self._undeflected.at(self.angles) if shaped else None,
             pins=self.live.pins.copy() if shaped else None,
             clearances=row[4 * n + 11 :].reshape(-1, 4),
+            moments=self._bending @ self.live.z,
         )

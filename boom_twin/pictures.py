@@ -13,15 +13,14 @@ from .replay import Recording, Replay
 from .scene.kinematics import gravity_in_base
 from .scene.parts import Scene
 from .truth import TipTruth
-from .view import History, ImuTrace, Truth, replay_pictures
+from .view import AlarmSpan, History, ImuTrace, Truth, replay_pictures
 from .view.orbits import Orbits
 
 NANO = 1e-9
 
 
-def draw(result: Replay, scene: Scene, out: Path) -> list[Path]:
-    """Draw the pictures of a replay into `out`; returns their paths."""
-    history = history_of(result.recording, scene)
+def draw(result: Replay, history: History, out: Path) -> list[Path]:
+    """Draw the pictures of a replay, of which `history` is made, into `out`; returns their paths."""
     notes = result.session.notes
     note = notes.get("origin", "")
     truth = _truth(result.truth, history)
@@ -54,8 +53,23 @@ def history_of(recording: Recording, scene: Scene) -> History:
         imu=_imu(force, stamps, felt, first),
         shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
+        alarms=_alarms(recording, first),
+        moments=np.array([prediction.moments for prediction in predictions]),
         orbits=_orbits(scene, stamps, recording),
     )
+
+
+def _alarms(recording: Recording, first: int) -> list[AlarmSpan]:
+    last = recording.predictions[-1].stamp
+    return [
+        AlarmSpan(
+            alarm.channel,
+            (alarm.since - first) * NANO,
+            ((last if alarm.until is None else alarm.until) - first) * NANO,
+            alarm.cause or alarm.kind,
+        )
+        for alarm in recording.alarms()
+    ]
 
 
 def _orbits(scene: Scene, stamps: Array, recording: Recording) -> Orbits | None:

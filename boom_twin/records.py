@@ -78,6 +78,8 @@ class Prediction:
         Barrel pin (x, y) and rod pin (x, y) of every cylinder of the deflected boom, m; when `shape` is there.
     clearances : ndarray, shape (k, 4), or None
         Of every pin with clearance the journal's offset x, y (m), contact force (N), and 1 where it touches.
+    moments : ndarray, shape (k,), or None
+        Bending moment (N m) at the stations of `boom_twin.moments`, positive where it bends the outboard end up.
     """
 
     stamp: int
@@ -95,6 +97,7 @@ class Prediction:
     undeflected: Array | None = None
     pins: Array | None = None
     clearances: Array | None = None
+    moments: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,14 +19,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .alarms import Alarms
 from .errors import BagError
+from .health.baseline import Baseline, load_baseline
 from .io.ahead import Ahead
 from .io.behind import Behind
 from .io.mapping import mapping_of
 from .io.reader import Session, scan
 from .io.topics import Topics
 from .io.writer import FILE_NAME
-from .records import Array, Change, Prediction, Report, Residuals, Sample, Stream
+from .records import Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .truth import TipTruth, load_truth
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from .twin import Twin
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
+NANO = 1e-9
 
 
 @dataclass
@@ -44,6 +47,7 @@ class Recording:
     predictions: list[Prediction] = field(default_factory=list)
     residuals: list[Residuals] = field(default_factory=list)
     gaps: list[tuple[int, int]] = field(default_factory=list)
+    health: list[Health] = field(default_factory=list)
     refused: int = 0
 
     def add(self, report: Report) -> None:
@@ -55,10 +59,19 @@ class Recording:
                 self.gaps.append((self.predictions[-1].stamp, report.stamp))
             self.predictions.append(report.prediction)
         self.residuals += report.residuals
+        if report.health is not None:
+            self.health.append(report.health)
 
     def of(self, stream: Stream) -> list[Residuals]:
         """Residuals of one stream."""
         return [residuals for residuals in self.residuals if residuals.stream is stream]
+
+    def alarms(self) -> list[Alarm]:
+        """All alarms, each once, as it was told last; in the order of their beginning."""
+        found = Alarms()
+        for health in self.health:
+            found.take(health)
+        return sorted(found.all, key=lambda alarm: alarm.since)
 
     def clearances(self) -> Array:
         """Of all pins with clearance offset x, y (m), force (N) and contact, shape (predictions, k, 4)."""
@@ -89,6 +102,8 @@ def replay(
     progress: Progress | None = None,
     mapping: str | Path | None = None,
     changes: bool = True,
+    health: bool = True,
+    baseline: str | Path | None = None,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -107,21 +122,27 @@ def replay(
         session was recorded with, else the package's own.
     changes : bool
         Repeat what was changed while the session was recorded (load, limits, zeros, starts from rest), at the same stamps.
+    health : bool
+        Judge the rig's health, see `Report.health`.
+    baseline : path, optional
+        What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
+        package's own.
 
     Raises
     ------
     UsageError
-        The mapping or a setting cannot be used.
+        The mapping, a setting or the baseline cannot be used.
     BagError
         The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written.
     """
     session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
     mapped = mapping_of(session.path, Path(mapping) if mapping else None, len(scene.joints))
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
+    usual = load_baseline(Path(baseline) if baseline else None) if health else None
     _clear(out)
     recording = Recording()
     with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, out / "bag") as (ahead, behind):
-        twin = _ready_twin(scene, settings, topics)
+        twin = _ready_twin(scene, settings, topics, usual)
         ahead.wait_ready()
         behind.wait_ready()
         samples: Iterator[Sample | Change | None] = iter(ahead)
@@ -186,11 +207,11 @@ def _ends(
         behind.stop()
 
 
-def _ready_twin(scene: Scene, settings: Settings, topics: Topics) -> Twin:
+def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from .twin import Twin
 
-    twin = Twin(scene, settings, topics.mounts(len(scene.joints)))
+    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline)
     twin.warm_up()
     return twin
 
@@ -215,7 +236,7 @@ def _told(twin: Twin) -> str:
 def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[str, Any]:
     """The contract's numbers of a replay."""
     first, last = recording.predictions[0].stamp, recording.predictions[-1].stamp
-    duration = (last - first) * 1e-9
+    duration = (last - first) * NANO
     angles = recording.of(Stream.ANGLES)
     values = _stacked([residuals.values for residuals in angles], twin.plan.joints)
     normalised = _stacked([residuals.normalised for residuals in angles], twin.plan.joints)
@@ -233,17 +254,34 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         "tip_acceleration_max_m_s2": float(acceleration.max()),
         **_pins(recording, twin),
         "output_sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
-        "alarms": [
-            {
-                "channel": Stream.STROKES.value,
-                "kind": "gap",
-                "from_s": (start - first) * 1e-9,
-                "to_s": (end - first) * 1e-9,
-                "cause": None,
-            }
-            for start, end in recording.gaps
-        ],
+        "alarms": _alarms(recording, first),
     }
+
+
+def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
+    """Gaps, and all alarms of the rig's health, in the order of their beginning; seconds since the stamp `first`."""
+    gaps = [
+        Alarm(Stream.STROKES.value, "gap", start, end, None, f"no strokes for {(end - start) * NANO:.2f} s")
+        for start, end in recording.gaps
+    ]
+    return [
+        {
+            "channel": alarm.channel,
+            "kind": alarm.kind,
+            "from_s": max(0.0, (alarm.since - first) * NANO),
+            "to_s": None if alarm.until is None else (alarm.until - first) * NANO,
+            "cause": alarm.cause,
+            "told": alarm.told,
+            "ranked": [{"cause": rank.cause, "probability": rank.probability} for rank in alarm.ranked],
+        }
+        for alarm in sorted([*gaps, *recording.alarms()], key=lambda alarm: alarm.since)
+    ]
+
+
+def alarm_as_text(alarm: dict[str, Any]) -> str:
+    """An alarm of ``summary.json`` in words."""
+    end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
+    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
 
 
 def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:

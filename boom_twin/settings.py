@@ -17,6 +17,7 @@ DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+NODE_ONLY = ("scene", "mapping", "health", "baseline", "autostart", "monitor")
 LIVE = "live"
 """Marks what can change while the twin runs."""
 Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
@@ -95,8 +96,8 @@ def settings_from(values: dict[str, Any], source: str) -> Settings:
 def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
-    Parameters of the node alone (``scene``, ``mapping``, ``autostart``) and of ``/diagnostics`` are passed over.
+    Parameters of the node alone (`NODE_ONLY`) and of ``/diagnostics`` are passed over.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    others = {"scene", "mapping", "autostart", *Thresholds.model_fields}
+    others = {*NODE_ONLY, *Thresholds.model_fields}
     return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from errno import EADDRINUSE
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,9 @@ ACTS = ("mark", "acknowledge", "record")
 NICE = 5
 """By how much it gives way to the node on the same machine."""
 
+BACKLOG = 16
+"""Connections that may wait to be taken; the kernel turns away more before they cost the node's machine anything."""
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What is shown, to whom, and what may be done."""
@@ -29,7 +33,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser, option=True)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
-    parser.add_argument("--port", type=int, default=PORT, help=f"({PORT}; 0: any that is free)")
+    parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     parser.add_argument(
         "--allow",
@@ -40,6 +44,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="what viewers may do: mark events, acknowledge alarms, start and stop a record(ing) (mark acknowledge)",
     )
     parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
+    parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help="remappings of the twin's topics, as for any node")
 
 
 def run(args: Namespace) -> int:
@@ -49,7 +55,7 @@ def run(args: Namespace) -> int:
     from ..monitor.desk import Desk
     from ..monitor.recording import Recording
 
-    os.nice(NICE)
+    _give_way()
     recording = Recording(args.record_into) if "record" in args.allow and args.bag is None else None
     try:
         with _feed(args) as feed:
@@ -60,6 +66,13 @@ def run(args: Namespace) -> int:
     return 0
 
 
+def _give_way() -> None:
+    """Let the node run first, and do not interrupt it in the midst of a step."""
+    os.nice(NICE)
+    if hasattr(os, "SCHED_BATCH"):  # Linux: does not preempt others when it wakes up
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
 @contextmanager
 def _feed(args: Namespace) -> Iterator[Feed]:
     """Of a session, or live."""
@@ -67,8 +80,9 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         from ..monitor.bag import bag_feed
         from ..settings import load_settings
 
-        print("reading the session (compiles for up to a minute the first time) ..", file=sys.stderr)
-        yield bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), _progress, args.mapping)
+        print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
+        with closing(bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), args.mapping)) as feed:
+            yield feed
         return
     from ..ros.require import require_rclpy
 
@@ -77,12 +91,10 @@ def _feed(args: Namespace) -> Iterator[Feed]:
     from ..ros.context import ros
     from ..ros.monitor import TopicFeed
 
-    with ros([]):
-        feed = TopicFeed(load_mapping(args.mapping), open_scene(args.scene) if args.scene else None)
-        try:
+    with ros(["--ros-args", *args.ros_args]):
+        scene = open_scene(args.scene) if args.scene else None
+        with closing(TopicFeed(load_mapping(args.mapping), scene)) as feed:
             yield feed
-        finally:
-            feed.close()
 
 
 def _serve(args: Namespace, feed: Feed, desk: Any) -> None:
@@ -107,11 +119,12 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
     stopped = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    if args.until_stdin_ends:
+        asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)
     runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
     try:
-        site = web.TCPSite(runner, args.host, args.port)
-        await site.start()
+        await _listen(runner, args.host, args.port)
         port = runner.addresses[0][1]
         address = f"http://{args.host}:{port}/" + (f"?token={token}" if token else "")
         print(f"open {address}   (Ctrl-C ends it)", file=sys.stderr, flush=True)
@@ -120,7 +133,13 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
         await runner.cleanup()
 
 
-def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
-    from tqdm import tqdm
+async def _listen(runner: Any, host: str, port: int | None) -> None:
+    """At `port`; without one at the usual one, or at any if that is taken."""
+    from aiohttp import web
 
-    return iter(tqdm(messages, total=total, unit="msg", desc="reading", disable=None, mininterval=0.2))
+    try:
+        await web.TCPSite(runner, host, PORT if port is None else port, backlog=BACKLOG).start()
+    except OSError as error:
+        if port is not None or error.errno != EADDRINUSE:
+            raise
+        await web.TCPSite(runner, host, 0, backlog=BACKLOG).start()

@@ -6,9 +6,15 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..records import Array
+    from ..replay import Replay
+    from ..scene import Scene
+    from ..settings import Settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -23,31 +29,55 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
-    parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
+    usual = "what is known of this rig while all is well; by default the package's"
+    parser.add_argument("--baseline", metavar="FILE", help=usual)
+    parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
+    drawn = parser.add_mutually_exclusive_group()
+    drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
+    drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
+    heights = "heights of the sections in m, for the stresses in the report; by default those of thin-walled boxes"
+    parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
     add_json(parser)
 
 
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
     from ..replay import replay
+    from ..report.loads import section_heights
     from ..settings import load_settings
 
     scene = open_scene(args.scene)
+    heights = section_heights(args.section_height, scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    result = replay(args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes)
-    pictures = []
-    if not args.no_pictures:
-        from ..pictures import draw  # with the plotting library
-
-        pictures = draw(result, scene, Path(args.out))
+    result = replay(
+        args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
+    )
+    files = _write(args, result, scene, settings, heights)
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
         return 0
     print("\n".join(as_text(result.summary)))
-    for path in [Path(args.out) / "summary.json", Path(args.out) / "bag", *pictures]:
+    for path in [Path(args.out) / "summary.json", Path(args.out) / "bag", *files]:
         print(path)
     return 0
+
+
+def _write(args: Namespace, result: Replay, scene: Scene, settings: Settings, heights: Array | None) -> list[Path]:
+    """Figures, pictures and report, as they are wanted."""
+    from ..pictures import draw
+    from ..report.page import Subject, write_report
+    from ..report.side import worked_out
+    from ..scene.load import DEFAULT_NAME
+
+    out = Path(args.out)
+    history, still, path = worked_out(result, scene, settings, Path(args.baseline) if args.baseline else None, out)
+    files = [path]
+    if not args.no_pictures:
+        files += draw(result, history, out)
+    if args.report:
+        files.append(write_report(Subject(result, history, scene, args.scene or DEFAULT_NAME, still, heights), out))
+    return files
 
 
 def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
@@ -58,6 +88,8 @@ def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
 
 def as_text(summary: dict[str, Any]) -> list[str]:
     """A short table."""
+    from ..replay import alarm_as_text
+
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
         f"wall time          {summary['wall_s']:.2f} s, {summary['realtime_factor']:.1f} times real time",
@@ -80,5 +112,5 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         ]
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
-    alarms = len(summary["alarms"])
-    return [*lines, f"alarms             {alarms or 'none'}"]
+    alarms = summary["alarms"]
+    return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]

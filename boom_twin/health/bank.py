@@ -5,9 +5,9 @@ deviations of all parameters (mean m, covariance P) integrated out,
 
     L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
 
-a fault with prior N(0, F) in some parameters f is more probable than none by the factor
+a fault with prior N(0, F) in one parameter f is more probable than none by the factor
 
-    ln B = l_f^T (L_ff + F^-1)^-1 l_f / 2 - ln det(I + F L_ff) / 2,
+    ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
 
 and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay,
 Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with
@@ -24,9 +24,9 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from ..records import Array
-from .parameters import Hypothesis, Parameter, variances
+from .parameters import Parameter, variances
 
-UNKNOWN = "unknown"
+UNKNOWN, UNKNOWN_PRIOR = "unknown", 0.01
 
 
 @dataclass(frozen=True)
@@ -85,57 +85,62 @@ class Evidence:
         _, log_det = np.linalg.slogdet(spread)
         fitted = 2.0 * float(self.vector @ mean) - float(mean @ self.matrix @ mean) + float(vector @ covariance @ reduced)
         log = self.log + 0.5 * (fitted - float(log_det))
-        matrix, reduced = 0.5 * (matrix + matrix.T), np.asarray(reduced, float)
-        return Evidence(matrix, reduced, self.squares - fitted, self.rows, log, self.unknown)
+        symmetric: Array = np.asarray(0.5 * (matrix + matrix.T))
+        return Evidence(symmetric, np.asarray(reduced), self.squares - fitted, self.rows, log, self.unknown)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Explanation:
-    """One hypothesis after the measurements.
+    """One fault after the measurements.
 
     Attributes
     ----------
-    cause : str
-        `UNKNOWN` for none of the others.
+    place : int or None
+        Its parameter; None for a fault that is unknown.
     log_factor : float
         ln of how much more probable the measurements are than without a fault.
-    fitted : float
-        What it takes off the sum of squares.
-    places : tuple of int
-        Parameters that it has.
-    values, sigmas : ndarray, shape (len(places),)
-        Their estimates and deviations.
+    value, sigma : float
+        Estimate and deviation of the parameter.
     """
 
-    cause: str
+    place: int | None
     log_factor: float
-    fitted: float
-    places: tuple[int, ...]
-    values: Array
-    sigmas: Array
+    value: float = 0.0
+    sigma: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Explanations that have one cause, the most probable first, and their probability together, if there is a fault."""
+
+    name: str
+    probability: float
+    parts: tuple[Explanation, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
-    """All hypotheses, the most probable first.
+    """All causes, the most probable first.
 
     Attributes
     ----------
-    found : tuple of Explanation
-    probabilities : ndarray, shape (len(found),)
-        Of the explanations beside each other, given that there is a fault.
+    causes : tuple of Cause
     excess : float
         Squares that the best explanation leaves over those that noise leaves, at least 1.
     """
 
-    found: tuple[Explanation, ...]
-    probabilities: Array
+    causes: tuple[Cause, ...]
     excess: float
+
+    @property
+    def best(self) -> Explanation:
+        """Of the most probable cause."""
+        return self.causes[0].parts[0]
 
     @property
     def strength(self) -> float:
         """ln of how much more probable the best explanation is than no fault, with the excess taken into account."""
-        return self.found[0].log_factor / self.excess
+        return self.best.log_factor / self.excess
 
 
 class Bank:
@@ -144,45 +149,42 @@ class Bank:
     Parameters
     ----------
     known : tuple of Parameter
-    causes : tuple of Hypothesis
     """
 
-    def __init__(self, known: tuple[Parameter, ...], causes: tuple[Hypothesis, ...]) -> None:
-        self.known, self.causes = known, causes
-        self._faulty = variances(known, "faulty")
-        self._priors = {each.cause: log(each.prior) for each in causes} | {UNKNOWN: log(1e-2)}
+    def __init__(self, known: tuple[Parameter, ...]) -> None:
+        self.known = known
+        self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
+        self._faulty = variances(known, "faulty")[self._places]
+        self._one_sided = np.array([known[i].one_sided for i in self._places])
+        self._priors = np.log([*(known[i].prior for i in self._places), UNKNOWN_PRIOR])
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array) -> Verdict:
-        """Weigh all hypotheses; `mean` and `covariance` are those of the parameters while all was well."""
+        """Weigh all faults; `mean` and `covariance` are those of the parameters while all was well."""
         healthy = evidence.given(mean, covariance)
-        found = [self._explain(each, healthy) for each in self.causes]
-        left = healthy.squares - max(each.fitted for each in found)
-        excess = max(1.0, left / max(healthy.rows, 1))
-        empty = np.zeros(0)
-        found.append(Explanation(UNKNOWN, healthy.unknown - healthy.log, 0.0, (), empty, empty))
-        weights = np.array([each.log_factor / excess + self._priors[each.cause] for each in found])
-        order = np.argsort(-weights)
-        shares = np.exp(weights[order] - weights.max())
-        return Verdict(tuple(found[i] for i in order), shares / shares.sum(), excess)
+        matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
+        spread = self._faulty / (1.0 + self._faulty * matrix)
+        values, sigmas = spread * vector, np.sqrt(spread)
+        fitted = vector * values
+        factors = 0.5 * fitted - 0.5 * np.log1p(self._faulty * matrix)
+        factors += np.where(self._one_sided, log_ndtr(values / sigmas) + log(2.0), 0.0)
+        excess = max(1.0, (healthy.squares - float(fitted.max())) / max(healthy.rows, 1))
+        weights = np.append(factors, healthy.unknown - healthy.log) / excess + self._priors
+        shares = np.exp(weights - weights.max())
+        found = [Explanation(int(p), *each) for p, *each in zip(self._places, factors, values, sigmas, strict=True)]
+        found.append(Explanation(None, healthy.unknown - healthy.log))
+        return Verdict(self._grouped(found, shares / shares.sum()), excess)
+
+    def _grouped(self, found: list[Explanation], shares: Array) -> tuple[Cause, ...]:
+        groups: dict[str, list[int]] = {}
+        for i in np.argsort(-shares).tolist():
+            place = found[i].place
+            groups.setdefault(UNKNOWN if place is None else self.known[place].cause, []).append(i)
+        causes = [Cause(name, float(shares[at].sum()), tuple(found[i] for i in at)) for name, at in groups.items()]
+        return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
     def support(self, evidence: Evidence, each: Explanation, mean: Array, covariance: Array) -> float:
         """ln of how much more probable `evidence` is with that fault, of the size that is estimated, than without any."""
         healthy = evidence.given(mean, covariance)
-        if each.cause == UNKNOWN:
+        if each.place is None:
             return healthy.unknown - healthy.log
-        matrix, vector = healthy.matrix[np.ix_(each.places, each.places)], healthy.vector[list(each.places)]
-        return float(vector @ each.values - 0.5 * each.values @ matrix @ each.values)
-
-    def _explain(self, each: Hypothesis, healthy: Evidence) -> Explanation:
-        places = list(each.places)
-        matrix, vector = healthy.matrix[np.ix_(places, places)], healthy.vector[places]
-        prior = self._faulty[places]
-        spread = np.eye(len(places)) + matrix * prior
-        posterior = prior[:, None] * np.linalg.inv(spread)
-        values, sigmas = posterior @ vector, np.sqrt(np.diag(posterior))
-        _, log_det = np.linalg.slogdet(spread)
-        fitted = float(vector @ values)
-        factor = 0.5 * fitted - 0.5 * float(log_det)
-        if len(places) == 1 and self.known[places[0]].one_sided:
-            factor += float(log_ndtr(values[0] / sigmas[0])) + log(2.0)
-        return Explanation(each.cause, factor, fitted, each.places, values, sigmas)
+        return float(each.value * (healthy.vector[each.place] - 0.5 * each.value * healthy.matrix[each.place, each.place]))

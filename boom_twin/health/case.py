@@ -85,7 +85,7 @@ class Case:
         if len(self._recent) < RECENT:
             return False
         recently = sum(self._recent, Evidence.none(len(self._mean))).turned(self._turn)
-        return self._bank.support(recently, verdict.found[0], self._mean, self._covariance) < GONE
+        return self._bank.support(recently, verdict.best, self._mean, self._covariance) < GONE
 
 
 def drifts_from(known: tuple[Parameter, ...], time: float) -> Array:

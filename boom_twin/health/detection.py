@@ -60,7 +60,17 @@ class Detector:
     def levels(self) -> Array:
         """Of each channel: 1 and above is an alarm; shape (channels,)."""
         window = np.sum(self._squares, axis=0) if len(self._squares) == WINDOW else 0.0
-        return np.maximum(np.maximum(self._up, self._down) / self.threshold, window / self.limit)
+        return np.maximum(self._lasting, window / self.limit)
+
+    @property
+    def suspicion(self) -> float:
+        """How near the nearest channel is to an alarm; 0 while nothing lasts and no spread is half of what is allowed."""
+        worst = float(self.levels.max())
+        return max(float(self._lasting.max()), worst if worst > 0.5 else 0.0)
+
+    @property
+    def _lasting(self) -> Array:
+        return np.asarray(np.maximum(self._up, self._down) / self.threshold)
 
     def blocks_since(self, channel: int) -> int:
         """Blocks since the deviation of a channel began, as far as it can be told."""

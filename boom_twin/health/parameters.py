@@ -51,6 +51,8 @@ class Parameter:
         Standard deviation of a fault.
     one_sided : bool
         Faults are positive.
+    prior : float
+        Weight of such a fault beside others before anything is seen.
     """
 
     cause: str
@@ -61,6 +63,7 @@ class Parameter:
     healthy: float
     faulty: float
     one_sided: bool = False
+    prior: float = 1.0
 
     @property
     def name(self) -> str:
@@ -68,26 +71,8 @@ class Parameter:
         return f"{self.cause}:{self.kind}"
 
 
-@dataclass(frozen=True)
-class Hypothesis:
-    """One cause, with the places of the parameters (in the order of `parameters`) that it may show in.
-
-    Attributes
-    ----------
-    cause : str
-    places : tuple of int
-    prior : float
-        Its weight beside the others before anything is seen.
-    """
-
-    cause: str
-    places: tuple[int, ...]
-    prior: float
-
-
 COMPLIANCE = (0.02, 0.5)
 BENDING = (0.02, 0.3)
-RARE = 0.1
 
 
 def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
@@ -109,11 +94,11 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
         Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0),
     ]
     found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
-    found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03) for i in each]
+    found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4, prior=0.3) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 5e-4, one_sided=True) for i in each]
-    found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05))
+    found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
     if has_imu:
         found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
     found += [
@@ -122,19 +107,6 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
         if f"section_{i + 1}.mass" in names
     ]
     return tuple(found)
-
-
-def hypotheses(known: tuple[Parameter, ...]) -> tuple[Hypothesis, ...]:
-    """The causes of faults among parameters: one for each cause that can have one."""
-    causes = dict.fromkeys(each.cause for each in known if each.faulty > 0.0)
-    return tuple(
-        Hypothesis(
-            cause,
-            tuple(i for i, each in enumerate(known) if each.cause == cause),
-            RARE if cause.endswith("clearance") else 1.0,
-        )
-        for cause in causes
-    )
 
 
 def step_of(each: Parameter, scene: Scene) -> tuple[float, dict[str, float]]:

@@ -17,14 +17,15 @@ from .blocks import BLOCK, NANO
 from .case import Case
 from .detection import Detector
 from .linear import Linear, Means, Problem
-from .parameters import hypotheses, parameters
+from .parameters import parameters
 from .regression import Regression
 from .signatures import Signature
 from .whitening import Modes, Whitening
 from .words import Teller
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a case is begun, and given up if it has not become an alarm
-PERIOD = 5  # blocks between two looks at a case
+SKIPPED = 2  # blocks in which a fault may still be on its way
+ENOUGH, PERIOD = 2, 5  # blocks before the first look at a case, and between two looks at a case
 SURE = 15.0  # ln of how much more probable a fault must be than none
 
 
@@ -61,7 +62,7 @@ class ResidualWatch:
         self._linear = Linear(scene, settings, mounts, known)
         mean, self.covariance = baseline.healthy(known)
         self._errors2, self._noise2, self._detuning = baseline.errors(n) ** 2, baseline.noise(n) ** 2, baseline.detuning
-        self._bank = Bank(known, hypotheses(known))
+        self._bank = Bank(known)
         self._tell = Teller(scene, known, self._linear.signatures, baseline.errors(n))
         self._regression = Regression(mean, self.covariance)
         self._detector = Detector(len(names), BLOCK * NANO, settings.false_alarms / 86400.0)
@@ -98,7 +99,7 @@ class ResidualWatch:
         if self.listener is not None:
             self.listener(problem)
         self._watch(problem)
-        if self._case is not None:
+        if self._case is not None and problem.start >= self._case.start:
             self._case.take(problem)
         if self.alarm is None:
             return self._open(block.start)
@@ -119,9 +120,10 @@ class ResidualWatch:
         if self.alarm is not None:
             return
         self._detector.take(self.surprise)
-        if self._case is None and self.levels.max() > SUSPICIOUS:
+        if self._case is None and self._detector.suspicion > SUSPICIOUS:
             assert self._linear.epoch is not None
-            self._case = Case(self._bank, problem.start, *known, self._errors2, self._noise2, self._linear.epoch)
+            start = problem.start + SKIPPED * BLOCK
+            self._case = Case(self._bank, start, *known, self._errors2, self._noise2, self._linear.epoch)
 
     # -- suspicion, alarm, end ------------------------------------------------------------------------------------------
 
@@ -129,10 +131,12 @@ class ResidualWatch:
         """An alarm where the detector says so, if a fault explains the case better than none."""
         levels = self.levels
         channel = int(np.argmax(levels))
-        if self._case is None or levels[channel] < CLEAN:
+        if self._case is None or self._detector.suspicion < CLEAN:
             self._case = None
             return None
         if levels[channel] < 1.0:
+            return None
+        if start < self._case.start + ENOUGH * BLOCK:
             return None
         verdict = self._case.explain()
         if verdict.strength < SURE:

@@ -58,12 +58,18 @@ class SensorWatch:
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             for channel in np.flatnonzero(flags).tolist():
+                if kind == "jump" and self._is_wild(channel):
+                    continue
                 news += self._seen(channel, kind, start, end, findings.jumped)
         for key, fault in list(self._faults.items()):
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
         return news
+
+    def _is_wild(self, channel: int) -> bool:
+        """Whether the sensor has a fault in which jumps mean nothing more."""
+        return any((channel, kind) in self._faults for kind in ("noise", "spikes"))
 
     def _seen(self, channel: int, kind: str, start: int, end: int, jumped: Array) -> list[Alarm]:
         key = (channel, kind)

@@ -8,12 +8,13 @@ import numpy as np
 
 from ..records import Alarm, Array, Ranked
 from ..scene.parts import Scene
-from .bank import UNKNOWN, Explanation, Verdict
+from .bank import UNKNOWN, Cause, Explanation, Verdict
 from .parameters import Form, Parameter, physical
 from .signatures import Signature, Signatures
 
 NAMED, KEPT = 0.95, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
+CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
 
@@ -37,39 +38,40 @@ class Teller:
 
     def alarm(self, alarm: Alarm, verdict: Verdict, signature: Signature | None) -> Alarm:
         """The alarm with its present explanation."""
-        found, probabilities = verdict.found, verdict.probabilities
-        likely = [i for i, p in enumerate(probabilities) if p >= LISTED][:MOST]
-        ranks = tuple(self._ranked(found[i], float(probabilities[i]), verdict.excess) for i in likely)
+        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
+        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
         certain = self._certain(alarm, verdict)
-        if found[0].cause == UNKNOWN and probabilities[0] > 0.5:
-            told = f"{alarm.channel} deviates as no single fault that is known would make it"
-            return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
         if certain is not None:
             rank = next(rank for rank in ranks if rank.cause == certain)
-            best = max(rank.parts, key=lambda part: abs(part[1]) / part[2])
-            return replace(alarm, kind=best[0], cause=certain, told=self._sentence(rank, best), ranked=ranks)
+            told = self._sentence(rank)
+            return replace(alarm, kind=rank.parts[0][0], cause=certain, told=told, ranked=ranks)
+        if verdict.best.place is None:
+            told = f"{alarm.channel} deviates as no single fault that is known would make it"
+            return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
-        return replace(alarm, kind="residual", cause=None, told=told + self._advised_move(found, signature), ranked=ranks)
+        move = self._advised_move(verdict, signature)
+        return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
     @staticmethod
     def _certain(alarm: Alarm, verdict: Verdict) -> str | None:
         """The cause that is named: one that is probable enough; one that was is kept while it is still quite probable."""
-        share = {each.cause: float(p) for each, p in zip(verdict.found, verdict.probabilities, strict=True)}
-        best = verdict.found[0].cause
-        if best != UNKNOWN and share[best] >= NAMED:
-            return best
+        best = verdict.causes[0]
+        if best.name != UNKNOWN and best.probability >= NAMED:
+            return best.name
+        share = {cause.name: cause.probability for cause in verdict.causes}
         return alarm.cause if alarm.cause is not None and share[alarm.cause] >= KEPT else None
 
-    def _ranked(self, each: Explanation, probability: float, excess: float) -> Ranked:
+    def _ranked(self, cause: Cause, excess: float) -> Ranked:
         parts = tuple(
-            (self._known[place].kind, float(value), float(sigma * excess**0.5), self._known[place].unit)
-            for place, value, sigma in zip(each.places, each.values, each.sigmas, strict=True)
+            (self._known[part.place].kind, part.value, part.sigma * excess**0.5, self._known[part.place].unit)
+            for part in cause.parts
+            if part.place is not None
         )
-        return Ranked(each.cause, probability, parts)
+        return Ranked(cause.name, cause.probability, parts)
 
-    def _sentence(self, rank: Ranked, part: tuple[str, float, float, str]) -> str:
+    def _sentence(self, rank: Ranked) -> str:
         """Cause, amount and certainty."""
-        kind, value, sigma, unit = part
+        kind, value, sigma, unit = rank.parts[0]
         each = next(p for p in self._known if p.cause == rank.cause and p.kind == kind)
         if each.form is Form.SCENE and not unit:
             now, own = physical(each, self._scene, value), physical(each, self._scene, 0.0)
@@ -79,17 +81,18 @@ class Teller:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
         return f"{rank.cause} {kind}: {amount} (probability {rank.probability:.3f})"
 
-    def _advised_move(self, found: tuple[Explanation, ...], signature: Signature | None) -> str:
+    def _advised_move(self, verdict: Verdict, signature: Signature | None) -> str:
         """The move that would best tell the two most probable causes apart; worked out once for every pair."""
-        pair = (found[0].cause, found[1].cause)
+        one, other = verdict.causes[0], verdict.causes[1]
+        pair = (one.name, other.name)
         if signature is None or UNKNOWN in pair:
             return ""
         if pair != self._advised:
-            self._advised, self._advice = pair, self._best_move(found[0], found[1], signature.strokes)
+            self._advised, self._advice = pair, self._best_move(one.parts[0], other.parts[0], signature.strokes)
         return self._advice
 
     def _best_move(self, one: Explanation, other: Explanation, strokes: Array) -> str:
-        best, told = 1.0, ""
+        best, told = CLEAR, ""
         for i, joint in enumerate(self._scene.joints):
             for way in (1.0, -1.0):
                 aim = strokes.copy()
@@ -105,6 +108,5 @@ class Teller:
 
     def _apart(self, one: Explanation, other: Explanation, there: Signature) -> float:
         """How far the two would be apart, in deviations of the model's error."""
-        first = there.channels[:, list(one.places)] @ one.values
-        second = there.channels[:, list(other.places)] @ other.values
+        first, second = (there.channels[:, each.place] * each.value for each in (one, other))
         return float(np.linalg.norm((first - second) / self._errors))

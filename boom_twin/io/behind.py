@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BoomTwinError
-from ..records import Array, Change, Prediction, Report, Residuals, Stream
+from ..records import Array, Change, Health, Prediction, Report, Residuals, Stream
 from ..scene.parts import Scene
 from ..settings import Settings
 from .outlet import Outlet
@@ -20,32 +20,33 @@ from .writer import SessionWriter
 
 BATCH = 200  # reports in one pickle
 Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
-Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, Rows, Change | None]
+Rare = tuple[Change | None, Health | None]
+Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, Rows, Rare]
 
 
 def pack(report: Report) -> Packed:
     """A report as plain numbers and bytes; events and status are not written to a bag, and left out."""
     residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
-    p = report.prediction
+    p, rare = report.prediction, (report.change, report.health)
     if p is None:
-        return report.stamp, None, None, residuals, report.change
+        return report.stamp, None, None, residuals, rare
     turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
     tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
     numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
     if p.shape is None or p.undeflected is None or p.pins is None:
-        return report.stamp, numbers, None, residuals, report.change
-    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals, report.change
+        return report.stamp, numbers, None, residuals, rare
+    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals, rare
 
 
 def unpack(packed: Packed) -> Report:
     """What `pack` was given, less what it leaves out."""
-    stamp, numbers, lines, rows, change = packed
+    stamp, numbers, lines, rows, (change, health) = packed
     residuals = tuple(
         Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
         for stream, at, names, values, sigmas in rows
     )
     prediction = None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines)
-    return Report(stamp, True, prediction, residuals, change=change)
+    return Report(stamp, True, prediction, residuals, change=change, health=health)
 
 
 def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:

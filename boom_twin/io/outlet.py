@@ -17,6 +17,7 @@ from ..scene.passive import PassiveJoints
 from ..settings import Settings
 from .changes import encode
 from .factory import RosbagsTypes
+from .health import encode as encode_health
 from .markers import ShapeMarkers
 from .places import fill_xz
 from .template import Holes, Template, stamped
@@ -43,19 +44,21 @@ class Outlet:
         self._displacement = self._template(Output.TIP_DISPLACEMENT, _fill_displacement)
         self._position = self._template(Output.TIP_POSITION, _fill_position)
         self._acceleration = self._template(Output.TIP_ACCELERATION, _fill_acceleration)
+        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _fill_displacement)
         self._joints = self._joint_states(names, count, 0)
         self._all_joints = self._joint_states([*names, *self._passive.names], count, len(self._passive.names))
         self._residuals: dict[tuple[str, ...], Template] = {}
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale)
 
     def fill(self, report: Report) -> Messages:
-        """The messages of one report, in the order of `Output`.
+        """The messages of one report.
 
         Returns
         -------
         list of (Output, bytes)
             ``tip_displacement`` (m), ``tip_position`` (m), ``tip_acceleration`` (m/s^2, rad/s^2), ``joint_states``, and
-            ``shape`` where it has one, if there is a prediction; ``residuals`` for each set of them.
+            ``shape`` where it has one, if there is a prediction; ``residuals`` for each set of them; ``health`` and
+            ``tip_uncertainty`` (m) where there is news of it.
         """
         messages: Messages = []
         if (p := report.prediction) is not None:
@@ -69,6 +72,9 @@ class Outlet:
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
             messages.append((Output.CHANGES, encode(report.change)))
+        if (health := report.health) is not None:
+            messages.append((Output.HEALTH, encode_health(health)))
+            messages.append((Output.TIP_UNCERTAINTY, self._uncertainty.fill(health.stamp, health.tip_sigmas)))
         if p is not None and p.shape is not None:
             messages.append((Output.SHAPE, self._markers.fill(p)))
         return messages

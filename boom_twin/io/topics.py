@@ -28,6 +28,8 @@ class Output(StrEnum):
     RESIDUALS = "residuals"
     SHAPE = "shape"
     CHANGES = "changes"
+    HEALTH = "health"
+    TIP_UNCERTAINTY = "tip_uncertainty"
     DIAGNOSTICS = "diagnostics"
 
 
@@ -42,6 +44,8 @@ TYPES: dict[Stream | Output, str] = {
     Output.RESIDUALS: "sensor_msgs/msg/JointState",
     Output.SHAPE: "visualization_msgs/msg/MarkerArray",
     Output.CHANGES: "sensor_msgs/msg/JointState",
+    Output.HEALTH: "diagnostic_msgs/msg/DiagnosticArray",
+    Output.TIP_UNCERTAINTY: "geometry_msgs/msg/Vector3Stamped",
     Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 """The one message type that the program reads or fills for each role."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from math import nan
 
-from .lamps import Board, Level
+from ..records import Health
+from .lamps import Board, Lamp, Level
 
 MOST = 500
 """Alarms that are kept."""
@@ -12,7 +15,7 @@ MOST = 500
 
 @dataclass(slots=True)
 class Alarm:
-    """A lamp that was not well.
+    """A lamp that was not well, or what the judge of the rig's health found.
 
     Attributes
     ----------
@@ -27,6 +30,9 @@ class Alarm:
     end : float or None
         None while it lasts.
     is_acknowledged : bool
+    causes : tuple of (str, float)
+        Of the judge only: what may explain it, with a probability beside the others, the most probable first; NaN where the
+        sensor itself gives it away.
     """
 
     number: int
@@ -36,6 +42,7 @@ class Alarm:
     begin: float
     end: float | None = None
     is_acknowledged: bool = False
+    causes: tuple[tuple[str, float], ...] = ()
 
 
 class Alarms:
@@ -50,6 +57,7 @@ class Alarms:
     def __init__(self) -> None:
         self.all: list[Alarm] = []
         self._open: dict[str, Alarm] = {}
+        self._judged: dict[str, Alarm] = {}
         self._number = 0
 
     def follow(self, time: float, board: Board) -> None:
@@ -60,6 +68,28 @@ class Alarms:
         for key, lamp in lamps.items():
             if lamp.level > Level.OK:
                 self._raise(key, lamp.name, lamp.level, lamp.reason, time)
+
+    def judge(self, health: Health, time: Callable[[int], float]) -> None:
+        """What is known of the rig's health; `time` gives seconds of a stamp."""
+        for found in health.alarms:
+            alarm = self._judged.pop(found.channel, None)
+            if alarm is None:
+                alarm = self._keep(Alarm(self._next(), found.channel, Level.ERROR, "", 0.0))
+            if found.until is None:
+                self._judged[found.channel] = alarm
+            causes = tuple((each.cause, each.probability) for each in found.ranked) or ((found.cause or "not known", nan),)
+            alarm.is_acknowledged &= [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
+            alarm.reason, alarm.begin, alarm.causes = found.told, time(found.since), causes
+            alarm.end = None if found.until is None else time(found.until)
+        lasting = {found.channel for found in health.alarms if found.until is None}
+        for channel in self._judged.keys() - lasting:
+            self._judged.pop(channel).end = time(health.stamp)
+
+    def lamps(self, time: float) -> Iterable[Lamp]:
+        """What the judge had found at `time` (s), as lamps."""
+        for alarm in self.all:
+            if alarm.causes and alarm.begin <= time and (alarm.end is None or time < alarm.end):
+                yield Lamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
 
     def add(self, name: str, level: Level, reason: str, begin: float, end: float) -> None:
         """An alarm that is over, such as a gap."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import asdict
+from math import floor
 from typing import Any
 
+import numpy as np
+
 from .feed import Feed
-from .frames import SPECTRUM, pack
+from .frames import SPECTROGRAM, SPECTRUM, pack
 from .modes import Modes
-from .spectrum import WINDOW, Spectrum, spectrum
+from .spectrogram import STEP, spectrogram
+from .spectrum import SEGMENT, WINDOW, Spectrum, spectrum
 
 TABLE = "acceleration"
 MATCH = 0.2
@@ -29,6 +33,7 @@ class Analyst:
         self._modes: Modes | None = None
         self._turn = asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
+        self._firsts: dict[int, tuple[float, float]] = {}
 
     async def look(self, time: float) -> tuple[dict[str, Any], bytes] | None:
         """Text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
@@ -44,19 +49,37 @@ class Analyst:
                 found = await asyncio.to_thread(self._work_out, times, values.astype(float), self._feed.strokes(time))
                 if found is None:
                     return None
-                lines, result = found
+                natural, result = found
                 number = list(store.tables).index(TABLE)
                 block = pack(SPECTRUM, number, result.frequencies, result.densities.astype("f4"))
-                self._known = key, ({"kind": "lines", "time": time, **lines}, block)
+                peaks = [self._placed(asdict(peak), natural, time) for peak in result.peaks]
+                self._known = key, ({"kind": "lines", "natural": natural, "peaks": peaks}, block)
             return self._known[1]
 
-    def _work_out(self, times: Any, values: Any, strokes: list[float]) -> tuple[dict[str, Any], Spectrum] | None:
-        found = spectrum(times, values)
-        if found is None:
+    async def past(self, after: float, until: float) -> tuple[float, bytes] | None:
+        """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
+        ends = STEP * np.arange(floor(after / STEP) + 1.0, floor(until / STEP) + 1.0)
+        ends = ends[ends > SEGMENT]
+        table = self._feed.store.tables.get(TABLE)
+        if table is None or not len(ends):
             return None
-        natural = self._natural(strokes)
-        peaks = [{**asdict(peak), "mode": _mode(peak.frequency, natural)} for peak in found.peaks]
-        return {"natural": natural, "peaks": peaks}, found
+        times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
+        found = await asyncio.to_thread(spectrogram, times, values.astype(float), ends)
+        return float(ends[-1]), pack(SPECTROGRAM, 0, ends, found)
+
+    def _work_out(self, times: Any, values: Any, strokes: list[float]) -> tuple[list[float], Spectrum] | None:
+        found = spectrum(times, values)
+        return None if found is None else (self._natural(strokes), found)
+
+    def _placed(self, peak: dict[str, Any], natural: list[float], time: float) -> dict[str, Any]:
+        """A peak with the number of its mode, its deviation from the model, and how that has drifted since the first look."""
+        mode = _mode(peak["frequency"], natural)
+        if mode is None:
+            return {**peak, "mode": None, "deviation": None, "drift": None}
+        ratio = peak["frequency"] / natural[mode - 1]
+        if mode not in self._firsts or time < self._firsts[mode][0]:
+            self._firsts[mode] = time, ratio
+        return {**peak, "mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()

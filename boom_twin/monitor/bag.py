@@ -1,13 +1,15 @@
-"""A recorded session: what its node published, or what a twin says to it now."""
+"""A recorded session: what its node published, or what a twin says to it now; read while it is shown."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Generator
 from pathlib import Path
+from time import perf_counter
 from types import SimpleNamespace
 from typing import Any
 
-from ..errors import BagError
+from ..errors import BagError, BoomTwinError
+from ..health.baseline import Baseline
 from ..io.ahead import Ahead
 from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
@@ -31,20 +33,56 @@ LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-SHOWN = frozenset(Output) - {Output.CHANGES}
+SHOWN = frozenset(Output) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
+TURN = 0.04
+"""Seconds of reading at a time, after which the pages have their turn."""
 
-Progress = Callable[[Iterator[Any], int], Iterator[Any]]
-Role = Stream | Output
+
+class BagFeed(Feed):
+    """A session that is read further with every `poll`.
+
+    Parameters
+    ----------
+    title, store, topics, scene
+        As of a `Feed`.
+    length : float
+        Seconds from its first message to the last.
+    """
+
+    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene, length: float) -> None:
+        super().__init__(title, store, topics, scene, length)
+        self._steps: Generator[None] | None = None
+
+    def begin(self, steps: Generator[None]) -> None:
+        """Read by going through `steps`."""
+        self._steps = steps
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether more is to come."""
+        return self._steps is not None
+
+    def poll(self) -> None:
+        """Read for `TURN`; a fault of the session ends that, and is told."""
+        if self._steps is None:
+            return
+        turn = perf_counter() + TURN
+        try:
+            for _ in self._steps:
+                if perf_counter() > turn:
+                    return
+        except BoomTwinError as error:
+            self.trouble = f"read up to {self.store.newest:.2f} s only: {error}"
+        self._steps, self.end = None, self.store.newest
+
+    def close(self) -> None:
+        """Stop reading."""
+        if self._steps is not None:
+            self._steps.close()
 
 
-def bag_feed(
-    path: Path,
-    scene: Scene,
-    settings: Settings,
-    progress: Progress = lambda messages, _: messages,
-    mapping: Path | None = None,
-) -> Feed:
-    """Read the whole session.
+def bag_feed(path: Path, scene: Scene, settings: Settings, mapping: Path | None = None) -> BagFeed:
+    """Open a session.
 
     Parameters
     ----------
@@ -54,15 +92,13 @@ def bag_feed(
         Of the rig.
     settings : Settings
         For the twin, where the session has no outputs.
-    progress : callable
-        Wraps the iterator over messages, of which it is told the number.
     mapping : Path, optional
         How topics and sensors are read; as for `boom_twin.replay.replay`.
 
     Raises
     ------
     BagError
-        It cannot be read, or nothing in it can be shown.
+        It cannot be read, or has nothing that can be shown.
     UsageError
         The mapping cannot be used.
     """
@@ -71,14 +107,14 @@ def bag_feed(
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
     store = Store(max(counts.values(), default=1), keeps_boards=True)
-    feed = Feed(_title(session, is_published), store, topics, scene, end=0.0)
+    if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
+        raise BagError(f"{path}: nothing to show. It needs strokes, or outputs of the twin.")
+    feed = BagFeed(_title(session, is_published), store, topics, scene, (session.end - session.start) * NANO)
     if is_published:
-        _take_published(session, feed, topics, counts, progress)
+        feed.begin(_take_published(session, feed, topics, counts))
     else:
-        _take_predicted(session, feed, topics, counts, settings, progress)
-    if not store.tables:
-        raise BagError(f"{path}: nothing to show. It needs strokes named cylinder_1 .. in m, or outputs of the twin.")
-    feed.end = store.newest
+        twin = _Twin(feed, topics, scene, settings)
+        feed.begin(_take_predicted(session, topics, counts, len(scene.joints), twin))
     return feed
 
 
@@ -94,31 +130,27 @@ def _title(session: Session, is_published: bool) -> str:
     return f"{session.path.name}, {kind}" + (f" ({origin})" if origin else "")
 
 
-def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int], progress: Progress) -> None:
-    """What the node said, beside the measured acceleration."""
+def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int]) -> Generator[None]:
+    """What the node said, beside the measured acceleration; one message a step."""
     takers = {name: take for name, take in feed.catch.takers.items() if name in counts}
     known = _names(topics)
-    messages = read(session, {name: known[name].type for name in takers})
-    for name, _, message in progress(messages, sum(counts[name] for name in takers)):
+    for name, _, message in read(session, {name: known[name].type for name in takers}):
         takers[name](message, feed.now())
+        yield
 
 
-def _take_predicted(
-    session: Session, feed: Feed, topics: Topics, counts: dict[str, int], settings: Settings, progress: Progress
-) -> None:
-    """What a twin says now."""
-    scene = feed.scene()
-    assert scene is not None
+def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], joints: int, twin: _Twin) -> Generator[None]:
+    """What a twin says now; one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
-    if not wanted:
-        return
-    ahead = Ahead(session.path, topics, wanted, len(scene.joints))
+    ahead = Ahead(session.path, topics, wanted, joints)
     try:
-        twin = _Twin(feed, topics, scene, settings)
         ahead.wait_ready()
-        for sample in progress(iter(ahead), sum(counts["/" + name.lstrip("/")] for name in wanted)):
+        for sample in ahead:
             if sample is not None:
                 twin.take(sample)
+            yield
+        if not twin.has_predicted:
+            raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
     finally:
         ahead.stop()
 
@@ -129,7 +161,7 @@ class _Twin:
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self._twin, self._outlet = Twin(scene, settings, mounts), Outlet(scene, settings)
+        self._twin, self._outlet = Twin(scene, settings, mounts, Baseline()), Outlet(scene, settings)
         self._takers = {key: feed.catch.takers[topic.absolute] for key, topic in topics.outputs.items() if key in SHOWN}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
@@ -137,6 +169,12 @@ class _Twin:
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
+        self._twin.warm_up()
+
+    @property
+    def has_predicted(self) -> bool:
+        """Whether the model has moved at all."""
+        return bool(self._feed.store.tables)
 
     def take(self, sample: Sample | Change) -> None:
         """Take what comes next in the session."""
@@ -152,6 +190,8 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
+        if report.health is not None:
+            self._feed.catch.judge(report.health)
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())

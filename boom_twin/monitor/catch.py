@@ -8,7 +8,7 @@ from typing import Any
 
 from ..io.intake import Intake, stamp_of
 from ..io.topics import Output, Topics
-from ..records import Sample, Stream
+from ..records import Health, Sample, Stream
 from .lamps import Board, Level
 from .store import Store
 
@@ -35,6 +35,7 @@ class Catch:
     ``acceleration``   the same
     ``force``          specific force at the tip, x and z of the IMU: measured, predicted, expected deviation of the two
     ``joints``         residual of every joint, then the same over its expected deviation
+    ``uncertainty``    standard deviation of the predicted tip, x and z
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
 
@@ -70,6 +71,11 @@ class Catch:
         }
         found = {topics.outputs[role].absolute: take for role, take in by_role.items()}
         return {**found, topics.inputs[Stream.IMU].absolute: self._take_measured, topics.events.absolute: self._take_event}
+
+    def judge(self, health: Health) -> None:
+        """Keep what is known of the rig's health."""
+        self._store.append("uncertainty", ("x_m", "z_m"), health.stamp, health.tip_sigmas.tolist())
+        self._store.alarms.judge(health, self._store.time)
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first."""

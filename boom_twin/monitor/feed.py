@@ -28,11 +28,17 @@ class Feed:
         By default the one that the node names, if it can be read here.
     end : float, optional
         Length of a recorded session, s; None if it is live.
+
+    Attributes
+    ----------
+    trouble : str
+        Why there is not more to be had; empty as long as all is well.
     """
 
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
         self.catch = Catch(store, topics)
+        self.trouble = ""
         self._scene = scene
 
     def poll(self) -> None:

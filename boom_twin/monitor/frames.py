@@ -5,15 +5,16 @@ A message is a sequence of blocks, each of a multiple of 8 bytes, all numbers li
 ======  =====================  ==========================================================================
 offset  type                   meaning
 ======  =====================  ==========================================================================
-0       uint8                  kind: 1 = rows of a table, 2 = spectrum
+0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram
 1       uint8                  number of the table, its place in the newest ``layout`` message
 2       uint16                 columns, c
 4       uint32                 rows, k
-8       float64 x k            kind 1: seconds since the session's epoch; kind 2: frequencies, Hz
+8       float64 x k            kinds 1, 3: seconds since the session's epoch; kind 2: frequencies, Hz
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
 ======  =====================  ==========================================================================
 
-A spectrum has one column for each column of the table that its number names. All else is JSON in text messages, with a key
+A spectrum has one column for each column of the table that its number names; a spectrogram one for each of
+`boom_twin.monitor.spectrogram.FREQUENCIES`. All else is JSON in text messages, with a key
 ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``answer``.
 """
 
@@ -24,7 +25,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-ROWS, SPECTRUM = 1, 2
+ROWS, SPECTRUM, SPECTROGRAM = 1, 2, 3
 HEAD = struct.Struct("<BBHI")
 
 

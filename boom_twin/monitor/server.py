@@ -21,6 +21,8 @@ LONGEST = 4096
 """Bytes of a request of the page."""
 POLL = 1.0 / 60.0
 """Seconds between looks at what has come."""
+LOOK = 10.0
+"""Seconds between looks at the spectrum of a live session when nobody looks."""
 HEARTBEAT = 60.0
 """Seconds without an answer after which a viewer is taken to have gone."""
 
@@ -75,17 +77,24 @@ class Server:
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         """Let the feed take what comes, as long as the server runs."""
         self._analyst = Analyst(self._feed)
-        task = asyncio.create_task(self._poll())
-        task.add_done_callback(_stop_on_fault)
+        tasks = [asyncio.create_task(each()) for each in (self._poll, self._look)]
+        tasks[0].add_done_callback(_stop_on_fault)
         yield
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
+        for task in tasks:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
 
     async def _poll(self) -> None:
         while True:
             self._feed.poll()
             await asyncio.sleep(POLL)
+
+    async def _look(self) -> None:
+        """Know where the peaks of a live session were at first, whether or not a page is open."""
+        while self._feed.end is None:
+            await self._analyst.look(self._feed.store.newest)
+            await asyncio.sleep(LOOK)
 
     async def _part(self, application: web.Application) -> None:
         for socket in set(self._viewers):

@@ -51,11 +51,12 @@ class Viewer:
 
     def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: Desk, analyst: Analyst) -> None:
         self._socket, self._feed, self._desk, self._analyst = socket, feed, desk, analyst
-        self._playback = None if feed.end is None else Playback(feed.end)
+        self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
         self._tables = 0
         self._alarms = ""
+        self._past: float | None = None
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
@@ -99,7 +100,7 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent = store.generation, 0, {}
+            self._generation, self._tables, self._sent, self._past = store.generation, 0, {}, None
             await self._say({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
@@ -108,10 +109,11 @@ class Viewer:
     async def _say_state(self, position: float) -> None:
         feed, play = self._feed, self._playback
         now = feed.now() if play is None else position
-        message = state(feed.store.board(now), now, position)
+        message = state(feed.store, now, position)
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
-        await self._say({**message, "is_recording": self._desk.is_recording})
+            message |= {"end": feed.end, "read": feed.store.newest}
+        await self._say({**message, "trouble": feed.trouble, "is_recording": self._desk.is_recording})
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
             self._alarms = told
@@ -159,7 +161,16 @@ class Viewer:
                 lines, block = found
                 await self._say(lines)
                 await self._socket.send_bytes(block)
+            await self._send_past(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
+
+    async def _send_past(self, position: float) -> None:
+        """The columns of the spectrogram that are owed."""
+        generation = self._generation
+        found = await self._analyst.past(position - HISTORY if self._past is None else self._past, position)
+        if found is not None and generation == self._generation == self._feed.store.generation:
+            self._past, block = found
+            await self._socket.send_bytes(block)
 
     async def _say(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(dump(message))
@@ -203,6 +214,6 @@ class Viewer:
         elif what == "speed":
             play.pace(value)
         else:
-            if play.position >= play.end and not value:
+            if play.is_at_end and not value:
                 self._steer(play, "seek", 0.0)
             play.is_held = bool(value)

@@ -8,13 +8,14 @@ from math import isfinite
 from typing import Any
 
 from .alarms import Alarm
-from .lamps import Board, Lamp, Level, overall, worst
+from .lamps import Lamp, Level, overall, worst
 from .store import Store
 
 
-def state(board: Board, now: float, time: float) -> dict[str, Any]:
+def state(store: Store, now: float, time: float) -> dict[str, Any]:
     """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s)."""
-    groups = board.groups(now)
+    groups = store.board(now).groups(now)
+    groups["residuals"] = [*store.alarms.lamps(time), *groups["residuals"]]
     level, reason = overall(groups)
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
     return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told}

@@ -73,6 +73,11 @@ class Diagnostics:
         """The twin made `report` of `sample` in so many seconds."""
         self._watch.took(sample, report, duration)
 
+    def acknowledge(self) -> str:
+        """Somebody has seen the alarms of the rig's health; says which of them ended and are let go."""
+        health = self._watch.health
+        return "health is not judged" if health is None else health.acknowledge()
+
     def broken(self, stream: Stream, error: Exception) -> None:
         """A message could not be handled at all."""
         self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")

@@ -9,9 +9,10 @@ from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import Log
+from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from ..io.topics import Topics
+from ..io.topics import Output, Topics
 from ..io.typestore import jazzy
 from ..monitor.feed import Feed
 from ..monitor.store import Store
@@ -36,6 +37,7 @@ class TopicFeed(Feed):
     """Listens to the twin; needs an initialised rclpy.
 
     Its messages are taken when it is looked at, not by an executor: that would wake up for each of a thousand in a second.
+    Rows are heard as best effort, so the node never keeps or repeats one for it; states and events are heard reliably.
 
     Parameters
     ----------
@@ -52,6 +54,8 @@ class TopicFeed(Feed):
         for topic in shown:
             if (take := self.catch.takers.get(topic.absolute)) is not None:
                 kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
+                if topic not in (topics.outputs[Output.DIAGNOSTICS], topics.events):
+                    qos.reliability = ReliabilityPolicy.BEST_EFFORT
                 heard = self._node.create_subscription(kind, topic.absolute, lambda _: None, qos, raw=True)
                 self._heard.append((heard, topic.type, take))
         events = topics.events

@@ -23,7 +23,8 @@ from ..scene.load import DEFAULT_NAME, examine
 from ..settings import Settings
 from ..twin import Twin
 from .diagnostics import Diagnostics
-from .parameters import declare, guard, mapping_path, scene_path, settings_of, thresholds_of
+from .page import Page
+from .parameters import baseline_of, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
 from .services import Services
 from .started import Started
@@ -48,6 +49,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
+        self._page: Page | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
@@ -81,6 +83,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             if key is not Output.DIAGNOSTICS:
                 kind = message_class(topic.type)
                 self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
+        if self.get_parameter("monitor").value:
+            self._page = Page(self, self._topics, self.get_parameter("mapping").value)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -137,13 +141,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self.get_logger().warning(str(oddity))
         settings, joints = settings_of(self), len(scene.joints)
         topics = load_mapping(mapping_path(self), joints)
-        twin = Twin(scene, settings, topics.mounts(joints))
+        twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
-        self._asked = Services(self, twin, lambda: bool(self._subscriptions_in))
+        self._asked = Services(self, twin, self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in))
         self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
@@ -168,6 +172,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         if self._twin is not None:
             self._asked.close()
         self._twin = None
+        if self._page is not None:
+            self._page.close()
+        self._page = None
 
     # -- one message --------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ..errors import UsageError
+from ..health.baseline import Baseline, load_baseline
 from ..settings import Settings, settings_from
 from ..thresholds import Thresholds, thresholds_from
 from .context import one_line
@@ -45,7 +46,10 @@ def _row(name: str, field: FieldInfo, is_live: bool) -> Row:
 TABLE = (
     Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
     Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
+    Row("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
+    Row("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
     Row("autostart", True, "the node configures and activates itself", AT_START),
+    Row("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
     *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
     *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
 )
@@ -107,6 +111,14 @@ def mapping_path(node: Node) -> Path | None:
     """The mapping to load; None = the package's own."""
     text: str = node.get_parameter("mapping").value
     return Path(text) if text else None
+
+
+def baseline_of(node: Node) -> Baseline | None:
+    """What the rig's health is judged by; None if it is not to be judged. UsageError if the file cannot be used."""
+    if not node.get_parameter("health").value:
+        return None
+    text: str = node.get_parameter("baseline").value
+    return load_baseline(Path(text) if text else None)
 
 
 def settings_of(node: Node) -> Settings:

@@ -1,4 +1,4 @@
-"""The node's services: start again from rest, set the zero of a sensor."""
+"""The node's services: start again from rest, set the zero of a sensor, acknowledge alarms."""
 
 from __future__ import annotations
 
@@ -17,22 +17,26 @@ INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
 
 class Services:
-    """``~/reset`` and, by sensor, ``~/rezero/joint_i``, ``~/rezero/cylinder_i``, ``~/rezero/tip_imu``; all std_srvs/Trigger.
+    """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``~/rezero/cylinder_i``, ``~/rezero/tip_imu``.
+
+    All are std_srvs/Trigger.
 
     Parameters
     ----------
     node : Node
     twin : Twin
         Takes what is asked for with its next full stroke sample.
+    acknowledge : callable
+        Lets go of alarms that ended; says which.
     is_active : callable
         Whether the node is.
     """
 
-    def __init__(self, node: Node, twin: Twin, is_active: Callable[[], bool]) -> None:
+    def __init__(self, node: Node, twin: Twin, acknowledge: Callable[[], str], is_active: Callable[[], bool]) -> None:
         self._node, self._twin, self._is_active = node, twin, is_active
         numbers = range(1, twin.plan.joints + 1)
         sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
-        acts: dict[str, Callable[[], str]] = {"reset": self._reset}
+        acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
         self._services: list[Service] = [
             node.create_service(Trigger, f"~/{name}", partial(self._answer, act)) for name, act in acts.items()

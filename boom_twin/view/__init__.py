@@ -1,6 +1,6 @@
 """Arrays in, pictures out. The only package that imports a plotting library, and only when a picture is drawn."""
 
-from .records import History, ImuTrace, Truth
+from .records import AlarmSpan, History, ImuTrace, Truth
 from .replay import replay_pictures
 
-__all__ = ["History", "ImuTrace", "Truth", "replay_pictures"]
+__all__ = ["AlarmSpan", "History", "ImuTrace", "Truth", "replay_pictures"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..records import Array
 from .orbits import Orbits
 
@@ -41,6 +43,16 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class AlarmSpan:
+    """An alarm: the channel where it shows, from and to (s; the end of the session while it lasts), and its cause or kind."""
+
+    channel: str
+    start: float
+    stop: float
+    label: str
+
+
+@dataclass(frozen=True)
 class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
 
@@ -61,6 +73,10 @@ class History:
         Deflected centre lines from the base pivot to the tip, m, and when.
     gaps : list of (float, float)
         From and to, s, where strokes were missing.
+    alarms : list of AlarmSpan
+        In the order of their beginning.
+    moments : ndarray, shape (m, k)
+        Bending moments (N m) at the stations of `boom_twin.moments`.
     orbits : Orbits or None
         Of the pins with clearance, if there are any.
     """
@@ -79,4 +95,6 @@ class History:
     imu: ImuTrace | None = None
     shapes: list[tuple[float, Array]] = field(default_factory=list)
     gaps: list[tuple[float, float]] = field(default_factory=list)
+    alarms: list[AlarmSpan] = field(default_factory=list)
+    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))
     orbits: Orbits | None = None

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..records import Array
 from .records import History
-from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +49,7 @@ def _channel(axes: Axes, history: History, channel: int) -> None:
     values = factor * history.residual_values[measured, channel]
     sigma = factor * history.residual_sigmas[measured, channel]
     shade_gaps(axes, history.gaps)
+    shade_alarms(axes, [alarm for alarm in history.alarms if alarm.channel == name])
     axes.set_ylabel(f"{name}\n{unit}")
     if not stamps.size:
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .records import AlarmSpan
+
 # Okabe and Ito: told apart by every kind of colour vision
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
@@ -74,6 +76,17 @@ def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
     """Grey bands where strokes were missing; the first one is labelled for a legend."""
     for number, (start, stop) in enumerate(gaps):
         axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
+
+
+def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:
+    """Coloured bands where alarms lasted, each with its cause."""
+    for alarm in alarms:
+        axes.axvspan(alarm.start, alarm.stop, color=ORANGE, alpha=0.13, linewidth=0, zorder=0.4)
+        place = (max(alarm.start, axes.get_xlim()[0]), 0.97)
+        axes.annotate(
+            alarm.label, place, xycoords=axes.get_xaxis_transform(), xytext=(4, 0), textcoords="offset points",
+            va="top", fontsize=11, color=ORANGE, weight="bold",
+        )  # fmt: skip
 
 
 def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tuple[Array, Array]:

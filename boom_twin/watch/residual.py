@@ -45,14 +45,16 @@ class ResidualJudge:
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
-    def status(self, thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the channel; times as for `boom_twin.watch.sensor.SensorJudge`."""
+    def status(self, alarm: tuple[Level, str] | None, thresholds: Thresholds, now: float, clock: float) -> Status:
+        """State of the channel, with its alarm if there is one; times as for `boom_twin.watch.sensor.SensorJudge`."""
         while self._window and self._window[0].time <= now - thresholds.residual_window:
             self._window.popleft()
         judge, count = self._judge, sum(sums.number for sums in self._window)
         judge.begin(now, thresholds)
         rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
         told = f"{rms:.2f} times as large as noise explains, for {thresholds.residual_window:g} s"
+        if alarm is not None:
+            judge.fault(*alarm)
         judge.check("rms_normalised", rms, Bounds(thresholds.residual_warn, thresholds.residual_error), told)
         judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
         judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))

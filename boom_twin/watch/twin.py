@@ -9,12 +9,13 @@ import numpy as np
 
 from ..records import Report, Residuals, Sample, Stream
 from ..thresholds import Thresholds
+from .health import HealthWatch, level_of
 from .model import ModelWatch
 from .outputs import OutputsJudge
 from .peers import Peers
 from .residual import ResidualJudge
 from .sensor import Sensor, SensorJudge
-from .status import Status
+from .status import Level, Status
 from .stream import StreamWatch
 from .topic import TopicJudge
 
@@ -59,6 +60,7 @@ class TwinWatch:
         self._residuals: list[Residuals] = []
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
+        self.health: HealthWatch | None = None
 
     # -- one message --------------------------------------------------------------------------------------------------
 
@@ -72,6 +74,9 @@ class TwinWatch:
         self._model.took(report, duration)
         if report.residuals:
             self._residuals += report.residuals
+        if report.health is not None:
+            self.health = self.health or HealthWatch()
+            self.health.took(report.health)
 
     def broken(self, reason: str) -> None:
         """A message could not be handled at all."""
@@ -85,10 +90,10 @@ class TwinWatch:
         return self._streams[Stream.STROKES].newest
 
     def is_urgent(self) -> bool:
-        """Whether the model failed, or a stream fell silent or is heard again: worth a look out of turn."""
+        """Whether the model failed, an alarm began, or a stream fell silent or is heard again: worth a look out of turn."""
         now = self._monotonic()
         before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
-        return self._model.has_failed or before != self._silent
+        return self._model.has_failed or before != self._silent or (self.health is not None and self.health.has_news)
 
     def look(
         self,
@@ -98,7 +103,7 @@ class TwinWatch:
         subscribers: Iterable[Peers],
         clock: float,
     ) -> list[Status]:
-        """The state of model, topics, sensors and residuals; of the model alone while the twin does not listen.
+        """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
         Parameters
         ----------
@@ -121,6 +126,8 @@ class TwinWatch:
         sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
         found += [self._topic(stream, publishers[stream], now, clock) for stream in self._streams]
         found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
+        if self.health is not None:
+            found.append(self.health.status(self.thresholds, now, clock))
         return found + sensors + self._look_at_residuals(now, clock)
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
@@ -147,4 +154,9 @@ class TwinWatch:
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name)).take(column, now)
-        return [judge.status(self.thresholds, now, clock) for judge in self._judges.values()]
+        return [judge.status(self._alarm_of(name), self.thresholds, now, clock) for name, judge in self._judges.items()]
+
+    def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
+        """Level and words of the alarm that lasts in a channel."""
+        alarm = None if self.health is None else self.health.of(channel)
+        return None if alarm is None else (level_of(alarm), alarm.told)

@@ -24,12 +24,12 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import AccelStamped, PointStamped, Vector3Stamped
+from geometry_msgs.msg import AccelStamped, PointStamped, Vector3, Vector3Stamped
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 
 from boom_twin.io.cdr import stamp_in
 from boom_twin.scene import load_scene
@@ -83,11 +83,12 @@ def echo_on_events() -> None:
         executor.spin_once(timeout_sec=1.0)
 
 
-def source(rate_text: str, duration_text: str) -> None:
-    """Send, once it has been found; prints a line when it begins, and the stamps of the strokes."""
+def source(rate_text: str, duration_text: str, *more: str) -> None:
+    """Send, once it has been found, with ``imu`` that too; prints a line when it begins, and the stamps of the strokes."""
     rate, duration = float(rate_text), float(duration_text)
     node, scene = rclpy.create_node("source"), load_scene()
     publishers = [node.create_publisher(JointState, name, SENSOR) for name in ("cylinder_strokes", "joint_angles")]
+    publishers += [node.create_publisher(Imu, "tip_imu", SENSOR)] * ("imu" in more)
     end = time.monotonic() + 30.0
     while any(publisher.get_subscription_count() < 1 for publisher in publishers):
         if time.monotonic() > end:
@@ -103,13 +104,16 @@ def source(rate_text: str, duration_text: str) -> None:
         for row in rows:
             msg.position = array("d", row)
             templates.append(bytearray(serialize_message(msg)))
+    for force in random.normal(9.81, 0.05, 200):
+        templates.append(bytearray(serialize_message(Imu(linear_acceleration=Vector3(z=force)))))
     print("sending", flush=True)
     stamps, began = [], time.monotonic()
     for k in range(int(rate * duration)):
         left = began + k / rate - time.monotonic()
         if left > 0.0:
             time.sleep(left)
-        for publisher, place in zip(publishers, (k % 200, 200 + k % 200), strict=True):
+        for number, publisher in enumerate(publishers):
+            place = 200 * number + k % 200
             stamp = time.time_ns()
             data = templates[place]
             data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin.io.behind import pack, unpack
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.topics import TYPES, Output
 from boom_twin.io.typestore import jazzy
-from boom_twin.records import Prediction, Report, Residuals, Stream
+from boom_twin.records import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -48,6 +49,26 @@ def report(stamp: int = STAMP) -> Report:
         sigmas=np.array([1e-4, 2e-4]),
     )
     return Report(stamp=stamp, accepted=True, prediction=prediction(stamp), residuals=(residuals,))
+
+
+ALARM = Alarm(
+    channel="joint_2",
+    kind="softer",
+    since=STAMP - 2_000_000_000,
+    until=None,
+    cause="cylinder_2.k",
+    told="cylinder_2.k is 29 % softer",
+    ranked=(
+        Ranked("cylinder_2.k", 0.97, (("softer", 0.41, 0.02, ""),)),
+        Ranked("joint_2.sensor", 0.03, (("bias", 0.0031, 0.0001, "rad"), ("drift", 0.0, 1e-5, "rad/s"))),
+    ),
+)
+
+
+def judged(*alarms: Alarm) -> Report:
+    """With news of the rig's health, which are of another stamp."""
+    health = Health(STAMP - 100_000_000, alarms, ("joint_1", "joint_2"), np.array([0.2, 1.5]), np.array([0.001, 0.004]))
+    return replace(report(), health=health)
 
 
 def outlet() -> Outlet:
@@ -116,6 +137,46 @@ def test_residuals_are_named(filled: dict[Output, Any]) -> None:
     assert msg.effort.tolist() == [1e-4, 2e-4]
 
 
+def test_an_alarm_is_told_in_words_and_numbers() -> None:
+    msg = decoded(outlet().fill(judged(ALARM)))[Output.HEALTH]
+    (status,) = msg.status
+    assert (status.name, status.level, status.message) == ("joint_2", 2, "cylinder_2.k is 29 % softer")
+    assert {pair.key: pair.value for pair in status.values} == {
+        "kind": "softer",
+        "cause": "cylinder_2.k",
+        "from_s": "1699999998.123",
+        "to_s": "nan",
+        "cylinder_2.k: probability": "0.97",
+        "cylinder_2.k: softer": "0.41",
+        "cylinder_2.k: sigma of softer": "0.02",
+        "joint_2.sensor: probability": "0.03",
+        "joint_2.sensor: bias_rad": "0.0031",
+        "joint_2.sensor: sigma of bias_rad": "0.0001",
+        "joint_2.sensor: drift_rad/s": "0",
+        "joint_2.sensor: sigma of drift_rad/s": "1e-05",
+    }
+
+
+def test_levels_of_alarms() -> None:
+    unknown, ended = replace(ALARM, cause=None), replace(ALARM, until=STAMP)
+    msg = decoded(outlet().fill(judged(ALARM, unknown, ended)))[Output.HEALTH]
+    assert [status.level for status in msg.status] == [2, 1, 0]
+    assert {pair.key: pair.value for pair in msg.status[2].values}["to_s"] == "1700000000.123"
+
+
+def test_how_far_off_the_tip_may_be() -> None:
+    found = decoded(outlet().fill(judged()))
+    vector = found[Output.TIP_UNCERTAINTY].vector
+    assert (vector.x, vector.y, vector.z) == (0.001, 0.0, 0.004)
+    assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
+    assert not found[Output.HEALTH].status
+
+
+def test_a_report_passes_between_processes_whole() -> None:
+    own, other = outlet(), outlet()
+    assert own.fill(unpack(pack(judged(ALARM)))) == other.fill(judged(ALARM))
+
+
 def test_every_message_has_the_stamp_of_its_cause(filled: dict[Output, Any]) -> None:
     markers = filled[Output.SHAPE].markers
     stamps = {key: stamp_of(msg) for key, msg in filled.items() if key is not Output.SHAPE}
@@ -155,7 +216,7 @@ def test_the_bytes_are_those_of_rosbags() -> None:
     """Encoded anew by it, a message is the same to the byte: lengths, padding, order, byte order."""
     own = outlet()
     for number in range(60):
-        for key, data in own.fill(report(STAMP + 100_000_000 * number)):
+        for key, data in own.fill(replace(judged(ALARM), prediction=prediction(STAMP + 100_000_000 * number))):
             msg = jazzy().deserialize_cdr(data, TYPES[key])
             assert bytes(jazzy().serialize_cdr(msg, TYPES[key])) == data, key
 
@@ -163,7 +224,7 @@ def test_the_bytes_are_those_of_rosbags() -> None:
 def test_rclpy_reads_the_same_numbers() -> None:
     serialization = pytest.importorskip("rclpy.serialization")
     types = pytest.importorskip("boom_twin.ros.types")
-    for key, data in outlet().fill(report()):
+    for key, data in outlet().fill(judged(ALARM)):
         assert_same(
             jazzy().deserialize_cdr(data, TYPES[key]),
             serialization.deserialize_message(data, types.message_class(TYPES[key])),
@@ -183,4 +244,4 @@ def assert_same(one: Any, other: Any, place: str) -> None:
         for left, right in zip(one, other, strict=True):
             assert_same(left, right, place)
     else:
-        assert one == other, place
+        assert one == (other[0] if isinstance(other, bytes) else other), place  # rclpy has a byte as bytes

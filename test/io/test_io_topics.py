@@ -21,6 +21,8 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.RESIDUALS: "/boom_twin/residuals",
         Output.SHAPE: "/boom_twin/shape",
         Output.CHANGES: "/boom_twin/changes",
+        Output.HEALTH: "/boom_twin/health",
+        Output.TIP_UNCERTAINTY: "/boom_twin/tip/uncertainty",
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"

@@ -12,7 +12,7 @@ from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import load_topics
-from boom_twin.monitor.bag import bag_feed
+from boom_twin.monitor.bag import BagFeed, bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.records import Stream
 from boom_twin.replay import replay
@@ -51,7 +51,15 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def feed(faulty: Path) -> Feed:
     """That session through the twin."""
-    return bag_feed(faulty, load_scene(), Settings())
+    return read_all(bag_feed(faulty, load_scene(), Settings()))
+
+
+def read_all(feed: BagFeed) -> BagFeed:
+    """Once it is read."""
+    feed.poll()
+    while feed.is_reading:
+        feed.poll()
+    return feed
 
 
 @pytest.fixture(scope="session")

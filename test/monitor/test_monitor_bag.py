@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from monitor.conftest import read_all
 
 from boom_twin.errors import BagError
 from boom_twin.io.reader import read, scan
+from boom_twin.io.session import write_session
 from boom_twin.io.topics import TYPES, Output, load_topics
 from boom_twin.monitor.bag import bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
+from boom_twin.monitor.playback import Playback
+from boom_twin.monitor.words import state
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -40,6 +45,14 @@ def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:
     assert gaps == [pytest.approx((alarm["from_s"], alarm["to_s"])) for alarm in summary["alarms"] if alarm["kind"] == "gap"]
 
 
+def test_the_cause_is_named_from_when_it_shows(feed: Feed) -> None:
+    (alarm,) = [alarm for alarm in feed.store.alarms.all if alarm.causes]
+    assert (alarm.name, alarm.causes[0][0]) == ("joint_3", "joint_3.sensor") and alarm.begin == pytest.approx(15.0, abs=0.1)
+    told = state(feed.store, 20.0, 20.0)
+    assert told["level"] == "ERROR" and told["reason"] == f"joint_3: {alarm.reason}"
+    assert state(feed.store, 14.0, 14.0)["level"] == "OK"
+
+
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
     level, reason = overall(feed.store.board(14.0).groups(14.0))
     assert level == Level.OK
@@ -57,7 +70,7 @@ def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replaye
 
 
 def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -> None:
-    published = bag_feed(replayed / "bag", load_scene(), Settings())
+    published = read_all(bag_feed(replayed / "bag", load_scene(), Settings()))
     for name in ("displacement", "position", "acceleration", "shape", "joints"):
         rows = [each.store.tables[name].rows(0, 10**6) for each in (feed, published)]
         for ours, theirs in zip(*rows, strict=True):
@@ -70,3 +83,35 @@ def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -
 def test_a_session_without_anything_to_show_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BagError):
         bag_feed(tmp_path, load_scene(), Settings())
+
+
+def test_it_is_shown_while_it_is_read(faulty: Path) -> None:
+    feed = bag_feed(faulty, load_scene(), Settings())
+    play = Playback(feed)
+    assert feed.end == pytest.approx(40.0, abs=0.1) and play.advance(5.0) == 0.0 and not play.is_held
+    while not feed.store.newest:
+        feed.poll()
+    assert feed.is_reading and 0.0 < feed.store.newest < 20.0
+    play.seek(35.0)
+    assert play.position == feed.store.newest
+    play.advance(1.0)
+    assert not play.is_held
+    read_all(feed)
+    play.seek(39.9)
+    assert play.advance(1.0) == feed.end and play.is_held
+
+
+def test_a_session_that_is_damaged_is_shown_up_to_there(replayed: Path, tmp_path: Path) -> None:
+    damaged = shutil.copytree(replayed / "bag", tmp_path / "damaged")
+    file = next(damaged.glob("*.mcap"))
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    feed = read_all(bag_feed(damaged, load_scene(), Settings()))
+    assert "read up to" in feed.trouble and 5.0 < feed.store.newest == feed.end < 35.0
+
+
+def test_a_session_whose_strokes_cannot_be_used_says_so(tmp_path: Path) -> None:
+    stamps = 10**18 + 5_000_000 * np.arange(100)
+    write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
+    assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble

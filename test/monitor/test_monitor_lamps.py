@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isnan
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from boom_twin.monitor.alarms import MOST, Alarms
 from boom_twin.monitor.lamps import SILENCE, Board, Level, overall, worst
+from boom_twin.monitor.store import Store
 from boom_twin.monitor.words import dump, state
+from boom_twin.records import Alarm, Health, Ranked
 
 OK, WARN, ERROR, STALE = range(4)
 
@@ -78,8 +82,36 @@ def test_of_the_disk_a_low_value_is_the_bad_one() -> None:
 
 
 def test_what_is_not_known_is_null_in_json() -> None:
-    board = Board().told(0.0, [status("n: model", age_s="nan", age_s_stale=2.0)], 0.0)
-    assert "NaN" not in dump(state(board, 0.0, float("inf")))
+    store = Store(10)
+    store.light(0.0, Board().told(0.0, [status("n: model", age_s="nan", age_s_stale=2.0)], 0.0))
+    assert "NaN" not in dump(state(store, 0.0, float("inf")))
+
+
+def health(stamp: float, *alarms: Alarm) -> Health:
+    return Health(round(stamp * 1e9), alarms, (), np.zeros(0), np.zeros(2))
+
+
+def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
+    def seconds(stamp: int) -> float:
+        return stamp * 1e-9
+
+    alarms, ranked = Alarms(), (Ranked("a.k", 0.6, ()), Ranked("b.k", 0.4, ()))
+    unknown = Alarm("joint_2", "residual", 2 * 10**9, None, None, "cannot be told apart", ranked)
+    named = replace(unknown, cause="b.k", told="b.k off", ranked=(Ranked("b.k", 0.97, ()),))
+    alarms.judge(health(3.0, unknown), seconds)
+    (found,) = alarms.all
+    assert (found.name, found.reason, found.begin) == ("joint_2", "cannot be told apart", 2.0)
+    assert found.causes == (("a.k", 0.6), ("b.k", 0.4))
+    assert alarms.acknowledge(found.number) is found
+    alarms.judge(health(4.0, unknown), seconds)
+    assert found.is_acknowledged and [lamp.reason for lamp in alarms.lamps(3.5)] == ["cannot be told apart"]
+    alarms.judge(health(5.0, named), seconds)
+    assert not found.is_acknowledged and found.causes == (("b.k", 0.97),)
+    alarms.judge(health(6.0, replace(named, until=round(5.5e9))), seconds)
+    assert found.end == 5.5 and list(alarms.lamps(5.6)) == [] and list(alarms.lamps(1.9)) == []
+    alarms.judge(health(7.0, replace(unknown, since=7 * 10**9)), seconds)
+    alarms.judge(health(8.0), seconds)
+    assert [(each.begin, each.end) for each in alarms.all] == [(2.0, 5.5), (7.0, 8.0)]
 
 
 def test_an_alarm_lasts_until_its_lamp_is_well_or_out() -> None:

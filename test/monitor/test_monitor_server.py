@@ -78,7 +78,7 @@ async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[An
         else:
             head = struct.unpack_from("<BBHI", message.data)
             times = np.frombuffer(message.data, "<f8", head[3], 8)
-            found = {"kind": ("rows", "density")[head[0] - 1], "head": head, "times": times}
+            found = {"kind": ("rows", "density", "past")[head[0] - 1], "head": head, "times": times}
         if found["kind"] == kind and accept(found):
             return found
 
@@ -107,6 +107,21 @@ def test_a_spectrum_with_the_models_frequencies_comes_too() -> None:
             assert (await until(socket, "density"))["head"][2] == 2
 
     serve(Made(), talk)
+
+
+def test_the_spectrogram_since_before_the_page_was_opened_comes_once_and_then_what_is_new() -> None:
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            assert (await until(socket, "past"))["times"].tolist() == [10.0]
+            feed.rows(900)
+            assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
+            feed.store.clear()
+            feed.rows(2500)
+            assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
+
+    feed = Made()
+    feed.rows(100)
+    serve(feed, talk)
 
 
 def test_one_that_does_not_read_loses_rows_but_never_a_lamp() -> None:

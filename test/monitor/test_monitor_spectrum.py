@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter, welch
 
 from boom_twin.monitor.modes import Modes
+from boom_twin.monitor.spectrogram import FREQUENCIES, spectrogram
 from boom_twin.monitor.spectrum import SEGMENT, spectrum
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -68,3 +69,20 @@ def test_natural_frequencies_follow_the_posture() -> None:
     first = modes.at(strokes)
     assert first == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
     assert modes.at(strokes + 0.001) is first and modes.at(strokes + 0.02) != first
+
+
+def test_a_spectrogram_is_the_parts_that_a_density_is_the_mean_of() -> None:
+    values = np.random.default_rng(4).normal(size=(len(TIMES), 2)) + np.sin(2.0 * np.pi * 3.0 * TIMES)[:, None]
+    ends = np.arange(SEGMENT, TIMES[-1] + 0.1, 0.5 * SEGMENT) - 1.0 / RATE
+    found, reference = spectrogram(TIMES, values, ends), spectrum(TIMES, values)
+    assert reference is not None and found.shape == (len(ends), len(FREQUENCIES))
+    assert found.mean(axis=0)[1:] == pytest.approx(reference.densities.sum(axis=1)[1 : len(FREQUENCIES)], rel=1e-4)
+    assert FREQUENCIES[np.argmax(found[0])] == 3.0
+
+
+def test_a_spectrogram_says_where_rows_are_missing_and_where_the_rate_ends() -> None:
+    times = np.arange(0.0, 30.0, 1.0 / 20.0)
+    times = times[(times < 10.0) | (times > 12.0)]
+    found = spectrogram(times, np.random.default_rng(5).normal(size=(len(times), 2)), np.array([9.0, 33.0]))
+    assert np.isfinite(found[0][FREQUENCIES < 10.0]).all() and np.isnan(found[0][FREQUENCIES > 10.0]).all()
+    assert np.isnan(found[1]).all()

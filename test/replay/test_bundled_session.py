@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin.health.baseline import load_baseline
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.reader import read, scan
@@ -75,7 +76,7 @@ def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
     wanted = {inputs[stream].name: inputs[stream].type for stream in Stream}
     roles = {inputs[stream].name: stream for stream in Stream}
     scene, store = load_scene(), jazzy()
-    twin, intake, outlet = Twin(scene), Intake(4), Outlet(scene, Settings())
+    twin, intake, outlet = Twin(scene, baseline=load_baseline()), Intake(4), Outlet(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(SESSION), wanted):
         sample = intake.put(roles[name], stamp_of(message), message)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
+from boom_twin.io.reader import scan
 from boom_twin.io.session import write_session
 
 
@@ -41,3 +46,26 @@ def test_no_session_is_a_failure(spawn: Callable[..., Any], tmp_path: Path) -> N
     demo = spawn("boom_twin.ros.demo", "--bag", str(tmp_path / "absent"), "--out", str(tmp_path / "out"))
     assert demo.end() == 1
     assert "absent" in demo.said() and "Traceback" not in demo.said()
+
+
+def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
+    demo = spawn("boom_twin.ros.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo.wait_for("in a browser")
+    url = demo.said().split("open ")[1].split()[0]
+    assert b"boom twin" in urlopen(url).read()
+    children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
+    assert demo.stop(signal.SIGINT) == 0, demo.said()
+    assert len(children) == 3 and not any(Path(f"/proc/{pid}").exists() for pid in children)
+    assert "Traceback" not in demo.said()
+    assert scan(tmp_path / "recorded").topics
+
+
+def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
+    demo = spawn("boom_twin.ros.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo.wait_for("in a browser")
+    children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
+    monitor = next(int(pid) for pid in children if "monitor" in Path(f"/proc/{pid}/cmdline").read_text().split("\0"))
+    os.kill(monitor, signal.SIGKILL)
+    began = time.monotonic()
+    assert demo.end(60.0) == 1 and time.monotonic() - began < 15.0  # the recorder completes its files
+    assert "monitor ended with -9" in demo.said()

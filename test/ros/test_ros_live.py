@@ -13,6 +13,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from boom_twin.health.baseline import load_baseline
 from boom_twin.io.changes import decode, recorded_changes
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
@@ -34,6 +35,7 @@ ASKED: dict[int, Callable[[Any], Any]] = {
     1500: lambda remote: remote.set("gap", 0.2),
     1800: lambda remote: remote.trigger("rezero/cylinder_1"),
     2100: lambda remote: remote.set("line_fill", 8.0),
+    2200: lambda remote: remote.trigger("acknowledge"),
 }
 """What is done after so many messages."""
 Recorded = dict[str, list[tuple[int, bytes]]]
@@ -92,7 +94,7 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     answered = {stamp for stamp, _ in outputs[Output.TIP_POSITION]}
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
-    twin = Twin(scene, settings)
+    twin = Twin(scene, settings, baseline=load_baseline())
     intake, outlet = Intake(twin.plan.joints), Outlet(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     changes = recorded_changes(scan(recorded), load_topics())
@@ -118,7 +120,7 @@ def test_nearly_every_stroke_is_answered_and_none_twice(outputs: Any, motion: di
     assert len(stamps) > 0.99 * len(motion["stamps_ns"])
 
 
-@pytest.mark.parametrize("key", [*SINGLE, Output.SHAPE, Output.CHANGES])
+@pytest.mark.parametrize("key", [*SINGLE, Output.SHAPE, Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY])
 def test_predictions_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: Any, key: Output) -> None:
     assert len(outputs[key]) > 0
     assert outputs[key] == expected[key]

@@ -36,7 +36,7 @@ class Rig:
         self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
 
     def is_heard(self) -> bool:
-        shown = set(self._publishers) - {Output.CHANGES}
+        shown = set(self._publishers) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
         return all(self._publishers[role].get_subscription_count() for role in shown)
 
     def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:

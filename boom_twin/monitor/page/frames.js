@@ -1,6 +1,6 @@
 // Binary messages as boom_twin/monitor/frames.py describes them.
 
-export const ROWS = 1, SPECTRUM = 2;
+export const ROWS = 1, SPECTRUM = 2, SPECTROGRAM = 3;
 
 export function* blocks(buffer) {
   const view = new DataView(buffer);

@@ -2,7 +2,7 @@
 
 import { escape, show } from "./sheet.js";
 
-const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
+export const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
 const OVERALL = { OK: "ALL WELL", WARN: "WARNING", ERROR: "FAULT", STALE: "STALE" };
 const SILENCE = 2000; // ms without a word from the monitor after which nothing here is known
 
@@ -22,9 +22,10 @@ export class Lamps {
     let words = "";
     if (silence > SILENCE) words = Number.isFinite(silence) ? `NO CONNECTION to the monitor for ${Math.round(silence / 1000)} s: nothing here is current` : "NO CONNECTION to the monitor";
     else if (!isReplay && now - this.link.grown > SILENCE) words = Number.isFinite(this.link.grown) ? `NO DATA for ${Math.round((now - this.link.grown) / 1000)} s: the traces are old` : "NO DATA yet: is the node active, and do strokes come?";
+    else if (this.state?.trouble) words = this.state.trouble;
     if (this.notice.textContent !== words) this.notice.textContent = words;
     this.notice.hidden = !words;
-    document.querySelector("main").classList.toggle("old", Boolean(words));
+    document.querySelector("main").classList.toggle("old", Boolean(words) && words !== this.state?.trouble);
     if (silence > SILENCE && this.isShown !== "lost") { this.isShown = "lost"; this.showLost(); }
   }
 
@@ -61,9 +62,9 @@ export class Lamps {
 
   showAlarms(alarms) {
     const table = document.getElementById("alarms");
-    table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th>from, s<th>to, s<th></tr>" : "") +
+    table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th class=text>cause<th>from, s<th>to, s<th></tr>" : "") +
       alarms.slice(-50).reverse().map(alarm => `<tr><td>${escape(alarm.name)}<td class=text data-level=${alarm.level}>${SIGNS[alarm.level]} ${alarm.level}<td class=text>${escape(alarm.reason)}` +
-        `<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
+        `<td class=text>${alarm.causes.map(([cause, share]) => escape(cause) + (share === null ? "" : ` ${(100 * share).toFixed(0)} %`)).join(", ")}<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
   }
 }
 

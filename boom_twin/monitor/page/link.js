@@ -1,6 +1,6 @@
 // The WebSocket: connected again and again; what comes is handed on.
 
-import { blocks, ROWS } from "./frames.js";
+import { blocks, ROWS, SPECTRUM } from "./frames.js";
 import { Table } from "./table.js";
 
 const RETRY = 1000; // ms
@@ -40,7 +40,7 @@ export class Link extends EventTarget {
 
   takeBlocks(buffer) {
     for (const block of blocks(buffer)) {
-      if (block.kind !== ROWS) { this.tell("density", block); continue; }
+      if (block.kind !== ROWS) { this.tell(block.kind === SPECTRUM ? "density" : "past", block); continue; }
       if (!this.tables[block.table]) continue;
       this.tables[block.table].add(block.times, block.values);
       this.grown = performance.now();

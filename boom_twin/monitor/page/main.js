@@ -12,14 +12,15 @@ import { View } from "./view.js";
 import { Work } from "./work.js";
 
 const REST = 2; // least time between two drawings, as a multiple of what one takes
+const LONGEST = 60, SLOW = 45, FAST = 55; // ms between drawings at most, and the frames/s below and above which that changes
 const get = id => document.getElementById(id);
 
 const link = new Link(), view = new View(link), timeline = new Timeline(link), lamps = new Lamps(link);
 new Work(link, view);
 const spectrum = new SpectrumTab(link, new Sheet("peaks"));
 const tabs = { traces: new Traces(link, view, new Sheet("figures")), spectrum, spectrogram: spectrum, shape: new Shape(link, view), state: null };
-let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now();
-const delays = []; // s from the newest stamp to its drawing, live, if the clocks agree
+let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
+const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
 // -- what is chosen ---------------------------------------------------------------------------------------------------
 
@@ -74,18 +75,27 @@ link.addEventListener("reset", () => { tabs.traces.rebuild(); if (view.zoom || v
 function draw(now) {
   requestAnimationFrame(draw);
   frames++;
+  tellDelay();
   if (now - second > 1000) tellRate(now);
   const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : link.grown} ${spectrum.isNew}`;
   if (now < due || state === drawn || document.hidden) return;
   const began = performance.now();
   tabs[open]?.draw(open);
   drawn = state;
-  due = now + REST * (performance.now() - began);
-  if (!timeline.isReplay && link.epoch) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - view.newest);
+  due = now + Math.max(pace, REST * (performance.now() - began));
+  shown = view.newest;
+}
+
+function tellDelay() {
+  if (!timeline.isReplay && link.epoch && Number.isFinite(shown)) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - shown);
+  shown = NaN;
 }
 
 function tellRate(now) {
-  get("fps").textContent = `${Math.round(1000 * frames / (now - second))} frames/s`;
+  const rate = 1000 * frames / (now - second);
+  get("fps").textContent = `${Math.round(rate)} frames/s`;
+  if (rate < SLOW) pace = Math.min(pace + 20, LONGEST); // a machine that does not keep up draws less often
+  if (rate > FAST) pace = Math.max(pace - 5, 0);
   frames = 0;
   second = now;
   lamps.watch(timeline.isReplay);

@@ -9,12 +9,12 @@ export class Sheet {
   }
 }
 
-// Four digits of a number, – where it is not known.
+// Three or four digits of a number, – where it is not known.
 export function show(cell) {
   if (typeof cell === "string") return escape(cell);
   if (!Number.isFinite(cell)) return "–";
   const size = Math.abs(cell);
-  return size && (size < 1e-3 || size >= 1e6) ? cell.toExponential(size < 1e-3 ? 0 : 3) : Number(cell.toPrecision(4)).toString();
+  return size && (size < 1e-3 || size >= 1e6) ? cell.toExponential(2) : Number(cell.toPrecision(4)).toString();
 }
 
 export const escape = text => text.replace(/[&<>"]/g, sign => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[sign]);

@@ -5,26 +5,28 @@ import { line, paint } from "./colours.js";
 
 const LOWEST = 0.25, HIGHEST = 50; // Hz
 const COLUMNS = 300, FEWEST = 60; // of the spectrogram
-const SPAN = 20; // Hz, of the spectrogram
+const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: STEP and FREQUENCIES of boom_twin/monitor/spectrogram.py
 const RANGE = 60; // dB from dark to bright
 
 export class SpectrumTab {
   constructor(link, sheet) {
     this.sheet = sheet;
     this.past = [];
-    this.firsts = new Map();
     this.lines = { natural: [], peaks: [] };
     link.addEventListener("lines", event => { this.lines = event.detail; this.isNew = true; });
     link.addEventListener("density", event => this.take(event.detail));
-    link.addEventListener("reset", () => { this.past = []; this.firsts.clear(); this.isNew = true; });
+    link.addEventListener("past", event => this.takePast(event.detail));
+    link.addEventListener("reset", () => { this.past = []; this.isNew = true; });
   }
 
   take({ times: frequencies, values, rows }) {
     this.density = [Array.from(frequencies).slice(1), ...[0, 1].map(c => Array.from(values.slice(c * rows + 1, (c + 1) * rows)))];
-    if (this.past.at(-1)?.time !== this.lines.time) {
-      const sum = this.density[1].map((value, i) => 10 * Math.log10(Math.max(value + this.density[2][i], 1e-30)));
-      this.past = [...this.past.slice(-COLUMNS + 1), { time: this.lines.time, step: frequencies[1], sum, natural: this.lines.natural }];
-    }
+    this.isNew = true;
+  }
+
+  takePast({ times, values, rows, columns }) {
+    const decibels = row => Float32Array.from({ length: columns }, (_, c) => 10 * Math.log10(Math.max(values[c * rows + row], 1e-30)));
+    this.past = [...this.past, ...Array.from(times, (time, row) => ({ time, levels: decibels(row) }))].slice(-COLUMNS);
     this.isNew = true;
   }
 
@@ -66,41 +68,37 @@ export class SpectrumTab {
     ctx.restore();
   }
 
-  // Drift: against the first time that this peak was seen, told by the mode it is near, or by its place.
   tell() {
     const { natural, peaks } = this.lines;
-    const rows = peaks.map(peak => {
-      const key = peak.mode ?? Math.round(4 * Math.log2(peak.frequency)) / 4;
-      if (!this.firsts.has(key)) this.firsts.set(key, peak.frequency);
-      const model = peak.mode === null ? NaN : natural[peak.mode - 1];
-      return [peak.frequency.toFixed(3), peak.damping === null ? NaN : 100 * peak.damping, peak.mode === null ? "–" : `${peak.mode}`, model, 100 * (peak.frequency / model - 1), 100 * (peak.frequency / this.firsts.get(key) - 1)];
-    });
+    const percent = share => share === null ? NaN : 100 * share;
+    const rows = peaks.map(({ frequency, damping, mode, deviation, drift }) =>
+      [frequency.toFixed(3), percent(damping), mode === null ? "–" : `${mode}`, mode === null ? NaN : natural[mode - 1], percent(deviation), percent(drift)]);
     const others = natural.map((frequency, i) => [`mode ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
     const words = natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene";
     this.sheet.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `last 40 s, segments of 8 s; ${words}`);
   }
 
+  // One pixel for every cell, drawn large.
   drawPast() {
+    if (!this.past.length) return;
     const canvas = document.getElementById("waterfall"), { clientWidth: width, clientHeight: height } = canvas;
-    canvas.width = width; canvas.height = height;
-    const context = canvas.getContext("2d"), left = 44, count = Math.max(FEWEST, this.past.length), image = context.createImageData(count, height - 24);
-    const top = Math.max(...this.past.flatMap(({ sum, step }) => sum.slice(0, Math.ceil(SPAN / step))));
-    this.past.forEach(({ sum, step }, i) => {
-      for (let y = 0; y < image.height; y++) {
-        const place = Math.round(SPAN * (1 - y / image.height) / step) - 1;
-        image.data.set(heat(1 + (sum[Math.max(0, place)] - top) / RANGE), 4 * (y * count + i + count - this.past.length));
-      }
-    });
-    const picture = new OffscreenCanvas(count, image.height);
+    Object.assign(canvas, { width, height });
+    const cells = this.past[0].levels.length, count = Math.max(FEWEST, this.past.length), empty = count - this.past.length;
+    const picture = new OffscreenCanvas(count, cells), image = new ImageData(count, cells);
+    const top = this.past.reduce((most, { levels }) => levels.reduce((a, b) => b > a ? b : a, most), -Infinity);
+    this.past.forEach(({ levels }, i) => levels.forEach((level, c) => {
+      if (Number.isFinite(level)) image.data.set(heat(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i + empty));
+    }));
     picture.getContext("2d").putImageData(image, 0, 0);
+    const context = canvas.getContext("2d"), left = 44, right = width - 60, bottom = height - 24, highest = (cells - 1) * HEIGHT;
     context.imageSmoothingEnabled = false;
-    context.drawImage(picture, left, 0, width - left - 60, image.height);
+    context.drawImage(picture, left, 0, right - left, bottom);
     context.fillStyle = paint("ink");
     context.font = "13px system-ui";
-    for (let f = 0; f <= SPAN; f += 5) context.fillText(`${f} Hz`, 2, Math.max(12, image.height * (1 - f / SPAN)));
-    this.past.at(-1).natural.forEach((f, i) => f < SPAN && context.fillText(`◂ mode ${i + 1}`, width - 58, image.height * (1 - f / SPAN) + 5));
-    context.fillText(`${this.past[0].time.toFixed(0)} s`, left + (width - left - 60) * (1 - this.past.length / count), height - 6);
-    context.fillText(`${this.past.at(-1).time.toFixed(0)} s`, width - 90, height - 6);
+    for (let f = 0; f <= highest; f += 5) context.fillText(`${f} Hz`, 2, Math.max(12, bottom * (1 - f / highest)));
+    this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ mode ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
+    context.fillText(`${(this.past[0].time - WIDTH).toFixed(0)} s`, left + (right - left) * empty / count, height - 6);
+    context.fillText(`${this.past.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
     document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
   }
 }

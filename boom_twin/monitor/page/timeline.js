@@ -6,6 +6,7 @@ export class Timeline {
   constructor(link) {
     this.link = link;
     this.times = [];
+    this.alarms = [];
     this.scrubber = document.getElementById("scrubber");
     this.play = document.getElementById("play");
     this.scrubber.oninput = () => this.seek(Number(this.scrubber.value));
@@ -23,20 +24,23 @@ export class Timeline {
   greet({ end }) {
     this.end = end;
     document.getElementById("timeline").hidden = end === null;
-    if (this.isReplay) this.scrubber.max = end;
     if (this.isReplay) this.link.ask({ do: "speed", value: Number(document.getElementById("speed").value) });
   }
 
-  follow({ position, is_held: isHeld }) {
+  follow({ position, is_held: isHeld, end, read }) {
     if (!this.isReplay) return;
+    if (end !== this.end) { this.end = end; this.mark(this.alarms); }
+    this.scrubber.max = end;
+    this.isRead = read >= end;
     this.isHeld = isHeld;
     this.position = position;
     this.play.textContent = isHeld ? "Play" : "Pause";
     if (document.activeElement !== this.scrubber || !this.scrubber.matches(":active")) this.scrubber.value = position;
-    document.getElementById("position").textContent = `${position.toFixed(2)} of ${this.end.toFixed(2)} s`;
+    document.getElementById("position").textContent = `${position.toFixed(2)} of ${end.toFixed(2)} s` + (this.isRead ? "" : `, read to ${read.toFixed(0)} s`);
   }
 
   mark(alarms) {
+    this.alarms = alarms;
     if (!this.isReplay) return;
     this.times = [...new Set(alarms.map(alarm => alarm.begin))].sort((a, b) => a - b);
     document.getElementById("marks").replaceChildren(...alarms.toSorted((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level)).map(alarm => {

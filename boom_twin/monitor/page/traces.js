@@ -1,15 +1,20 @@
 // What the tip does and how far it is from what was measured, against time.
 
 import { Chart } from "./chart.js";
+import { paint } from "./colours.js";
+import { RANKS, SIGNS } from "./lamps.js";
+import { escape } from "./sheet.js";
 import { figures, thin } from "./thin.js";
 
 const BAND = 2; // deviations that are shaded
+const SLOT = 2; // px from lowest to highest of which one line is drawn
+const BAR = 4; // px, of an alarm's mark
 const TELL = 500; // ms between two looks at the figures
 const NAMES = { x: "forward", z: "up" };
 
 // Every chart: table, columns (a function of the table), their labels, a factor of the unit.
 const CHARTS = [
-  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
+  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true },
   { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
   { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
   { name: "residuals", table: "joints", title: "residual, σ", factor: 1, columns: table => range(table.columns.length / 2, table.columns.length),
@@ -22,6 +27,8 @@ export class Traces {
     this.view = view;
     this.sheet = sheet;
     this.charts = new Map();
+    this.alarms = [];
+    link.addEventListener("alarms", event => { this.alarms = event.detail.alarms; view.version++; });
     setInterval(() => this.tell(), TELL);
     for (const { name } of CHARTS) {
       const element = document.createElement("div");
@@ -44,15 +51,25 @@ export class Traces {
       if (!table?.count) continue;
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
-      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth));
-      chart.draw([times, ...(kind.isBanded ? banded(values) : kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor)))], from, to);
+      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
+      const scaled = kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor));
+      chart.draw([times, ...(kind.isBanded ? banded(scaled) : kind.isUncertain ? this.uncertain(times, scaled, kind.factor) : scaled)], from, to);
     }
+  }
+
+  // The tip's lines, and beside each what it may be off by: as told last before each time.
+  uncertain(times, values, factor) {
+    const table = this.link.table("uncertainty");
+    let row = table?.count ? Math.max(table.first, table.from(times[0]) - 1) : NaN;
+    const at = times.map(time => { while (row + 1 < table?.count && table.time(row + 1) <= time) row++; return row; });
+    const beside = (column, sign) => values[column].map((value, i) => value === null || !(table?.time(at[i]) <= times[i]) ? null : value + sign * factor * BAND * table.at(column, at[i]));
+    return [...values, ...[0, 1].flatMap(column => [beside(column, 1), beside(column, -1)])];
   }
 
   build(kind, table) {
     const labels = typeof kind.labels === "function" ? kind.labels(table) : kind.labels;
     const plain = () => labels.map((label, i) => ({ label, colour: i }));
-    const options = kind.isBanded ? BANDED : { series: plain() };
+    const options = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
       axes: [kind === CHARTS.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
@@ -65,16 +82,40 @@ export class Traces {
           if (width > 5) this.view.set({ zoom: [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] });
           plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
         }],
-        draw: kind.name === "residuals" ? [shadeExpected] : [],
+        draw: [plot => this.markAlarms(plot), ...(kind.name === "residuals" ? [shadeExpected] : [])],
       },
     });
   }
 
+  // The alarms of a span of time, the worst last.
+  during(from, to) {
+    return this.alarms.filter(({ begin, end }) => begin <= to && (end ?? Infinity) >= from).sort((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level) || a.causes.length - b.causes.length);
+  }
+
+  // A bar at the top of the chart as long as an alarm lasts, the worst over the others.
+  markAlarms({ ctx, bbox, scales, valToPos }) {
+    const right = bbox.left + bbox.width, at = time => Math.min(Math.max(valToPos(time, "x", true), bbox.left), right);
+    ctx.save();
+    for (const { level, begin, end } of this.during(scales.x.min, scales.x.max)) {
+      ctx.fillStyle = paint(level === "OK" ? "accent" : level.toLowerCase());
+      ctx.fillRect(at(begin), bbox.top, Math.max((end === null ? right : at(end)) - at(begin), 2 * devicePixelRatio), BAR * devicePixelRatio);
+    }
+    ctx.restore();
+  }
+
+  // In words, the worst first.
+  tellAlarms(from, to) {
+    const words = this.during(from, to).reverse().map(({ name, reason, level, begin, end }) =>
+      `<span data-level=${level}>${SIGNS[level]} ${escape(name)}</span>: ${escape(reason)}, ${end === null ? `since ${begin.toFixed(1)} s` : `${begin.toFixed(1)} to ${end.toFixed(1)} s`}`);
+    document.getElementById("during").innerHTML = words.join(" &nbsp; ");
+  }
+
   // The table of figures of what is shown.
   tell() {
-    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown}`;
+    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown} ${this.view.version}`;
     if (told === this.told || !Number.isFinite(to) || !this.sheet.element.offsetParent) return;
     this.told = told;
+    this.tellAlarms(from, to);
     const rows = [];
     for (const [name, unit, factor, label] of [["displacement", "mm", 1000, "displ."], ["acceleration", "m/s²", 1, "accel."], ["force", "m/s²", 1, "IMU"], ["joints", "mrad", 1000, ""]]) {
       const table = this.link.table(name);
@@ -99,6 +140,11 @@ const BANDED = {
     { label: "measured x", colour: "soft", width: 1, show: false }, { label: "predicted x", colour: 1, width: 1, show: false },
   ],
   bands: [[3, 4, 0]],
+};
+
+const UNCERTAIN = {
+  series: [{ label: "tip forward", colour: 0 }, { label: "tip up", colour: 1 }, ...[0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }))],
+  bands: [[3, 4, 0], [5, 6, 1]],
 };
 
 // From measured, predicted, deviation of z, then of x, to what is drawn.

@@ -2,7 +2,7 @@
 
 import { paint } from "./colours.js";
 
-const TABLES = ["displacement", "position", "acceleration", "force", "joints"];
+const TABLES = ["displacement", "position", "acceleration", "force", "joints", "uncertainty"];
 
 export class Work {
   constructor(link, view) {

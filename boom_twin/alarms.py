@@ -1,0 +1,62 @@
+"""Alarms over their lives, from the `Health` that tells of them again and again; and as named values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import nan
+
+from .records import Alarm, Health
+
+NANO = 1e-9
+
+
+class Alarms:
+    """All alarms of a run, each of them once.
+
+    Attributes
+    ----------
+    all : list of Alarm
+        In the order in which they became known, each as it was told last.
+    """
+
+    def __init__(self) -> None:
+        self.all: list[Alarm] = []
+        self._lasting: dict[tuple[str, int], int] = {}
+
+    def take(self, health: Health) -> None:
+        """Go on with what is told now; an alarm that is told of no more has ended."""
+        told = {(alarm.channel, alarm.since): alarm for alarm in health.alarms}
+        for key in [key for key in self._lasting if key not in told]:
+            place = self._lasting.pop(key)
+            self.all[place] = replace(self.all[place], until=health.stamp)
+        for key, alarm in told.items():
+            place = self._lasting.setdefault(key, len(self.all))
+            self.all[place : place + 1] = [alarm]
+            if alarm.until is not None:
+                del self._lasting[key]
+
+    def forget_ended(self) -> None:
+        """Keep only those that last."""
+        self.all = self.lasting
+        self._lasting = {key: place for place, key in enumerate(self._lasting)}
+
+    @property
+    def lasting(self) -> list[Alarm]:
+        """Those that have not ended."""
+        return [self.all[place] for place in self._lasting.values()]
+
+
+def values_of(alarm: Alarm) -> dict[str, str]:
+    """An alarm as named values: times are stamps in s, units end the names, ``nan`` is not known."""
+    found = {
+        "kind": alarm.kind,
+        "cause": alarm.cause or "",
+        "from_s": f"{alarm.since * NANO:.3f}",
+        "to_s": f"{nan if alarm.until is None else alarm.until * NANO:.3f}",
+    }
+    for rank in alarm.ranked:
+        found[f"{rank.cause}: probability"] = f"{rank.probability:.4g}"
+        for kind, value, sigma, unit in rank.parts:
+            named = f"{kind}_{unit}" if unit else kind
+            found |= {f"{rank.cause}: {named}": f"{value:.6g}", f"{rank.cause}: sigma of {named}": f"{sigma:.3g}"}
+    return found

@@ -1,0 +1,71 @@
+"""``boom_twin compare``: two sessions side by side."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from .common import add_json, add_scene, open_scene, print_json
+
+if TYPE_CHECKING:
+    from ..report.compare import Row
+    from ..report.side import Side
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    for name in ("A", "B"):
+        parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
+    add_scene(parser, option=True)
+    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    parser.add_argument("--baseline", metavar="FILE", help="as for replay")
+    parser.add_argument("--out", metavar="DIR", help="folder for compare.png and the replays; without it nothing is kept")
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Replay what is not replayed, and compare."""
+    from ..report.compare import as_text, flat, rows_of
+
+    with ExitStack() as stack:
+        out = Path(args.out or stack.enter_context(TemporaryDirectory()))
+        one, other = (_side(args, Path(getattr(args, name)), out / name) for name in ("A", "B"))
+    if one.scene != other.scene:
+        print("warning: the two were replayed with different scenes; differences may be those of the scenes", file=sys.stderr)
+    rows = rows_of(one, other)
+    if args.out:
+        _draw(out, one, other, rows)
+    if args.json:
+        print_json(flat(one, other, rows))
+    else:
+        print("\n".join(as_text(one, other, rows)))
+    return 0
+
+
+def _side(args: Namespace, path: Path, folder: Path) -> Side:
+    from ..replay import replay
+    from ..report.side import side_of, worked_out
+    from ..settings import load_settings
+
+    def replayed(session: Path) -> Path:
+        print(f"replaying {session} ..", file=sys.stderr)
+        scene, settings = open_scene(args.scene), load_settings(Path(args.params) if args.params else None)
+        result = replay(session, scene, folder, settings, baseline=args.baseline)
+        worked_out(result, scene, settings, Path(args.baseline) if args.baseline else None, folder)
+        return folder
+
+    return side_of(path, replayed)
+
+
+def _draw(out: Path, one: Side, other: Side, rows: list[Row]) -> None:
+    from ..report.compare import SURE
+    from ..view.compare import compare_picture
+
+    known = [(row.name, row.difference / row.sigma) for row in rows if row.sigma and row.difference is not None]
+    out.mkdir(parents=True, exist_ok=True)
+    title = f"B ({other.name}) against A ({one.name})"
+    compare_picture(out / "compare.png", title, [name for name, _ in known], [apart for _, apart in known], SURE)

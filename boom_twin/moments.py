@@ -1,0 +1,58 @@
+"""Bending moments of the flexible parts, from their bending coordinates: M = EI times curvature.
+
+In the default basis the curvature at xi = s/length of a part is sum_k P_k(2 xi - 1) q_k / length with Legendre polynomials P_k,
+and K_00 = EI / length is the part's stiffness (notes at `boom_twin.physics.modes`). Three shapes so hold what weight spread
+along a part and forces at its ends do; material damping is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from .plan.plan import Plan
+from .records import Array
+from .scene.parts import Scene
+from .scene.splits import flexible_parts
+
+PLACES = (0.0, 0.5, 1.0)
+"""Of the stations of a part, over its length."""
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A cross-section: of which section (0-based), and how far from its inboard pivot (m)."""
+
+    section: int
+    place: float
+
+    @property
+    def name(self) -> str:
+        """Section and place in words."""
+        return f"section {self.section + 1} at {self.place:.2f} m"
+
+
+def stations(scene: Scene) -> tuple[Station, ...]:
+    """The stations of all flexible parts, base to tip."""
+    return tuple(
+        Station(index, start + at * (stop - start))
+        for index in range(len(scene.sections))
+        for start, stop in flexible_parts(scene, index)
+        for at in PLACES
+    )
+
+
+def moments_by_unknowns(plan: Plan) -> Array:
+    """Bending moment (N m) at every station by the unknowns of the boom, shape (stations, unknowns).
+
+    Positive where it bends the outboard end up.
+    """
+    tables = plan.tables
+    found = np.zeros((len(PLACES) * len(tables.beams), len(plan.names)))
+    for part, row in enumerate(tables.beams):
+        shapes = legendre.legvander(2.0 * np.array(PLACES) - 1.0, int(row.bending) - 1)
+        rows = slice(len(PLACES) * part, len(PLACES) * (part + 1))
+        found[rows, row.z : row.z + row.bending] = tables.stiffness[part, 0, 0] * shapes
+    return found

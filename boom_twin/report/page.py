@@ -1,0 +1,266 @@
+"""``report.html``: one file that says what a session showed, to read or to print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..records import Alarm, Array
+from ..replay import NANO, Recording, Replay
+from ..scene.parts import Scene
+from ..twin import EVENTS
+from ..view import AlarmSpan, History
+from ..view.frequencies import frequency_picture
+from ..view.moments import moment_picture
+from ..view.timeline import timeline_picture
+from .decay import Vibration
+from .html import heading, image, page, paragraph, table
+from .loads import BOX, Load, loads
+from .vibration import LEAST, NEAR, SURE, Hold, course
+
+FILE_NAME = "report.html"
+NO_JUDGE = "The rig's health was not judged."
+SHARES = "An estimate without unit is a share; of a stiffness (k, EI) by its compliance: 0.43 is 1.43 times as compliant."
+ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a report is about.
+
+    Attributes
+    ----------
+    result : Replay
+    history : History
+        Of the same replay.
+    scene : Scene
+    scene_name : str
+        Path, or what else it is called.
+    still : list of Hold
+    heights : ndarray, shape (n,), or None
+        Of the sections, m, where they are known.
+    """
+
+    result: Replay
+    history: History
+    scene: Scene
+    scene_name: str
+    still: list[Hold]
+    heights: Array | None
+
+    @property
+    def name(self) -> str:
+        """Of the session."""
+        return self.result.session.path.resolve().name
+
+    @property
+    def origin(self) -> str:
+        """Where the session comes from; empty if it does not say."""
+        return self.result.session.notes.get("origin", "")
+
+
+def write_report(subject: Subject, folder: Path) -> Path:
+    """Write the report into `folder`, where the pictures of the replay are; returns its path."""
+    parts = [
+        *_head(subject),
+        *_alarms(subject, folder),
+        *_residuals(folder),
+        *_vibration(subject, folder),
+        *_tip(subject, folder),
+        *_moments(subject, folder),
+        *_events(subject),
+        *_provenance(subject),
+    ]
+    path = folder / FILE_NAME
+    path.write_text(page(f"Session {subject.name}", parts), encoding="utf-8")
+    return path
+
+
+# -- head -------------------------------------------------------------------------------------------------------------
+
+
+def _head(subject: Subject) -> list[str]:
+    summary, recording = subject.result.summary, subject.result.recording
+    begin = datetime.fromtimestamp(recording.predictions[0].stamp // 1_000_000_000, UTC)
+    rows: list[tuple[str, object]] = [
+        ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
+        ("duration, s", summary["duration_s"]),
+        ("stroke samples used", summary["samples"]),
+        ("samples left out", summary["dropped"]),
+        ("largest tip acceleration, m/s²", summary["tip_acceleration_max_m_s2"]),
+        ("largest tip displacement, m", float(np.hypot(*subject.history.tip_displacement.T).max())),
+        *_uncertainty(recording),
+        *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
+    ]
+    scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
+    return [
+        heading(f"Session {subject.name}", 1),
+        paragraph(subject.origin or "The session does not say where it comes from.", "origin"),
+        paragraph(f"Scene {scene}"),
+        _verdict(subject.result),
+        table((), rows),
+        heading("Joint angles", 3),
+        table(("joint", "residual, mrad rms", "mean / expected deviation", "spread / expected deviation"), _joints(summary)),
+    ]
+
+
+_AGAINST_TRUTH = (
+    ("tip_error_rms_m", "tip against the truth, m rms"),
+    ("tip_acceleration_error_rms_m_s2", "tip acceleration against the truth, m/s² rms"),
+)
+
+
+def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
+    sigmas = np.array([health.tip_sigmas for health in recording.health]).reshape(-1, 2)
+    if not np.isfinite(sigmas).any():
+        return []
+    x, z = np.nanmax(sigmas, axis=0)
+    return [("standard deviation of the predicted tip at worst, m", f"{x:.2g} forward, {z:.2g} up")]
+
+
+def _verdict(result: Replay) -> str:
+    if not result.recording.health:
+        return paragraph(NO_JUDGE, "note")
+    count = len(result.recording.alarms())
+    if count:
+        return paragraph(f"{count} alarm{'s' if count > 1 else ''} of the rig's health.", "alarm")
+    return paragraph("No alarm: all residuals are as the model, the sensors' noise and the baseline explain.", "well")
+
+
+def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
+    columns = ("joint_residual_rms_rad", "joint_residual_normalised_mean", "joint_residual_normalised_std")
+    rows = zip(*(summary[column] for column in columns), strict=True)
+    return [(i, None if rms is None else 1e3 * rms, mean, spread) for i, (rms, mean, spread) in enumerate(rows, 1)]
+
+
+# -- alarms and residuals ---------------------------------------------------------------------------------------------
+
+
+def _alarms(subject: Subject, folder: Path) -> list[str]:
+    recording, history = subject.result.recording, subject.history
+    if not recording.health:
+        return [heading("Alarms"), paragraph(NO_JUDGE)]
+    first = recording.predictions[0].stamp
+    gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
+    stamps = np.array([(health.stamp - first) * NANO for health in recording.health])
+    levels = np.array([health.levels for health in recording.health])
+    spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
+    path, end = folder / "timeline.png", float(history.stamps_s[-1])
+    timeline_picture(path, subject.name, end, spans, stamps, recording.health[0].names, levels, subject.origin)
+    alarms = recording.alarms()
+    found = [_alarm(alarm, first) for alarm in alarms] or [paragraph("None.")]
+    note = [paragraph(SHARES, "note")] if any(alarm.ranked for alarm in alarms) else []
+    return [heading("Alarms"), *found, *note, image(path, "alarms and levels over time")]
+
+
+def _alarm(alarm: Alarm, first: int) -> str:
+    """Words, times, and the causes with their estimates."""
+    start = max(0.0, (alarm.since - first) * NANO)
+    end = "lasts to the end" if alarm.until is None else f"to {(alarm.until - first) * NANO:.2f} s"
+    rows = [
+        (rank.cause, rank.probability, kind, _number(value, unit), _number(sigma, unit))
+        for rank in alarm.ranked
+        for kind, value, sigma, unit in rank.parts or (("", float("nan"), float("nan"), ""),)
+    ]
+    causes = table(("possible cause", "probability", "what", "estimate", "standard deviation"), rows) if rows else ""
+    title = heading(f"{alarm.channel}: {alarm.cause or alarm.kind}", 3)
+    return f'<div class="block">{title}{paragraph(alarm.told)}{paragraph(f"From {start:.2f} s, {end}.", "note")}{causes}</div>'
+
+
+def _number(value: float, unit: str) -> str:
+    return "-" if not np.isfinite(value) else f"{value:.3g} {unit}".rstrip()
+
+
+def _residuals(folder: Path) -> list[str]:
+    if not (folder / "residuals.png").is_file():
+        return [heading("Residuals"), paragraph("Nothing but the strokes was measured.")]
+    told = "Measured minus predicted. The band is three times the expected deviation; alarms are shaded where they show."
+    return [heading("Residuals"), paragraph(told, "note"), image(folder / "residuals.png", "residuals with their bands")]
+
+
+# -- vibration, tip, loads --------------------------------------------------------------------------------------------
+
+
+def _vibration(subject: Subject, folder: Path) -> list[str]:
+    peaks = [(0.5 * (hold.start + hold.stop), each.frequency) for hold in subject.still for each in hold.measured.values()]
+    path = folder / "frequencies.png"
+    frequency_picture(path, subject.name, *course(subject.history, subject.scene), peaks, subject.origin)
+    source = "tip IMU" if subject.history.imu is not None else "joint angles"
+    told = (
+        "Lines: the model, about the equilibrium in the posture of the moment. "
+        f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "
+        f"within {NEAR:.0%} of a mode and sure to {SURE:.1%}."
+    )
+    rows = [
+        (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))
+        for hold in subject.still
+        for mode, each in sorted(hold.measured.items())
+    ]
+    head = ("while still", "mode", "model, Hz", "measured, Hz", "apart, %", "damping, %")
+    found = table(head, rows) if rows else paragraph("Nothing was measured: no free vibration, or no standing still.")
+    return [heading("Natural frequencies and damping"), paragraph(told, "note"), image(path, "natural frequencies"), found]
+
+
+def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
+    """Frequency, how far it is from the model's, and damping, with their standard deviations."""
+    apart, sigma = 100.0 * (each.frequency / model - 1.0), 100.0 * each.frequency_sigma / model
+    return (
+        f"{each.frequency:.4f} ± {each.frequency_sigma:.1g}",
+        f"{apart:+.2f} ± {sigma:.1g}",
+        f"{100.0 * each.damping:.2f} ± {100.0 * each.damping_sigma:.1g}",
+    )
+
+
+def _tip(subject: Subject, folder: Path) -> list[str]:
+    parts = [heading("Tip"), image(folder / "tip.png", "tip displacement and acceleration")]
+    return parts + [image(folder / name, name) for name in ("spectrum.png", "posture.png") if (folder / name).is_file()]
+
+
+def _moments(subject: Subject, folder: Path) -> list[str]:
+    title, found = heading("Bending of the sections"), loads(subject.history, subject.scene, subject.heights)
+    if not found:
+        return [title, paragraph("All sections of the scene are rigid: their bending is not in the model.")]
+    path = folder / "moments.png"
+    rows = [(load.station.name, load.column) for load in found]
+    moment_picture(path, subject.name, subject.history, rows, subject.origin)
+    told = (
+        "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
+        "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M h / (2 I) of bending alone: "
+        "no axial force, no notches, no welds. "
+    )
+    told += ASSUMED if subject.heights is None else "Heights as given."
+    head = ("station", "largest moment, kN m", "at, s", "static part then, kN m", "height, m", "bending stress, MPa")
+    return [title, paragraph(told, "note"), table(head, map(_load, found)), image(path, "bending moments")]
+
+
+def _load(load: Load) -> tuple[object, ...]:
+    return load.station.name, 1e-3 * load.moment, load.time, 1e-3 * load.static, load.height, 1e-6 * load.stress
+
+
+# -- what else --------------------------------------------------------------------------------------------------------
+
+
+def _events(subject: Subject) -> list[str]:
+    gaps = [(f"{start:.3f} to {stop:.3f} s", stop - start) for start, stop in subject.history.gaps]
+    events = [(name, count, EVENTS.get(name, "seen in a message")) for name, count in subject.result.summary["events"].items()]
+    return [
+        heading("Gaps and events"),
+        table(("gap of the strokes", "s"), gaps) if gaps else paragraph("No gap in the strokes."),
+        table(("event", "times", "what it is"), events) if events else paragraph("Nothing out of the ordinary."),
+    ]
+
+
+def _provenance(subject: Subject) -> list[str]:
+    summary = subject.result.summary
+    rows = [
+        ("boom_twin", __version__),
+        ("mapping", summary["mapping"]),
+        ("sha256 of the result bag", summary["output_sha256"]),
+        *subject.result.session.notes.items(),
+    ]
+    return [heading("Where this comes from"), table((), rows)]

@@ -1,0 +1,155 @@
+"""The figures of a session, each with its standard deviation, so that two sessions can be compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from math import hypot, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BagError
+from ..health.baseline import Baseline
+from ..moments import stations
+from ..records import Array
+from ..replay import Recording
+from ..scene.parts import Scene
+from ..settings import Settings
+from ..view import History
+from .vibration import Hold
+
+FILE_NAME = "quantities.json"
+BATCHES = 10
+"""Parts of a session whose means show how sure the mean of all is (method of batch means)."""
+LEG = 1e-3
+"""m; a stroke has turned when it came back by this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One figure: its standard deviation is None where it is not known; units are SI."""
+
+    name: str
+    value: float
+    sigma: float | None
+    unit: str
+
+
+def quantities(
+    recording: Recording, history: History, still: list[Hold], scene: Scene, settings: Settings, baseline: Baseline
+) -> list[Quantity]:
+    """All figures of one replay."""
+    return [
+        *_residuals(history, baseline, len(scene.joints)),
+        *_frequencies(still),
+        *_tip(recording, history),
+        *_loads(history, scene),
+        *_travels(history, settings),
+    ]
+
+
+def _residuals(history: History, baseline: Baseline, joints: int) -> Iterator[Quantity]:
+    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean."""
+    channels = [*(f"joint_{i + 1}" for i in range(joints)), "tip_imu_x", "tip_imu_z"]
+    errors = dict(zip(channels, baseline.errors(joints), strict=True))
+    for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
+        values, unit = column[np.isfinite(column)], "rad" if name.startswith("joint") else "m/s^2"
+        if len(values) < BATCHES:
+            continue
+        mean, mean_sigma = batch_mean(values)
+        square, square_sigma = batch_mean(values**2)
+        rms = sqrt(square)
+        yield Quantity(f"residual_mean_{name}", mean, hypot(mean_sigma, errors[name]), unit)
+        sigma = hypot(square_sigma, 2.0 * mean * errors[name]) / (2.0 * rms) if rms else 0.0
+        yield Quantity(f"residual_rms_{name}", rms, sigma, unit)
+
+
+def batch_mean(values: Array) -> tuple[float, float]:
+    """Mean of a row of values (k,), and its standard deviation from those of `BATCHES` batches."""
+    means = np.array([part.mean() for part in np.array_split(values, BATCHES)])
+    return float(values.mean()), float(means.std(ddof=1) / sqrt(BATCHES))
+
+
+def _frequencies(still: list[Hold]) -> Iterator[Quantity]:
+    """Of every mode that was seen: measured over model frequency, which no posture changes, and damping."""
+    for mode in sorted({mode for hold in still for mode in hold.measured}):
+        seen = [(hold.model[mode], hold.measured[mode]) for hold in still if mode in hold.measured]
+        ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
+        yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios)
+        yield _weighted(f"damping_mode_{mode + 1}", np.array([(each.damping, each.damping_sigma) for _, each in seen]))
+
+
+def _weighted(name: str, rows: Array) -> Quantity:
+    """Weighted mean of values and deviations (k, 2); it is as unsure as they say, or as they scatter if that is more."""
+    weights = rows[:, 1] ** -2.0
+    mean = float(weights @ rows[:, 0] / weights.sum())
+    scatter = float(weights @ (rows[:, 0] - mean) ** 2 / max(len(rows) - 1, 1))
+    return Quantity(name, mean, sqrt(max(1.0, scatter) / weights.sum()), "1")
+
+
+def _tip(recording: Recording, history: History) -> Iterator[Quantity]:
+    """Peaks of the predicted tip; of the displacement with what the judge of health says of the predicted position."""
+    sigmas = np.array([health.tip_sigmas for health in recording.health]).reshape(-1, 2)
+    known = sigmas[np.isfinite(sigmas).all(axis=1)]
+    sigma = float(np.hypot(*known.T).max()) if len(known) else None
+    yield Quantity("tip_displacement_max", float(np.hypot(*history.tip_displacement.T).max()), sigma, "m")
+    yield Quantity("tip_acceleration_max", float(np.hypot(*history.tip_acceleration.T).max()), None, "m/s^2")
+
+
+def _loads(history: History, scene: Scene) -> Iterator[Quantity]:
+    """Largest bending moment of every flexible section."""
+    sections = np.array([station.section for station in stations(scene)], dtype=np.int64)
+    for section in np.unique(sections):
+        moments = np.abs(history.moments[:, sections == section])
+        yield Quantity(f"bending_moment_max_section_{section + 1}", float(moments.max()), None, "N m")
+
+
+def _travels(history: History, settings: Settings) -> Iterator[Quantity]:
+    for i, stroke in enumerate(history.strokes.T):
+        travel, legs = path_length(stroke)
+        sigma = sqrt(2.0 * legs * settings.stroke_variance)
+        yield Quantity(f"stroke_travel_cylinder_{i + 1}", travel, sigma, "m")
+
+
+def path_length(stroke: Array) -> tuple[float, int]:
+    """How far a stroke (k,), m, has gone back and forth, and in how many legs; what does not come back by `LEG` is noise."""
+    turns, way = [float(stroke[0])], 0
+    extreme = turns[0]
+    for value in stroke.tolist():
+        if way and (extreme - value) * way > LEG:
+            turns.append(extreme)
+            extreme, way = value, -way
+        elif not way and abs(value - turns[0]) > LEG:
+            extreme, way = value, 1 if value > turns[0] else -1
+        elif way and (value - extreme) * way > 0.0:
+            extreme = value
+    if not way:
+        return 0.0, 0
+    turns.append(extreme)
+    return float(np.abs(np.diff(turns)).sum()), len(turns) - 1
+
+
+def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
+    """Keep them beside ``summary.json``; returns the file."""
+    path = folder / FILE_NAME
+    rows = ",\n".join(f"  {json.dumps(asdict(each))}" for each in found)
+    path.write_text(f'{{\n "scene_sha256": "{digest(scene)}",\n "quantities": [\n{rows}\n ]\n}}\n', encoding="utf-8")
+    return path
+
+
+def read(folder: Path) -> tuple[str, list[Quantity]]:
+    """Digest of the scene, and the figures, of a replay folder; BagError if they are not there."""
+    path = folder / FILE_NAME
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return str(content["scene_sha256"]), [Quantity(**row) for row in content["quantities"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BagError(f"{path}: {error}. Replay the session again with `boom_twin replay`.") from None
+
+
+def digest(scene: Scene) -> str:
+    """Of everything in a scene."""
+    return sha256(scene.model_dump_json().encode()).hexdigest()

@@ -1,0 +1,57 @@
+"""One of two sessions that are compared: its figures and its alarms."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import BagError
+from ..health.baseline import load_baseline
+from ..pictures import history_of
+from ..replay import Replay
+from ..scene.parts import Scene
+from ..settings import Settings
+from ..view import History
+from .quantities import Quantity, quantities, read, write
+from .vibration import Hold, holds
+
+
+@dataclass(frozen=True)
+class Side:
+    """What is known of one session: its name, the digest of its scene, figures, and alarms as in ``summary.json``."""
+
+    name: str
+    scene: str
+    quantities: list[Quantity]
+    alarms: list[dict[str, Any]]
+
+
+def worked_out(
+    result: Replay, scene: Scene, settings: Settings, baseline: Path | None, folder: Path
+) -> tuple[History, list[Hold], Path]:
+    """History and stretches of standing still of a replay; its figures are written into `folder`, as the path says."""
+    history = history_of(result.recording, scene)
+    still = holds(history, scene)
+    found = quantities(result.recording, history, still, scene, settings, load_baseline(baseline))
+    return history, still, write(folder, scene, found)
+
+
+def side_of(path: Path, replayed: Callable[[Path], Path]) -> Side:
+    """One side from a replay folder, or from a session, of which `replayed` makes a replay folder.
+
+    Raises
+    ------
+    BagError
+        The session cannot be replayed, or the folder lacks figures or has none that can be read.
+    """
+    folder = path if (path / "summary.json").is_file() else replayed(path)
+    scene, found = read(folder)
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        alarms = list(summary["alarms"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
+    return Side(path.resolve().name, scene, found, alarms)

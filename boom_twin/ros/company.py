@@ -1,0 +1,157 @@
+"""The processes of a demonstration: the node, a recorder, and others, kept out of any other ROS 2 traffic."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import BoomTwinError
+from .stop import on_stop_signal
+
+if TYPE_CHECKING:
+    from .player import Player
+
+PATIENCE = 300.0
+"""Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
+PARTING = 10.0
+"""Seconds that a process may take to end."""
+LOOK = 1.0
+"""Seconds between looks at whether all have found each other."""
+LISTENERS = 2
+"""Of every input: node and recorder."""
+
+
+class Child:
+    """A running Python process whose words go into a log.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Of Python.
+    log : Path
+    parting : Signals
+        What ends it in order.
+    """
+
+    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals) -> None:
+        self._name, self._log, self._parting = " ".join(arguments[:3]), log, parting
+        with log.open("w", encoding="utf-8") as file:
+            self._process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
+
+    def said(self) -> str:
+        """All that it said so far."""
+        return self._log.read_text(encoding="utf-8")
+
+    def check(self) -> None:
+        """Raise BoomTwinError if it has ended."""
+        if self._process.poll() is not None:
+            last = (self.said().strip().splitlines() or ["nothing was said"])[-1]
+            raise BoomTwinError(f"{self._name} ended with {self._process.returncode}: {last} (see {self._log})")
+
+    def end(self) -> None:
+        """Ask it to end, and wait until it has."""
+        self._process.send_signal(self._parting)
+        try:
+            self._process.wait(PARTING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+class Company:
+    """Node, recorder, and whoever joins them.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the logs and of the recording.
+
+    Attributes
+    ----------
+    recorded : Path
+        The recording.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self._out, self.recorded = out, out / "recorded"
+        self._children: list[Child] = []
+        self._is_asked_to_end = False
+
+    def begin(self, origin: str) -> None:
+        """Start node and recorder; `origin` is kept in the recording."""
+        self.start("node", ["-m", "boom_twin.ros.main"], signal.SIGTERM)
+        record = ["-m", "boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin]
+        self._recorder = self.start("recorder", record, signal.SIGINT)
+
+    def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
+        """Start one more."""
+        self._children.append(Child(arguments, self._out / f"{name}.log", parting))
+        return self._children[-1]
+
+    def check(self) -> None:
+        """Raise BoomTwinError if one of them has ended, KeyboardInterrupt after SIGINT or SIGTERM."""
+        if self._is_asked_to_end:
+            raise KeyboardInterrupt
+        for child in self._children:
+            child.check()
+
+    def ask_to_end(self) -> None:
+        """End with the next `check`."""
+        self._is_asked_to_end = True
+
+    def play(self, player: Player, duration: float | None = None) -> Iterator[int]:
+        """Play as long as all of them run; as `boom_twin.ros.player.Player.play`."""
+
+        def is_held() -> bool:
+            self.check()
+            return False
+
+        return player.play(duration=duration, is_held=is_held)
+
+    def meet(self, player: Player) -> None:
+        """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
+        from .recorder import COMPLETE
+
+        print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
+        end = time.monotonic() + PATIENCE
+        while player.wait(LOOK, LISTENERS, self.check) or COMPLETE not in self._recorder.said():
+            self.check()
+            if time.monotonic() > end:
+                raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
+
+    def end(self) -> None:
+        """End all, the last first."""
+        with ExitStack() as stack:
+            for child in self._children:
+                stack.callback(child.end)
+
+
+@contextmanager
+def company(out: Path, origin: str) -> Iterator[Company]:
+    """Node and recorder in a domain of their own, as long as this lasts; the recording of an earlier run is removed."""
+    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if (out / "recorded").is_dir():
+            shutil.rmtree(out / "recorded")
+    except OSError as error:
+        raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
+    running = Company(out)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    on_stop_signal(running.ask_to_end)
+    try:
+        running.begin(origin)
+        yield running
+    finally:
+        running.end()
+        for number, act in before.items():
+            signal.signal(number, act)

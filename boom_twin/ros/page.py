@@ -1,0 +1,64 @@
+"""The live page beside the node: ``boom_twin monitor`` as a process that the node starts, ends, and otherwise forgets."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ..io.topics import Topics
+
+LOOK = 1.0
+"""Seconds of steady time between looks at whether it still runs."""
+PARTING = 1.0
+"""Seconds that it may take to end."""
+
+
+class Page:
+    """Runs the monitor from now until `close`; if it ends before, one line says so and nothing else changes.
+
+    It shares no socket, lock or queue with the node: it hears the node's topics as any subscriber does. Its standard input is
+    a pipe that the node holds, so it ends with the node however that ends.
+
+    Parameters
+    ----------
+    node : Node
+        Its names, namespace and remappings are those that the page listens to.
+    topics : Topics
+    mapping : str
+        Path of the mapping; empty: the package's own.
+    """
+
+    def __init__(self, node: Node, topics: Topics, mapping: str) -> None:
+        self._node = node
+        known = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
+        names = {topic.absolute: node.resolve_topic_name(topic.name) for topic in known}
+        arguments = ["--until-stdin-ends", *(["--mapping", mapping] if mapping else []), "--ros-args"]
+        for name, resolved in names.items():
+            arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
+        self._process = _start(arguments)
+        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def close(self) -> None:
+        """End it."""
+        self._timer.destroy()
+        self._process.terminate()
+        try:
+            self._process.wait(PARTING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _look(self) -> None:
+        code = self._process.poll()
+        if code is not None:
+            self._timer.cancel()
+            self._node.get_logger().warning(f"the monitor ended with {code}; `boom_twin monitor` starts another one")
+
+
+def _start(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "boom_twin.cli.main", "monitor", *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE)

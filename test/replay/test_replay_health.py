@@ -1,0 +1,75 @@
+"""Alarms of the rig's health in what a replay leaves behind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay
+from boom_twin.errors import UsageError
+from boom_twin.io.reader import read, scan
+from boom_twin.io.session import write_session
+from boom_twin.io.topics import Output, load_topics
+from boom_twin.replay import alarm_as_text
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+
+START, STEP = 1_700_000_000_000_000_000, 5_000_000
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """The reading of joint 3 repeats from 3 s on; otherwise a boom at rest, whose deflection the angles lack."""
+    scene, random = load_scene(), np.random.default_rng(4)
+    strokes = np.tile(strokes_of_posture(scene, "arch"), (1200, 1))
+    joints = np.tile(joint_angles_of_strokes(scene, strokes[0]), (1200, 1)) + random.normal(0.0, 1.7e-4, strokes.shape)
+    joints[600:, 2] = joints[600, 2]
+    path = tmp_path_factory.mktemp("session") / "bag"
+    stamps = START + STEP * np.arange(1200)
+    strokes = strokes + random.normal(0.0, 2e-5, strokes.shape)
+    write_session(path, stamps, strokes, joints, None, {"origin": "synthetic, a test"})
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(session, tmp_path_factory):
+    return replay(session, load_scene(), tmp_path_factory.mktemp("out"))
+
+
+def test_a_stuck_sensor_is_in_the_summary(result):
+    alarms = result.summary["alarms"]
+    assert [alarm["from_s"] for alarm in alarms] == sorted(alarm["from_s"] for alarm in alarms)
+    stuck = next(alarm for alarm in alarms if alarm["channel"] == "joint_3" and alarm["kind"] == "stuck")
+    assert stuck.keys() == {"channel", "kind", "from_s", "to_s", "cause", "told", "ranked"}
+    assert stuck["cause"] == "joint_3.sensor" and stuck["to_s"] is None and 2.9 < stuck["from_s"] < 4.0
+    assert alarm_as_text(stuck) == f"joint_3, {stuck['from_s']:.2f} s to the end: {stuck['told']}"
+
+
+def test_every_alarm_is_there_once(result):
+    alarms = result.recording.alarms()
+    assert len({(alarm.channel, alarm.since) for alarm in alarms}) == len(alarms)
+    assert len(result.recording.health) >= 5
+
+
+def test_the_result_bag_tells_of_the_alarm(result, tmp_path):
+    folder = result.session.path
+    again = replay(folder, load_scene(), tmp_path)
+    assert again.summary["output_sha256"] == result.summary["output_sha256"]
+    topics = load_topics().outputs
+    wanted = {topics[key].absolute: topics[key].type for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)}
+    found = list(read(scan(tmp_path / "bag"), wanted))
+    told = [message for name, _, message in found if name == topics[Output.HEALTH].absolute]
+    assert len(told) == len(result.recording.health) == len(found) - len(told)
+    assert "joint_3" in {status.name for status in told[-1].status}
+
+
+def test_health_can_be_left_out(session, tmp_path):
+    summary = replay(session, load_scene(), tmp_path, health=False).summary
+    assert summary["alarms"] == []
+    found = scan(tmp_path / "bag").find(load_topics().outputs[Output.HEALTH].absolute)
+    assert found is None or found.count == 0
+
+
+def test_a_baseline_that_is_none(session, tmp_path):
+    (tmp_path / "baseline.yaml").write_text("angle_error: -1.0\n")
+    with pytest.raises(UsageError, match=r"baseline\.yaml.*angle_error"):
+        replay(session, load_scene(), tmp_path / "out", baseline=tmp_path / "baseline.yaml")

@@ -1,0 +1,64 @@
+"""Alarms of the rig's health on /diagnostics: told, kept after their end, let go when acknowledged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from boom_twin.records import Alarm, Health
+from boom_twin.thresholds import Thresholds
+from boom_twin.watch.health import HealthWatch
+from boom_twin.watch.status import Level, Status
+
+SECOND = 1_000_000_000
+BIAS = Alarm("joint_3", "bias", 15 * SECOND, None, "joint_3.sensor", "joint_3.sensor bias: +0.0035 rad")
+OPEN = Alarm("joint_1", "residual", 16 * SECOND, None, None, "cannot be told apart: cylinder_1.k or joint_1.sensor")
+
+
+def health(second: int, *alarms: Alarm) -> Health:
+    return Health(second * SECOND, alarms, ("joint_1", "joint_3"), np.zeros(2), np.zeros(2))
+
+
+def status(watch: HealthWatch) -> Status:
+    return watch.status(Thresholds(), 0.0, 100.0)
+
+
+def test_without_alarms() -> None:
+    watch = HealthWatch()
+    watch.took(health(1))
+    assert (status(watch).level, status(watch).message) == (Level.OK, "no alarm")
+    assert not watch.has_news and watch.acknowledge() == "no alarm has ended"
+
+
+def test_the_worst_is_told_first() -> None:
+    watch = HealthWatch()
+    watch.took(health(17, OPEN, BIAS))
+    assert watch.has_news
+    found = status(watch)
+    assert found.level == Level.ERROR and found.message == f"joint_3: {BIAS.told}; joint_1: {OPEN.told}"
+    assert (found.values["alarms"], found.values["2 cause"], found.values["1 cause"]) == (2, "joint_3.sensor", "")
+    assert found.values["2 from_s"] == "15.000" and not watch.has_news
+    assert watch.of("joint_3") == BIAS and watch.of("joint_2") is None
+
+
+def test_an_alarm_that_ended_stays_until_it_is_acknowledged() -> None:
+    watch = HealthWatch()
+    watch.took(health(17, BIAS, OPEN))
+    assert watch.acknowledge() == "no alarm has ended" and status(watch).level == Level.ERROR
+    watch.took(health(20, replace(BIAS, until=19 * SECOND), OPEN))
+    watch.took(health(21, OPEN))
+    found = status(watch)
+    assert found.level == Level.WARN and "ended; not acknowledged" in found.message
+    assert (found.values["alarms"], found.values["not_acknowledged"]) == (1, 1)
+    assert watch.acknowledge() == f"joint_3: {BIAS.told}"
+    assert status(watch).message == f"joint_1: {OPEN.told}"
+    watch.took(health(22, replace(OPEN, told="cylinder_1.k is softer", cause="cylinder_1.k")))
+    assert status(watch).message == "joint_1: cylinder_1.k is softer" and status(watch).level == Level.ERROR
+
+
+def test_an_alarm_that_is_told_of_no_more_has_ended() -> None:
+    watch = HealthWatch()
+    watch.took(health(17, BIAS))
+    watch.took(health(18))
+    assert status(watch).values["1 to_s"] == "18.000" and watch.of("joint_3") is None
