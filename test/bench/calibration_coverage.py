@@ -1,7 +1,7 @@
 """How often the 95 % intervals of a calibration hold the truth: 30 sets of noise on one short motion of the virtual rig.
 
-Run ``python test/bench/calibration_coverage.py [SETS]``: about half an hour on an idle core. 84 % were measured (26 sets, two sections,
-30 s): intervals of short sessions are too narrow, see docs/calibrate.md.
+Run ``python test/bench/calibration_coverage.py [SETS]``: about half an hour on an idle core. 84 % were measured (26 sets, two
+sections, 30 s): intervals of short sessions are too narrow, see docs/calibrate.md.
 """
 
 from __future__ import annotations
