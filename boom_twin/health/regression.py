@@ -7,6 +7,8 @@ import numpy as np
 from ..records import Array
 
 GATE = 4.5  # deviations
+STRAYED = 5.0  # deviations of the prior
+LEAST = 1e-3  # of the prior's variance, what must have been learnt for that
 
 
 class Regression:
@@ -20,7 +22,19 @@ class Regression:
     """
 
     def __init__(self, mean: Array, covariance: Array) -> None:
-        self.mean, self.covariance = mean.copy(), covariance.copy()
+        self._prior = mean, covariance
+        self.restart()
+
+    def restart(self) -> None:
+        """Know no more than before anything was measured."""
+        self.mean, self.covariance = self._prior[0].copy(), self._prior[1].copy()
+
+    @property
+    def has_strayed(self) -> bool:
+        """Whether what was learnt bit by bit is, all together, more than healthy parameters may be off by."""
+        mean, covariance = self._prior
+        learnt = np.diag(covariance) - np.diag(self.covariance)
+        return bool(np.any((self.mean - mean) ** 2 > STRAYED**2 * np.maximum(learnt, LEAST * np.diag(covariance))))
 
     def take(self, white: Array, learn: bool) -> tuple[Array, float]:
         """Narrow by whitened innovations, shape (rows, 1 + parameters), what is known.

@@ -120,6 +120,9 @@ class ResidualWatch:
         if self.alarm is not None:
             return
         self._detector.take(self.surprise)
+        if self._regression.has_strayed:  # too slowly for the detector; now it will be told at once
+            self._regression.restart()
+            self._case = None
         if self._case is None and self._detector.suspicion > SUSPICIOUS:
             assert self._linear.epoch is not None
             start = problem.start + SKIPPED * BLOCK
