@@ -49,7 +49,7 @@ def test_a_lasting_deviation_is_found_in_its_time():
         assert detector.levels.max() < 1.0
         blocks = 0
         while detector.levels.max() < 1.0:
-            detector.take(rng.normal(size=3) + [0.0, sign * 3.0, 0.0])
+            detector.take(rng.normal(size=3) + np.array([0.0, sign * 3.0, 0.0]))
             blocks += 1
         assert np.argmax(detector.levels) == 1
         assert blocks == pytest.approx(detector.threshold / (3.0 - ALLOWANCE), abs=5)
