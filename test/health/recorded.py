@@ -21,7 +21,7 @@ TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: 
 
 
 @lru_cache
-def session(seconds: float = 20.0) -> tuple[Sample, ...]:
+def session(seconds: float = 12.0) -> tuple[Sample, ...]:
     """Its samples."""
     streams, found = {stream.value: stream for stream in TYPES}, []
     wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
@@ -72,7 +72,7 @@ def run(samples: Iterable[Sample], settings: Settings | None = None, baseline: B
     return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
 
 
-def spoilt(samples, stream: Stream, channel: int, change, onset: float = 8.0) -> list[Sample]:
+def spoilt(samples, stream: Stream, channel: int, change, onset: float = 6.0) -> list[Sample]:
     """`change` (value, s since the onset) on one channel from the onset (s) on."""
     start, found = samples[0].stamp, []
     for sample in samples:
