@@ -69,7 +69,7 @@ def test_innovations_of_angles_are_white(left):
     assert np.abs((angles[1:] * angles[:-1]).mean(axis=0)).max() < 0.2
 
 
-@pytest.mark.xfail(strict=True, reason="variance 1.8 and 1.6, correlation 0.30 and -0.16 after a baseline of three sessions of 40 s")
+@pytest.mark.xfail(strict=True, reason="variance 1.8 and 1.6, correlation 0.30 and -0.16 after two minutes")
 def test_innovations_of_the_imu_are_white(left):
     force = left[:, 4:]
     assert force.var(axis=0).max() < 1.5
@@ -88,7 +88,8 @@ def test_a_softer_cylinder(baseline, seed):
     told = outcome.told()
     assert told and told[0][0] < 10.0, "within 10 s"
     assert outcome.causes() <= {"cylinder_2.k"}, "named, or open; never another"
-    assert outcome.states()[-1][1].cause == "cylinder_2.k"
+    last = outcome.states()[-1][1]
+    assert last.cause in ("cylinder_2.k", None) and last.ranked[0].cause == "cylinder_2.k"
     assert 1.0 / (1.0 + estimate(outcome, "cylinder_2.k")) == pytest.approx(0.7, rel=0.1)
 
 
