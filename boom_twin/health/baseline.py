@@ -55,7 +55,7 @@ class Baseline(BaseModel):
         Raises
         ------
         UsageError
-            It was learnt on another boom.
+            It was learnt on another boom, or mean and covariance are none of its names.
         """
         place = {each.name: i for i, each in enumerate(known)}
         if strange := [name for name in self.names if name not in place]:
@@ -67,8 +67,17 @@ class Baseline(BaseModel):
         at = [place[name] for name in self.names]
         mean[at] = self.mean
         if at:
-            covariance[np.ix_(at, at)] = self.covariance
+            covariance[np.ix_(at, at)] = self._checked_covariance()
         return mean, covariance
+
+    def _checked_covariance(self) -> Array:
+        """The covariance, if it is one."""
+        covariance = np.array(self.covariance)
+        scale = np.sqrt(np.abs(np.diag(covariance))) + 1e-300
+        scaled = covariance / np.outer(scale, scale)
+        if np.abs(scaled - scaled.T).max() > 1e-6 or np.linalg.eigvalsh(scaled).min() < -1e-6:
+            raise UsageError("baseline: covariance must be symmetric and without negative variances. Learn it anew.")
+        return covariance
 
 
 def load_baseline(path: Path | None = None) -> Baseline:

@@ -92,7 +92,10 @@ class Judge:
     def _judge(self, block: Block) -> list[Alarm]:
         n, start = self._n, block.number * BLOCK
         stamps, raw, left = stacked(block.angles, n)
+        before = self._angle_watch.masked
         news = self._angle_watch.take(self._angles.look(stamps, raw, raw - left, block.end * NANO), start, block.end)
+        if (self._angle_watch.masked & ~before).any():
+            self.residuals.forget()
         stroke_stamps = np.array([prediction.stamp for prediction in block.predictions]) * NANO
         readings = np.array(block.strokes)
         strokes = self._strokes.look(stroke_stamps, readings, np.zeros_like(readings), block.end * NANO)

@@ -155,6 +155,12 @@ class ResidualWatch:
         verdict = self._case.explain()
         return self.close(start) if self._case.has_ended(verdict) else self._told(verdict)
 
+    def forget(self) -> None:
+        """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
+        if self.alarm is None:
+            self._case = None
+            self._detector.reset()
+
     def close(self, stamp: int) -> Alarm | None:
         """End the alarm, if there is one."""
         if self.alarm is None:

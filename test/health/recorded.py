@@ -1,0 +1,85 @@
+"""The bundled session, synthetic by construction, with faults put on its readings by the test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.health.baseline import Baseline
+from boom_twin.io.reader import read, scan
+from boom_twin.records import Alarm, Health, Report
+from boom_twin.settings import Settings
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+NANO = 1e-9
+TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: "Imu"}
+
+
+@lru_cache
+def session(seconds: float = 12.0) -> tuple[Sample, ...]:
+    """Its samples."""
+    streams, found = {stream.value: stream for stream in TYPES}, []
+    wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
+    for topic, _, msg in read(scan(SESSION), wanted):
+        stream = streams[topic.lstrip("/")]
+        stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
+        if found and (stamp - found[0].stamp) * NANO > seconds:
+            break
+        force = getattr(msg, "linear_acceleration", None)
+        values = np.array(msg.position) if force is None else np.array([force.x, force.z])
+        found.append(Sample(stream, stamp, values))
+    return tuple(found)
+
+
+class Outcome(NamedTuple):
+    """What a twin told of a session; times in s since its first sample."""
+
+    twin: Twin
+    reports: list[Report]
+    health: list[Health]
+    start: int
+
+    def states(self) -> list[tuple[float, Alarm]]:
+        """Every alarm at every stamp at which it was told."""
+        return [((health.stamp - self.start) * NANO, alarm) for health in self.health for alarm in health.alarms]
+
+    def told(self) -> list[tuple[float, str, str, str | None]]:
+        """Channel, kind and cause of every alarm when it was first told so."""
+        found: dict[tuple[str, int, str, str | None], float] = {}
+        for time, alarm in self.states():
+            found.setdefault((alarm.channel, alarm.since, alarm.kind, alarm.cause), time)
+        return [(time, channel, kind, cause) for (channel, _, kind, cause), time in found.items()]
+
+    def causes(self) -> set[str]:
+        """Everything that was ever named."""
+        return {alarm.cause for _, alarm in self.states() if alarm.cause is not None}
+
+    def tips(self) -> np.ndarray:
+        """Predicted tips, shape (k, 2)."""
+        return np.array([report.prediction.tip_position for report in self.reports if report.prediction is not None])
+
+
+def run(samples: Iterable[Sample], settings: Settings | None = None, baseline: Baseline | None = None, twin=None) -> Outcome:
+    """A twin of the default boom takes them all."""
+    samples = list(samples)
+    twin = twin or Twin(load_scene(), settings, baseline=baseline or Baseline())
+    reports = [twin.update(sample) for sample in samples]
+    return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
+
+
+def spoilt(samples, stream: Stream, channel: int, change, onset: float = 6.0) -> list[Sample]:
+    """`change` (value, s since the onset) on one channel from the onset (s) on."""
+    start, found = samples[0].stamp, []
+    for sample in samples:
+        time = (sample.stamp - start) * NANO - onset
+        if sample.stream is stream and time >= 0.0:
+            values = sample.values.copy()
+            values[channel] = change(values[channel], time)
+            sample = Sample(stream, sample.stamp, values)
+        found.append(sample)
+    return found

@@ -1,0 +1,87 @@
+"""Alarms of single sensors: begun, masked while they last, ended."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from boom_twin.health.sensor_watch import SETTLED, TOLD, SensorWatch
+from boom_twin.health.sensors import Findings
+
+BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
+
+
+def findings(channel: int | None = None, kind: str = "", jump: float = 0.0) -> Findings:
+    flags = {each: np.zeros(2, dtype=bool) for each in TOLD}
+    jumped = np.zeros(2)
+    if kind == "jump":
+        jumped[channel] = jump
+    elif kind:
+        flags[kind][channel] = True
+    return Findings(flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"])
+
+
+class Watched:
+    """Takes block after block."""
+
+    def __init__(self) -> None:
+        self.watch, self.block = SensorWatch(NAMES), 0
+
+    def take(self, found: Findings):
+        self.block += 1
+        return self.watch.take(found, (self.block - 1) * BLOCK, self.block * BLOCK)
+
+    def rest(self, time: int):
+        return [alarm for _ in range(time // BLOCK) for alarm in self.take(findings())]
+
+
+def test_kinds_are_those_of_findings():
+    assert set(findings().by_kind()) == set(TOLD)
+
+
+def test_begins_once_lasts_and_ends():
+    for kind in ("stuck", "noise", "dropout", "range"):
+        watched = Watched()
+        assert watched.take(findings()) == [] and watched.watch.alarms == ()
+        (began,) = watched.take(findings(1, kind))
+        assert (began.channel, began.kind, began.cause) == ("joint_2", kind, "joint_2.sensor")
+        assert (began.since, began.until) == (BLOCK, None) and TOLD[kind] in began.told
+        assert watched.watch.masked.tolist() == [False, True]
+        assert [alarm for _ in range(30) for alarm in watched.take(findings(1, kind))] == []
+        assert watched.watch.alarms == (began,)
+        assert watched.rest(SETTLED) == [] and watched.watch.masked[1]
+        (ended,) = watched.rest(BLOCK)
+        assert ended.until == 32 * BLOCK and (ended.channel, ended.since) == ("joint_2", BLOCK)
+        assert watched.watch.alarms == () and not watched.watch.masked.any()
+
+
+def test_spikes_do_not_mask():
+    """Outliers are left out of means as they are."""
+    watched = Watched()
+    watched.take(findings(0, "spikes"))
+    assert len(watched.watch.alarms) == 1 and not watched.watch.masked.any()
+
+
+def test_a_jump_lasts_until_it_jumps_back():
+    watched = Watched()
+    (began,) = watched.take(findings(0, "jump", 0.01))
+    assert "+0.01" in began.told and watched.watch.masked.tolist() == [True, False]
+    assert watched.rest(5 * SETTLED) == [] and watched.watch.masked[0]
+    assert watched.take(findings(0, "jump", 0.02)) == [], "further away"
+    watched.rest(SETTLED)
+    (ended,) = watched.take(findings(0, "jump", -0.0099))
+    assert ended.until == watched.block * BLOCK and watched.watch.alarms == ()
+
+
+def test_jumps_of_a_wild_sensor_mean_nothing_more():
+    for kind in ("noise", "spikes"):
+        watched = Watched()
+        watched.take(findings(0, kind))
+        assert watched.take(findings(0, "jump", 0.01)) == []
+        assert [alarm.channel for alarm in watched.take(findings(1, "jump", 0.01))] == ["joint_2"]
+
+
+def test_two_faults_of_one_sensor():
+    watched = Watched()
+    watched.take(findings(0, "range"))
+    watched.take(findings(0, "noise"))
+    assert {alarm.kind for alarm in watched.watch.alarms} == {"range", "noise"}

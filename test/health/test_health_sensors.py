@@ -1,0 +1,183 @@
+"""What gives a single sensor away: each fault found in its time, nothing found on clean readings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin.health.sensors import SensorCheck, repeats
+
+SIGMA, RESOLUTION, PERIOD, ROWS = 1.745e-4, 8.727e-5, 0.005, 20
+LOW, HIGH = np.full(4, -1.0), np.full(4, 1.0)
+
+
+class Stream:
+    """Blocks of 0.1 s of four channels: a slow motion, noise, rounding, then what the test does to them."""
+
+    def __init__(self, seed: int, sigma: float = SIGMA, resolution: float = RESOLUTION, fastest: float = 0.0) -> None:
+        self.rng, self.sigma, self.resolution, self.block = np.random.default_rng(seed), sigma, resolution, 0
+        self.check = SensorCheck(SIGMA, RESOLUTION, LOW, HIGH, fastest)
+
+    def look(self, change=lambda times, raw: raw, motion=lambda times: 0.2 * np.sin(0.5 * times), kept=slice(None)):
+        stamps = (self.block * ROWS + np.arange(ROWS)) * PERIOD
+        expected = np.tile(motion(stamps)[:, None], (1, 4))
+        read = expected + self.rng.normal(0.0, self.sigma, expected.shape)
+        raw = change(stamps, np.round(read / self.resolution) * self.resolution if self.resolution else read)
+        self.block += 1
+        return self.check.look(stamps[kept], raw[kept], expected[kept], self.block * ROWS * PERIOD)
+
+    def found(self, blocks: int, **options) -> dict[tuple[str, int], float]:
+        """First time (s from now) of every kind and channel."""
+        found: dict[tuple[str, int], float] = {}
+        for k in range(blocks):
+            for kind, flags in self.look(**options).by_kind().items():
+                for channel in np.flatnonzero(flags).tolist():
+                    found.setdefault((kind, channel), (k + 1) * ROWS * PERIOD)
+        return found
+
+
+def only(found, kind, channel, within):
+    assert set(found) == {(kind, channel)}
+    assert found[kind, channel] <= within
+
+
+def started(seed: int, **options) -> Stream:
+    stream = Stream(seed, **options)
+    assert stream.found(20) == {}
+    return stream
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("fastest", [0.0, 0.5])
+def test_clean_readings_give_nothing(seed, fastest):
+    """10^5 readings of each of four channels in all."""
+    assert Stream(seed, fastest=fastest).found(1250) == {}
+
+
+def test_a_gaussian_without_rounding_gives_nothing():
+    assert Stream(11, resolution=0.0).found(500) == {}
+
+
+def test_noise_below_the_rounding_is_not_stuck():
+    """A rounded reading repeats while the boom rests; nothing of the stream is then alive."""
+    assert Stream(12, sigma=1e-7).found(300, motion=lambda times: 0.0 * times) == {}
+
+
+def test_stuck():
+    stream, last = started(1), []
+
+    def change(times, raw):
+        last.append(raw[0, 2])
+        raw[:, 2] = last[0]
+        return raw
+
+    only(stream.found(10, change=change), "stuck", 2, 1.0)
+
+
+def test_a_source_without_noise_is_not_stuck():
+    """Nobody can tell: the readings of a model at rest repeat, too."""
+    stream = Stream(2, sigma=0.0, resolution=0.0)
+    assert stream.found(300, motion=lambda times: np.full_like(times, 0.3)) == {}
+
+
+@pytest.mark.parametrize("times", [3.5, 5.0, 10.0])
+def test_noisy(times):
+    """Much noise looks like spikes and jumps, too; of this sensor alone."""
+
+    def change(_, raw):
+        raw[:, 1] += stream.rng.normal(0.0, times * SIGMA, ROWS)
+        return raw
+
+    stream = started(3)
+    found = stream.found(20, change=change)
+    assert found["noise", 1] <= 1.0 and {channel for _, channel in found} == {1}
+
+
+def test_a_little_more_noise_is_not_noisy():
+    quiet = started(4)
+    assert quiet.found(200, change=lambda times, raw: raw + quiet.rng.normal(0.0, SIGMA, raw.shape)) == {}
+
+
+@pytest.mark.parametrize("place", [0, 7, 18, 19])
+def test_a_spike_anywhere_in_a_block(place):
+    def change(times, raw):
+        if stream.block == 20:
+            raw[place, 3] += 0.02
+        return raw
+
+    stream = started(5)
+    only(stream.found(10, change=change), "spikes", 3, 0.2)
+
+
+@pytest.mark.parametrize("place", [0, 1, 10, 18, 19])
+def test_a_jump_anywhere_in_a_block(place):
+    def change(times, raw):
+        raw[times > (20 * ROWS + place - 0.5) * PERIOD, 0] += 0.01
+        return raw
+
+    stream = started(6)
+    sizes = [stream.look(change).jumped for _ in range(4)]
+    assert np.sum(sizes, axis=0) == pytest.approx([0.01, 0.0, 0.0, 0.0], abs=6.0 * SIGMA)
+    assert np.count_nonzero(sizes) == 1, "told once"
+
+
+def test_motion_of_the_model_is_no_jump():
+    """A step of measured and expected alike, and one of the expected alone, are the model's own."""
+    stream = started(7)
+    assert stream.found(10, motion=lambda times: np.where(times > 2.23, 0.3, 0.1)) == {}
+    stream = started(8)
+    found = stream.found(10, motion=lambda times: np.where(times > 2.23, 0.3, 0.1), change=lambda times, raw: raw * 0.0 + 0.1)
+    assert not any(kind == "jump" for kind, _ in found)
+
+
+def test_a_fast_move_of_a_drive_is_no_jump():
+    """Against its own bound, where there is no model: 0.3 m/s passes, 5 mm between two readings do not."""
+    stream = Stream(9, fastest=0.5)
+
+    def look(change):
+        return stream.look(change, motion=lambda times: 0.0 * times)
+
+    for _ in range(30):
+        findings = look(lambda times, raw: raw + 0.3 * np.clip(times - 1.0, 0.0, 1.0)[:, None])
+        assert not findings.jumped.any()
+    sizes = [look(lambda times, raw: raw + 0.3 + 0.005 * (times > 3.04)[:, None]).jumped for _ in range(3)]
+    assert np.sum(sizes, axis=0) == pytest.approx(np.full(4, 0.005), abs=6.0 * SIGMA)
+
+
+def test_dropout_of_one_channel():
+    def change(times, raw):
+        raw[:, 1] = np.nan
+        return raw
+
+    only(started(10).found(10, change=change), "dropout", 1, 0.6)
+
+
+def test_dropout_in_part():
+    def change(times, raw):
+        raw[stream.rng.random(ROWS) < 0.3, 1] = np.nan
+        return raw
+
+    stream = started(11)
+    only(stream.found(20, change=change), "dropout", 1, 1.5)
+
+
+def test_dropout_of_the_whole_stream():
+    found = started(12).found(10, kept=slice(0, 0))
+    assert set(found) == {("dropout", channel) for channel in range(4)}
+    assert max(found.values()) <= 0.7
+    assert set(Stream(1).found(10, kept=slice(0, 0))) == set(), "a stream that never began is not there"
+
+
+def test_range():
+    stream = Stream(13)
+    found = stream.found(5, change=lambda times, raw: raw + np.array([0.0, 0.0, 1.5, 0.0]))
+    only(found, "range", 2, 0.1)
+
+
+def test_patience_follows_from_rounding_over_noise():
+    assert repeats(SIGMA, 0.0) == 3
+    assert repeats(SIGMA, RESOLUTION) < repeats(0.5 * SIGMA, RESOLUTION) < repeats(0.1 * SIGMA, RESOLUTION) <= 1_000_000
+    rng = np.random.default_rng(1)
+    read = np.round(rng.normal(0.0, SIGMA, 10**6) / RESOLUTION)
+    change = np.flatnonzero(np.diff(read))
+    assert np.diff(change).max() < repeats(SIGMA, RESOLUTION), "the longest run of a million clean readings is shorter"

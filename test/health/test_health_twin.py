@@ -1,0 +1,186 @@
+"""The twin's health, end to end: the bundled session with faults of single sensors put on it."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from health.recorded import NANO, Outcome, run, session, spoilt
+
+from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin.health.baseline import Baseline
+
+DEGREE, ONSET = math.radians(1.0), 6.0
+JOINTS = range(4)
+
+
+@lru_cache
+def healthy() -> Outcome:
+    return run(session())
+
+
+@lru_cache
+def faulty(stream: Stream, kind: str, channel: int, onset: float = ONSET) -> Outcome:
+    rng, last = np.random.default_rng(channel), {}
+    change = {
+        "bias": lambda v, t: v + (0.2 * DEGREE if stream is Stream.ANGLES else 2e-3),
+        "stuck": lambda v, t: last.setdefault("reading", v),
+        "dropout": lambda v, t: np.nan,
+        "spikes": lambda v, t: v + (2.0 * DEGREE if stream is Stream.ANGLES else 0.02) * (rng.random() < 0.02),
+        "noise": lambda v, t: v + rng.normal(0.0, 10.0 * Settings().angle_sigma),
+    }[kind]
+    return run(spoilt(session(), stream, channel, change, onset))
+
+
+def with_others_slow(kinds):
+    """Each kind on one joint at once, on the others in the long run."""
+    return [
+        pytest.param(kind, channel, marks=[] if channel == k % 4 else pytest.mark.slow)
+        for k, kind in enumerate(kinds)
+        for channel in JOINTS
+    ]
+
+
+def first_after(outcome: Outcome, onset: float) -> float:
+    told = outcome.told()
+    assert told and told[0][0] >= onset, "nothing before the fault"
+    return told[0][0] - onset
+
+
+ANGLE_KINDS = {"bias": 5.0, "stuck": 1.0, "dropout": 1.0, "spikes": 1.0, "noise": 1.0}
+
+
+@pytest.mark.parametrize("kind, channel", with_others_slow(ANGLE_KINDS))
+def test_an_angle_sensor(kind, channel):
+    """Found in time, that sensor named and no other; what the twin predicts is the same, bit for bit."""
+    outcome = faulty(Stream.ANGLES, kind, channel)
+    assert first_after(outcome, ONSET) <= ANGLE_KINDS[kind]
+    assert outcome.causes() == {f"joint_{channel + 1}.sensor"}
+    assert {alarm.channel for _, alarm in outcome.states()} == {f"joint_{channel + 1}"}
+    assert outcome.tips().tobytes() == healthy().tips().tobytes()
+
+
+@pytest.mark.parametrize("channel", [0, *(pytest.param(i, marks=pytest.mark.slow) for i in (1, 2, 3))])
+def test_an_angle_sensor_that_was_never_right(channel):
+    """A bias from the start may be a softer cylinder as well; it is told within 5 s, and no wrong name is."""
+    outcome = faulty(Stream.ANGLES, "bias", channel, 0.0)
+    assert first_after(outcome, 0.0) <= 5.0
+    assert outcome.causes() <= {f"joint_{channel + 1}.sensor"}
+
+
+@pytest.mark.parametrize("kind, channel", with_others_slow(["bias", "stuck", "dropout", "spikes"]))
+def test_a_stroke_sensor(kind, channel):
+    """Named, or the cause stays open; never another. Single spikes and silence are told within 1 s."""
+    outcome = faulty(Stream.STROKES, kind, channel)
+    assert outcome.causes() <= {f"cylinder_{channel + 1}.sensor"}
+    if kind != "stuck":
+        assert first_after(outcome, ONSET) <= {"bias": 5.0, "spikes": 1.0, "dropout": 1.0}[kind]
+
+
+@pytest.mark.parametrize("channel", [1, *(pytest.param(i, marks=pytest.mark.slow) for i in (0, 2, 3))])
+def test_spikes_of_a_stroke_do_not_move_the_tip(channel):
+    outcome = faulty(Stream.STROKES, "spikes", channel)
+    moved = np.linalg.norm(outcome.tips() - healthy().tips(), axis=1)
+    assert 0.0 < moved.max() < 1e-3
+    assert outcome.twin.counts["implausible"] > 10
+
+
+def test_healthy_sessions_give_no_alarm():
+    assert healthy().states() == []
+    assert len(healthy().health) >= 10, "one a second"
+    assert all((health.levels < 1.0).all() for health in healthy().health)
+    assert np.all(healthy().health[-1].tip_sigmas > 1e-5) and np.all(healthy().health[-1].tip_sigmas < 0.05)
+
+
+def test_innovations_of_a_right_model_are_white():
+    """The bundled session with nothing learnt: model errors that could be there are not, so their variance is below 1."""
+    twin, found = Twin(load_scene(), baseline=Baseline()), []
+    for sample in session(60.0):
+        twin.update(sample)
+        if not found or twin.judge.residuals.surprise is not found[-1]:
+            found.append(twin.judge.residuals.surprise)
+    left = np.array([row for row in found if np.isfinite(row).all()])
+    assert len(left) > 590
+    assert np.abs(left.mean(axis=0)).max() < 4.0 / math.sqrt(len(left))
+    assert left.var(axis=0).min() > 0.25 and left.var(axis=0).max() < 1.15
+    assert np.abs((left[1:] * left[:-1]).mean(axis=0)).max() < 4.0 / math.sqrt(len(left))
+    assert np.abs(left).max() < 4.5
+
+
+def told(outcome: Outcome):
+    return [(health.stamp, health.alarms, health.levels.tobytes(), health.tip_sigmas.tobytes()) for health in outcome.health]
+
+
+def test_twice_is_the_same():
+    samples = spoilt(session(), Stream.ANGLES, 1, lambda v, t: v + 0.02 * DEGREE * t)
+    assert told(run(samples)) == told(run(samples))
+
+
+def test_the_order_of_arrival_does_not_matter():
+    """Angles that come 60 ms late, each in its own order: the same is told, at most a block later."""
+    samples = spoilt(session(), Stream.ANGLES, 2, lambda v, t: v + 0.2 * DEGREE, 6.0)
+    late = {Stream.STROKES: 0, Stream.ANGLES: 60_000_000, Stream.IMU: 35_000_000}
+    shifted = sorted(samples, key=lambda sample: sample.stamp + late[sample.stream])
+    assert [sample.stamp for sample in shifted] != [sample.stamp for sample in samples]
+    one, other = run(samples), run(shifted)
+    assert one.told() == other.told() and one.told()
+    assert [health.levels.tobytes() for health in one.health] == [health.levels.tobytes() for health in other.health]
+
+
+def test_a_twin_without_a_baseline_tells_nothing():
+    twin = Twin(load_scene())
+    outcome = run(session(3.0), twin=twin)
+    assert outcome.health == [] and twin.judge is None
+    assert outcome.tips().tobytes() == healthy().tips()[: len(outcome.tips())].tobytes()
+
+
+def test_another_load_is_asked_for():
+    """40 kg that are not there: an alarm; taken back, it is over and all is well again."""
+    samples, start = session(18.0), session()[0].stamp
+    twin, alarms = Twin(load_scene(), baseline=Baseline()), []
+    for sample in samples:
+        time = (sample.stamp - start) * NANO
+        if sample.stream is Stream.STROKES and abs(time - 5.0) < 0.0025:
+            twin.requests.tune({"payload": 40.0})
+        if sample.stream is Stream.STROKES and abs(time - 12.0) < 0.0025:
+            twin.requests.tune({"payload": -1.0})
+        health = twin.update(sample).health
+        alarms += [] if health is None else [(time, alarm) for alarm in health.alarms]
+    assert twin.counts["load"] == 2
+    times = [time for time, _ in alarms]
+    assert 5.0 < min(times) < 11.0 and max(times) < 13.0
+    assert {alarm.cause for _, alarm in alarms} <= {None, "tip.payload"}
+
+
+def test_after_a_gap_it_begins_anew():
+    """6 s of silence: started again from rest, without an alarm of its own; later faults are found."""
+    samples = spoilt(session(18.0), Stream.ANGLES, 0, lambda v, t: v + 0.2 * DEGREE, 15.0)
+    start = samples[0].stamp
+    kept = [sample for sample in samples if not 5.0 < (sample.stamp - start) * NANO < 11.0]
+    outcome = run(kept)
+    assert outcome.twin.counts["restart"] == 1
+    assert first_after(outcome, 15.0) <= 5.0 and outcome.causes() == {"joint_1.sensor"}
+
+
+def test_without_an_imu():
+    """Angles alone tell a sensor that jumps; the IMU's channels are silent."""
+    samples = [s for s in faulty_samples() if s.stream is not Stream.IMU]
+    outcome = run(samples)
+    assert outcome.causes() == {"joint_2.sensor"}
+    assert not np.isfinite(outcome.twin.judge.residuals.surprise[-2:]).any()
+
+
+def faulty_samples() -> list[Sample]:
+    return spoilt(session(), Stream.ANGLES, 1, lambda v, t: v + 0.2 * DEGREE, 6.0)
+
+
+def test_an_alarm_ends_with_its_fault():
+    """The bias goes after 3 s: its alarm ends, and nothing else is told."""
+    samples = spoilt(session(18.0), Stream.ANGLES, 1, lambda v, t: v + 0.2 * DEGREE * (t < 3.0), 6.0)
+    outcome = run(samples)
+    assert outcome.causes() == {"joint_2.sensor"}
+    assert any(alarm.until is not None for _, alarm in outcome.states())
+    assert outcome.health[-1].alarms == ()
+

@@ -1,0 +1,231 @@
+"""The whitening filter against data simulated from its own model, dense Gaussians, and matrix exponentials."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from health.gaussian import covariance_of, is_white, log_density
+from scipy.linalg import expm
+
+from boom_twin import load_scene
+from boom_twin.analysis.frequencies import joint_increments
+from boom_twin.analysis.noise import stroke_noise
+from boom_twin.analysis.statics import settle
+from boom_twin.health.reading import Reading
+from boom_twin.health.whitening import HIGHEST, KEEPS_STEP, REACH, REST, SHAPE, Modes, Whitening, modes_of, oscillation
+from boom_twin.mounting import Mounting
+from boom_twin.plan.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.settings import Settings
+
+BLOCK, CHANNELS, DETUNING = 0.1, 3, 0.02
+ERRORS2 = np.array([0.5, 1.0, 2.0]) ** 2
+
+
+@pytest.mark.parametrize("omega, decay", [(3.0, 0.0), (3.0, 0.4), (40.0, 1.0), (2.0, 4.0), (2.0, 9.0), (1e-3, 1e-4)])
+def test_oscillation_is_a_matrix_exponential(omega, decay):
+    generator = np.array([[0.0, 1.0], [-omega * omega, -decay]])
+    assert oscillation(omega, decay, BLOCK) == pytest.approx(expm(BLOCK * generator), abs=1e-12)
+
+
+# -- modes of a boom ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def boom():
+    scene, settings = load_scene(), Settings()
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes_of_posture(scene, "arch"), posture_angles(scene, "arch"))
+    noise = stroke_noise(plan, state, work, settings.stroke_variance, 0.005, settings.jerk_density)
+    reading = Reading(plan, Mounting(plan, 0.0, (None,) * plan.joints))
+    return noise, plan, state, work, reading, BLOCK
+
+
+def test_stroke_noise_keeps_its_own_covariance(boom):
+    modes = modes_of(*boom, None)
+    assert len(modes.frequencies) >= 2 and modes.frequencies.max() < HIGHEST
+    assert modes.turn @ modes.rest @ modes.turn.T + modes.least == pytest.approx(modes.rest, rel=1e-9, abs=1e-20)
+    assert np.linalg.eigvalsh(modes.least).min() > 0.0
+    kept = [mode.frequency < HIGHEST for mode in boom[0].modes]
+    assert np.diag(modes.rest)[::2] == pytest.approx(boom[0].collected[kept])
+
+
+def test_what_angles_read_of_modes(boom):
+    """The mode's own increments of the joints, averaged over a block; velocities are not read."""
+    noise, plan, state, work, *_ = boom
+    modes = modes_of(*boom, None)
+    for k, frequency in enumerate(modes.frequencies):
+        x = math.pi * frequency * BLOCK
+        wanted = math.sin(x) / x * joint_increments(plan, state, work, noise.modes[k])
+        assert modes.shown[:4, 2 * k] == pytest.approx(wanted, rel=1e-4, abs=1e-9)
+    assert not modes.shown[:, 1::2].any()
+
+
+def test_wrong_frequencies_shake_by_the_predicted_vibration(boom):
+    """Density detuning^2 omega^4 A^2, A^2 of the coordinate whose acceleration gives the tip 1 (m/s^2)^2: in the limit, h S."""
+    noise, plan, state, work, reading, _ = boom
+    short, tip = 1e-6, plan.tables.tip
+    modes = modes_of(noise, plan, state, work, reading, short, None)
+    for k in range(len(modes.frequencies)):
+        swing2 = float((noise.modes[k].motion[tip : tip + 2] ** 2).sum())
+        assert modes.driven[2 * k + 1, 2 * k + 1] == pytest.approx(KEEPS_STEP * short / swing2)
+
+
+def test_modes_keep_their_signs(boom):
+    """A mode's shape comes with any sign; that of the modes before is kept, so that coordinates go on."""
+    before, noise = modes_of(*boom, None), boom[0]
+    flipped = tuple(replace(m, increments=-m.increments, motion=-m.motion) for m in noise.modes)
+    other = (replace(noise, modes=flipped), *boom[1:])
+    assert modes_of(*other, None).shown == pytest.approx(-before.shown, rel=1e-6, abs=1e-12)
+    again = modes_of(*other, before)
+    assert again.shown == pytest.approx(before.shown, rel=1e-6, abs=1e-12)
+    tables = np.random.default_rng(1).normal(0.0, 1e-4, (20, 6, 1))
+    one, two = (filtered(Whitening(6, 1, BLOCK, 0.01), [before, each], tables) for each in (before, again))
+    assert one == pytest.approx(two, rel=1e-6)
+
+
+def filtered(whitening: Whitening, modes, tables):
+    """Innovations of all tables, the modes changed in the middle."""
+    size, found = tables.shape[1], []
+    whitening.tune(modes[0])
+    for k, table in enumerate(tables):
+        if k == len(tables) // 2:
+            whitening.tune(modes[1])
+        found.append(whitening.step(table, 1e-10 * np.eye(size), np.full(size, 1e-9), 0.1, 0.0).white)
+    return np.array(found)
+
+
+# -- the filter on made-up modes -----------------------------------------------------------------------------------------
+
+
+def made(*frequencies: float) -> Modes:
+    """Modes that three channels read, of unit variance at rest."""
+    size, rng = len(frequencies), np.random.default_rng(9)
+    turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
+    for k, frequency in enumerate(frequencies):
+        omega, at = 2.0 * math.pi * frequency, slice(2 * k, 2 * k + 2)
+        turn[at, at] = own = oscillation(omega, 0.3, BLOCK)
+        rest[at, at] = np.diag([1.0, omega**2])
+        least[at, at] = rest[at, at] - own @ rest[at, at] @ own.T
+        driven[at, at] = 100.0 * np.array([[BLOCK**3 / 3.0, BLOCK**2 / 2.0], [BLOCK**2 / 2.0, BLOCK]])
+    shown = np.zeros((CHANNELS, 2 * size))
+    shown[:, ::2] = rng.normal(size=(CHANNELS, size))
+    return Modes(np.array(frequencies), turn, least, driven, rest, shown, rng.uniform(1.0, 2.0, CHANNELS))
+
+
+class Source:
+    """The very model of the filter."""
+
+    def __init__(self, modes: Modes, seed: int, travel: float, shaking: float) -> None:
+        self.modes, self.rng, self.travel, self.shaking = modes, np.random.default_rng(seed), travel, shaking
+        self.noise = covariance_of(np.random.default_rng(8), CHANNELS, 0.7)
+        self.kept = math.exp(-(travel + REST * BLOCK) / REACH)
+        self.driven = modes.least + shaking * DETUNING**2 * modes.driven
+        self.own = self.noise + np.diag(shaking * SHAPE**2 * DETUNING**2 * modes.shaken)
+
+    def rows(self, count: int) -> np.ndarray:
+        """Means of the channels, shape (count, CHANNELS)."""
+        draw = self.rng.multivariate_normal
+        eta = draw(np.zeros(len(self.driven)), self.modes.rest)
+        error, found = draw(np.zeros(CHANNELS), np.diag(ERRORS2)), []
+        for k in range(count):
+            eta = self.modes.turn @ eta + draw(np.zeros(len(eta)), self.driven)
+            if k:
+                error = self.kept * error + math.sqrt(1.0 - self.kept**2) * draw(np.zeros(CHANNELS), np.diag(ERRORS2))
+            found.append(self.modes.shown @ eta + error + draw(np.zeros(CHANNELS), self.own))
+        return np.array(found)
+
+    def covariance(self, count: int) -> np.ndarray:
+        """Of `rows`, all in one vector: from the variances and what carries over, without a filter."""
+        c, shown, turn = CHANNELS, self.modes.shown, self.modes.turn
+        found, spread = np.zeros((count * c, count * c)), self.modes.rest
+        for k in range(count):
+            spread = turn @ spread @ turn.T + self.driven
+            carried = spread
+            for later in range(k, count):
+                block = shown @ carried @ shown.T + self.kept ** (later - k) * np.diag(ERRORS2)
+                block = block + self.own if later == k else block
+                found[later * c : (later + 1) * c, k * c : (k + 1) * c] = block
+                found[k * c : (k + 1) * c, later * c : (later + 1) * c] = block.T
+                carried = turn @ carried
+        return found
+
+    def whitening(self, columns: int = 1) -> Whitening:
+        whitening = Whitening(CHANNELS, columns, BLOCK, DETUNING)
+        whitening.tune(self.modes)
+        return whitening
+
+    def innovations(self, whitening: Whitening, table: np.ndarray):
+        return whitening.step(table, self.noise, ERRORS2, self.shaking, self.travel)
+
+
+@pytest.mark.parametrize("travel, shaking", [(0.0, 0.0), (0.02, 0.0), (0.005, 30.0), (1.0, 3.0)])
+def test_innovations_are_white_and_of_unit_variance(travel, shaking):
+    source = Source(made(0.7, 2.3), 1, travel, shaking)
+    whitening = source.whitening()
+    white = [source.innovations(whitening, row[:, None]).white[:, 0] for row in source.rows(6000)]
+    is_white(np.array(white))
+
+
+@pytest.mark.parametrize("travel, shaking", [(0.0, 0.0), (0.02, 5.0)])
+def test_probability_is_that_of_all_rows_at_once(travel, shaking):
+    source = Source(made(0.7, 2.3), 2, travel, shaking)
+    whitening, rows = source.whitening(), source.rows(8)
+    log = sum(source.innovations(whitening, row[:, None]).log for row in rows)
+    assert log == pytest.approx(log_density(rows.ravel(), np.zeros(rows.size), source.covariance(8)), abs=1e-8)
+
+
+def test_signatures_are_filtered_as_residuals_are():
+    """A fault in the residuals adds its filtered signature to the innovations, whatever else they hold."""
+    source = Source(made(0.7), 3, 0.001, 1.0)
+    whitening, signature = source.whitening(4), np.random.default_rng(4).normal(size=(50, CHANNELS, 2))
+    for row, columns in zip(source.rows(50), signature, strict=True):
+        white = source.innovations(whitening, np.column_stack([row, columns, row + columns @ [2.0, -3.0]])).white
+        assert white[:, 3] == pytest.approx(white[:, 0] + white[:, 1:3] @ [2.0, -3.0], abs=1e-9)
+
+
+def test_channels_that_were_not_measured():
+    """They give no innovation; the others' are those of a joint density without them."""
+    source, lost = Source(made(0.7, 2.3), 5, 0.01, 1.0), {(1, 0), (2, 0), (2, 2), (4, 1), (3, 0), (3, 1), (3, 2)}
+    whitening, rows, log = source.whitening(), source.rows(6), 0.0
+    for k, row in enumerate(rows):
+        for channel in range(CHANNELS):
+            if (k, channel) in lost:
+                row[channel] = np.nan
+        found = source.innovations(whitening, row[:, None])
+        assert found.white.shape == (np.isfinite(row).sum(), 1)
+        log += found.log
+    there = np.isfinite(rows.ravel())
+    wanted = log_density(rows.ravel()[there], np.zeros(there.sum()), source.covariance(6)[np.ix_(there, there)])
+    assert log == pytest.approx(wanted, abs=1e-8)
+
+
+def test_a_mode_that_is_missing_for_a_while():
+    """Without the second mode the filter goes on, and with it again it is as unsure of it as at rest; still white."""
+    both, one = made(0.7, 2.3), made(0.7)
+    source = Source(both, 6, 0.0, 0.0)
+    whitening = source.whitening()
+    for row in source.rows(30):
+        source.innovations(whitening, row[:, None])
+    whitening.tune(one)
+    alone = Source(one, 7, 0.0, 0.0)
+    for row in alone.rows(200):
+        alone.innovations(whitening, row[:, None])
+    whitening.tune(both)
+    is_white(np.array([source.innovations(whitening, row[:, None]).white[:, 0] for row in source.rows(4000)]))
+
+
+def test_slow_errors_are_forgotten_by_travel():
+    """A constant is learnt at rest, and is new again after 10 times the reach."""
+    source = Source(made(0.7), 6, 0.0, 0.0)
+    whitening, table = source.whitening(), np.full((CHANNELS, 1), 5.0)
+    first = np.abs(source.innovations(whitening, table).white).max()
+    for _ in range(100):
+        last = np.abs(source.innovations(whitening, table).white).max()
+    assert last < 0.2 * first
+    moved = whitening.step(table, source.noise, ERRORS2, 0.0, 10.0 * REACH).white
+    assert np.abs(moved).max() > 0.5 * first

@@ -1,0 +1,89 @@
+"""Strokes that cannot be are kept from the model, those that can are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin.plausible import FAR, MOST, SILENT, Plausible
+from boom_twin.settings import Settings
+
+MS, SETTINGS = 1_000_000, Settings()
+LIMIT = FAR * SETTINGS.stroke_variance**0.5 + SETTINGS.stroke_rate * 0.005
+
+
+class Run:
+    """Readings every 5 ms; the estimate is the last that was taken, as the model's own nearly is."""
+
+    def __init__(self) -> None:
+        self.plausible, self.stamp = Plausible(), 0
+        self.take(0.3, 0.4)
+
+    def take(self, *values: float):
+        taken, events = self.plausible.of(self.stamp, np.array(values), SETTINGS)
+        estimate = taken if self.plausible.estimate is None else np.where(np.isnan(taken), self.plausible.estimate, taken)
+        self.plausible.estimate, self.stamp = estimate, self.stamp + 5 * MS
+        return taken.tolist(), events
+
+
+def same(found, *wanted):
+    return found == pytest.approx(list(wanted), nan_ok=True)
+
+
+def test_a_single_spike_is_left_out():
+    run = Run()
+    for size in (0.02, -0.02, 1.01 * LIMIT):
+        taken, events = run.take(0.3 + size, 0.4)
+        assert same(taken, np.nan, 0.4) and events == ["implausible"]
+        assert run.take(0.3, 0.4) == ([0.3, 0.4], [])
+
+
+def test_what_is_near_passes():
+    run = Run()
+    assert run.take(0.3 + 0.99 * LIMIT, 0.4)[1] == []
+
+
+def test_a_burst_is_left_out_and_then_believed():
+    run = Run()
+    for _ in range(MOST):
+        taken, events = run.take(0.35, 0.4)
+        assert same(taken, np.nan, 0.4) and events == ["implausible"]
+    assert run.take(0.35, 0.4) == ([0.35, 0.4], []), "so many readings that agree are the cylinder's place"
+    assert run.take(0.35, 0.4) == ([0.35, 0.4], [])
+
+
+def test_a_shorter_burst_leaves_no_trace():
+    run = Run()
+    for _ in range(3):
+        for _ in range(MOST):
+            assert run.take(0.35, 0.4)[1] == ["implausible"]
+        assert run.take(0.3, 0.4) == ([0.3, 0.4], [])
+
+
+def test_a_fast_move_passes():
+    run, stroke = Run(), 0.3
+    for _ in range(200):
+        stroke += 0.9 * SETTINGS.stroke_rate * 0.005
+        assert run.take(stroke, 0.4) == ([pytest.approx(stroke), 0.4], [])
+
+
+def test_a_pause_allows_as_much_as_it_is_long():
+    run = Run()
+    run.stamp += 1000 * MS
+    assert run.take(0.3 + SETTINGS.stroke_rate, 0.4)[1] == []
+
+
+def test_a_stroke_that_fell_silent_is_held():
+    run = Run()
+    for k in range(100):
+        taken, events = run.take(np.nan, 0.4)
+        late = (k + 1) * 5 * MS > SILENT
+        assert same(taken, 0.3 if late else np.nan, 0.4) and events == (["held"] if late else [])
+    assert run.take(0.3, 0.4) == ([0.3, 0.4], [])
+    assert same(run.take(np.nan, 0.4)[0], np.nan, 0.4), "silence counts anew"
+
+
+def test_the_others_of_a_sample_are_taken():
+    run = Run()
+    taken, events = run.take(0.9, np.nan)
+    assert same(taken, np.nan, np.nan) and events == ["implausible"]
