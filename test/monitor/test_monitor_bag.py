@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from monitor.conftest import read_all
 
-from boom_twin.errors import BagError
+from boom_twin.errors import BagError, UsageError
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.monitor.alarms import Alarm
 from boom_twin.monitor.bag import bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
@@ -53,6 +54,37 @@ def test_the_cause_is_named_from_when_it_shows(feed: Feed) -> None:
     assert state(feed.store, 14.0, 14.0)["level"] == "OK"
 
 
+def judged(feed: Feed) -> list[Alarm]:
+    return [alarm for alarm in feed.store.alarms.all if alarm.causes]
+
+
+def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, replayed: Path) -> None:
+    told = [each for each in json.loads((replayed / "summary.json").read_text())["alarms"] if each["kind"] != "gap"]
+    published = read_all(bag_feed(replayed / "bag", load_scene(), Settings()))
+    assert told
+    for alarms in (judged(feed), judged(published)):
+        for alarm, expected in zip(sorted(alarms, key=lambda alarm: alarm.begin), told, strict=True):
+            assert (alarm.name, alarm.reason) == (expected["channel"], expected["told"])
+            assert alarm.begin == pytest.approx(expected["from_s"], abs=2e-3)
+            assert alarm.end == (None if expected["to_s"] is None else pytest.approx(expected["to_s"], abs=2e-3))
+            assert alarm.level == (Level.WARN if expected["cause"] is None else Level.ERROR)
+            assert expected["cause"] in (None, alarm.causes[0][0])
+            if expected["ranked"]:
+                assert alarm.causes == tuple(
+                    (each["cause"], pytest.approx(each["probability"], rel=1e-3)) for each in expected["ranked"]
+                )
+    found = state(published.store, 20.0, 20.0)
+    assert (found["level"], found["reason"]) == ("ERROR", state(feed.store, 20.0, 20.0)["reason"])
+
+
+def test_the_baseline_is_that_which_is_given(faulty: Path, tmp_path: Path) -> None:
+    (tmp_path / "baseline.yaml").write_text("angle_error: 0.1\n")
+    feed = read_all(bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "baseline.yaml"))
+    assert not judged(feed)
+    with pytest.raises(UsageError, match="none"):
+        bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
+
+
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
     level, reason = overall(feed.store.board(14.0).groups(14.0))
     assert level == Level.OK
@@ -71,7 +103,7 @@ def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replaye
 
 def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -> None:
     published = read_all(bag_feed(replayed / "bag", load_scene(), Settings()))
-    for name in ("displacement", "position", "acceleration", "shape", "joints"):
+    for name in ("displacement", "position", "acceleration", "shape", "joints", "uncertainty"):
         rows = [each.store.tables[name].rows(0, 10**6) for each in (feed, published)]
         for ours, theirs in zip(*rows, strict=True):
             assert ours == pytest.approx(theirs), name
