@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from .health.baseline import Baseline
 from .health.learning import learn
@@ -21,17 +21,23 @@ def learn_baseline(
     sessions: Iterable[Iterable[Sample]],
     names: Sequence[str],
     mounts: Sequence[Mount | None] = (),
+    progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> Baseline:
     """What model and sensors are off by in `sessions`, called `names`, in which all was well.
+
+    `progress` is told the share done and what comes next.
 
     Raises
     ------
     UsageError
         Less than a minute of usable samples in all.
     """
-    problems = [_problems(scene, settings, session, mounts) for session in sessions]
+    problems: list[list[Problem]] = []
+    for name, session in zip(names, sessions, strict=True):
+        progress(0.3 * len(problems) / len(names), name)
+        problems.append(_problems(scene, settings, session, mounts))
     scene = loaded(scene, *settings.load)
-    return learn(problems, parameters(scene), len(scene.joints), names)
+    return learn(problems, parameters(scene), len(scene.joints), names, lambda share: progress(0.3 + 0.7 * share, "learning"))
 
 
 def _problems(scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]) -> list[Problem]:

@@ -132,7 +132,7 @@ def calibrate(
     settings, choice = settings or Settings(), choice or Choice()
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
-    mapped = _common_mapping(paths, Path(mapping) if mapping else None, joints)
+    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
     sessions = read_sessions(paths, mapped.topics, joints)
     imu = has_imu(sessions)
     names = choice.names or usual_names(scene, imu, choice.load, choice.damping, choice.stiffness, choice.zeros)
@@ -166,7 +166,8 @@ def _tell_pass(progress: Progress, number: int) -> None:
     progress(0.15 + 0.6 * (1.0 - 0.85**number), f"fit, pass {number}")
 
 
-def _common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
+def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
+    """The mapping that all sessions have, or the one at `mapping`; UsageError if theirs differ."""
     found = [mapping_of(path, mapping, joints) for path in paths]
     for path, each in zip(paths, found, strict=True):
         if each.topics != found[0].topics:

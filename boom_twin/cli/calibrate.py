@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
+from ..errors import UsageError
 from .common import add_json, add_scene, open_scene, print_json
 
 if TYPE_CHECKING:
@@ -21,7 +22,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
     add_scene(parser, option=True)
-    parser.add_argument("--out", required=True, type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
+    result = parser.add_mutually_exclusive_group(required=True)
+    result.add_argument("--out", type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
+    learn = "learn what is healthy on this rig, for alarms (replay --baseline, the node's parameter); changes no scene"
+    result.add_argument("--baseline", type=Path, metavar="FILE", help=learn)
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
     parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
@@ -37,7 +41,35 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Calibrate, write, tell."""
+    """Calibrate, or learn a baseline; write, tell."""
+    return _learn(args) if args.baseline else _calibrate(args)
+
+
+def _learn(args: Namespace) -> int:
+    from ..calibrate.baseline import baseline_of, write_baseline
+    from ..settings import load_settings
+
+    scene, settings = open_scene(args.scene), load_settings(Path(args.params) if args.params else None)
+    if args.baseline.exists() and not args.force:
+        raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
+    with _bar() as progress:
+        learnt = baseline_of(args.bags, scene, settings, args.mapping, progress)
+    write_baseline(learnt, args.baseline, _credit(args), args.force)
+    if args.json:
+        print_json(learnt.model_dump(exclude={"mean", "covariance", "names"}))
+        return 0
+    for name, mean, row, i in zip(learnt.names, learnt.mean, learnt.covariance, range(len(learnt.names)), strict=True):
+        print(f"{name:28s} {mean:+.2e} +- {row[i] ** 0.5:.1e}")
+    print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {learnt.detuning:.1%}")
+    print(args.baseline)
+    return 0
+
+
+def _credit(args: Namespace) -> str:
+    return f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
+
+
+def _calibrate(args: Namespace) -> int:
     from ..calibrate.run import Choice, calibrate
     from ..calibrate.words import as_object, as_text
     from ..calibrate.written import refuse_overwriting, write_mapping, write_scene
@@ -47,12 +79,12 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
-    choice, date = Choice(names, args.load, args.damping, args.stiffness, args.zeros), args.date or time.strftime("%Y-%m-%d")
+    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()
     with _bar() as progress:
         found = calibrate(args.bags, scene, choice, settings, args.mapping, progress)
     wall = time.perf_counter() - began
-    credit = f"{date} by boom_twin {__version__}"
+    credit = _credit(args)
     write_scene(found, scene, args.scene, args.out, credit)
     mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.joints))
     files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,8 @@ from ..parameter_file import checked
 from ..plain import read_plain
 from ..records import Array
 from .parameters import Parameter, variances
+
+DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "baseline.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -70,8 +73,7 @@ class Baseline(BaseModel):
 
 def load_baseline(path: Path | None = None) -> Baseline:
     """A baseline from its file (YAML), the package's own if no path is given; UsageError names every value that cannot be."""
-    if path is None:
-        return Baseline()
+    path = DEFAULT_FILE if path is None else path
     content = read_plain(path, UsageError, "Give a file written by `boom_twin calibrate --baseline`.")
     if not isinstance(content, dict):
         raise UsageError(f"{path}: not a baseline. Give a file written by `boom_twin calibrate --baseline`.")

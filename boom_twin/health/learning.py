@@ -7,7 +7,7 @@ sessions one after the other gives the parameters.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -34,8 +34,14 @@ LEAST = 60.0  # s
 Session = Sequence[Problem]
 
 
-def learn(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, names: Sequence[str]) -> Baseline:
-    """A baseline from the linear problems of healthy sessions of one rig, called `names`.
+def learn(
+    sessions: Sequence[Session],
+    known: tuple[Parameter, ...],
+    joints: int,
+    names: Sequence[str],
+    progress: Callable[[float], None] = lambda share: None,
+) -> Baseline:
+    """A baseline from the linear problems of healthy sessions of one rig, called `names`; `progress` is told the share done.
 
     Raises
     ------
@@ -46,13 +52,11 @@ def learn(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int
     if span < LEAST:
         raise UsageError(f"sessions = {span:.0f} s in all: too short to learn from. Give at least {LEAST:.0f} s, with moves.")
     best = Baseline(description="learnt", sessions=tuple(names))
-    for ratio in RATIOS:
-        for _ in range(ROUNDS):
-            before = best
-            for key in SEARCHED:
-                best = _climb(sessions, known, joints, best, key, ratio)
-            if best == before:
-                break
+    rounds = [(ratio, key) for ratio in RATIOS for _ in range(ROUNDS) for key in SEARCHED]
+    for done, (ratio, key) in enumerate(rounds):
+        progress(done / len(rounds))
+        best = _climb(sessions, known, joints, best, key, ratio)
+    progress(1.0)
     regression, _ = _run(sessions, known, joints, best)
     learnt = [i for i, each in enumerate(known) if each.healthy > 0.0]
     covariance = WIDER * regression.covariance[np.ix_(learnt, learnt)]

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from scipy.signal import decimate
 
 from ..records import Array
 
 ORDER = 14
 """Eigenvalues that are looked for: two a mode, and some that take up noise."""
 RATE = 40.0
-"""Hz to which samples are averaged."""
+"""Hz to which samples are thinned out."""
 LOWEST, HIGHEST = 0.2, 15.0
 DAMPED = 0.2
 """Largest damping ratio of what is taken for a mode."""
@@ -35,7 +36,7 @@ class Vibration:
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
     """Modes by frequency in `values` (k, c) at `times` (k,) in s; none of less than a second or two."""
-    dt, x = _averaged(times, values)
+    dt, x = _thinned(times, values)
     if len(x) < 3 * ORDER or not x.any():
         return []
     x = np.asarray(x - x.mean(axis=0), np.float64)
@@ -51,16 +52,18 @@ def vibrations(times: Array, values: Array) -> list[Vibration]:
     return [_vibration(rate, sigma) for rate, sigma in zip(rates, sigmas, strict=True)]
 
 
-def _averaged(times: Array, values: Array) -> tuple[float, Array]:
-    """Step (s) and values (n, c) at even times; means of all samples within a step."""
-    columns = [values[:, i] for i in range(values.shape[1]) if np.isfinite(values[:, i]).mean() > 0.5]
+def _thinned(times: Array, values: Array) -> tuple[float, Array]:
+    """Step (s) and values (n, c) at even times, low-pass filtered; nothing where there is too little to filter."""
+    columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
         return 1.0, np.zeros((0, 1))
     interval = float(np.median(np.diff(times)))
     even = np.arange(times[0], times[-1], interval)
     rows = np.stack([np.interp(even, times[np.isfinite(c)], c[np.isfinite(c)]) for c in columns], axis=1)
     step = max(1, round(1.0 / (RATE * interval)))
-    return step * interval, rows[: len(rows) // step * step].reshape(-1, step, rows.shape[1]).mean(axis=1)
+    if len(rows) < 3 * ORDER * step:
+        return 1.0, np.zeros((0, 1))
+    return step * interval, rows if step == 1 else np.asarray(decimate(rows, step, axis=0))
 
 
 def _sigmas(times: Array, x: Array, rates: np.ndarray) -> Array:

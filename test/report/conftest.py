@@ -1,0 +1,56 @@
+"""Two replays with everything: 24 s of the bundled session as they are, and with an encoder that is wrong from 12 s on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import Stream
+from boom_twin.cli.main import main
+from boom_twin.io.intake import Intake, stamp_of
+from boom_twin.io.reader import read, scan
+from boom_twin.io.session import write_session
+from boom_twin.io.topics import load_topics
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
+
+
+def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
+    """Stamps (k,) and values of every stream, up to `SECONDS`; all streams have the same stamps."""
+    inputs, intake = load_topics().inputs, Intake(4)
+    roles = {inputs[stream].name: stream for stream in Stream}
+    found: dict[Stream, list] = {stream: [] for stream in Stream}
+    for name, _, message in read(scan(SESSION), {inputs[stream].name: inputs[stream].type for stream in Stream}):
+        sample = intake.put(roles[name], stamp_of(message), message)
+        found[sample.stream].append(sample)
+        if sample.stamp - found[Stream.STROKES][0].stamp > SECONDS * 1e9:
+            break
+    count = min(map(len, found.values()))
+    return {
+        stream: (np.array([each.stamp for each in rows[:count]]), np.array([each.values for each in rows[:count]]))
+        for stream, rows in found.items()
+    }
+
+
+@pytest.fixture(scope="session")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Healthy, and faulty."""
+    found = samples()
+    (stamps, strokes), (_, joints), (_, imu) = (found[stream] for stream in Stream)
+    folder, notes = tmp_path_factory.mktemp("sessions"), {"origin": "synthetic session <of a test> & more"}
+    write_session(folder / "healthy", stamps, strokes, joints, imu, notes)
+    wrong = joints + WRONG_BY * np.array([0.0, 0.0, 1.0, 0.0]) * (stamps - stamps[0] > WRONG_FROM * 1e9)[:, None]
+    write_session(folder / "faulty", stamps, strokes, wrong, imu, notes)
+    return folder / "healthy", folder / "faulty"
+
+
+@pytest.fixture(scope="session")
+def replays(sessions: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Of both, with report."""
+    folder = tmp_path_factory.mktemp("replays")
+    for session in sessions:
+        assert main(["replay", str(session), "--out", str(folder / session.name), "--report"]) == 0
+    return folder / "healthy", folder / "faulty"

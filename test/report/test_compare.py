@@ -1,0 +1,72 @@
+"""Two sessions side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from boom_twin.cli.main import main
+from boom_twin.report.compare import as_text, flat, rows_of
+from boom_twin.report.quantities import Quantity
+from boom_twin.report.side import Side
+
+ONE = Side("one", "s", [Quantity("x", 1.0, 0.1, "m"), Quantity("y", 1.0, None, "m"), Quantity("only", 2.0, 0.1, "m")], [])
+
+
+def other(x: float) -> Side:
+    alarm = {"channel": "joint_1", "kind": "bias", "from_s": -0.03, "to_s": None, "cause": "joint_1.sensor", "told": "bias"}
+    return Side("other", "s", [Quantity("x", x, 0.1, "m"), Quantity("y", 3.0, None, "m")], [alarm])
+
+
+@pytest.mark.parametrize(("x", "differs"), [(1.0, False), (1.5, False), (1.6, True), (0.4, True)])
+def test_what_is_no_chance(x: float, differs: bool) -> None:
+    row = rows_of(ONE, other(x))[0]
+    assert row.sigma == pytest.approx(0.1 * 2**0.5) and row.difference == pytest.approx(x - 1.0)
+    assert row.is_significant is differs
+
+
+def test_what_nobody_can_say() -> None:
+    _, y, only = rows_of(ONE, other(1.0))
+    assert (y.difference, y.sigma, y.is_significant) == (2.0, None, None)
+    assert (only.a, only.b, only.difference) == (2.0, None, None)
+
+
+def test_in_words_and_flat() -> None:
+    rows = rows_of(ONE, other(1.6))
+    text = "\n".join(as_text(ONE, other(1.6), rows))
+    assert "alarms of A, one: none" in text and "joint_1, 0.00 s to the end: bias" in text
+    assert next(line for line in text.splitlines() if line.startswith("x ")).endswith("differs")
+    found = flat(ONE, other(1.6), rows)
+    assert found["same_scene"] and found["difference"] == [pytest.approx(0.6), 2.0, None]
+    assert not any(isinstance(value, dict) for value in found.values())
+
+
+def test_a_session_and_a_replay_of_it_are_the_same(
+    sessions: tuple[Path, Path], replays: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", str(sessions[0]), str(replays[0]), "--out", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["same_scene"] and set(found["difference"]) == {0.0} and True not in found["is_significant"]
+    assert (tmp_path / "compare.png").stat().st_size > 10_000 and (tmp_path / "A" / "quantities.json").is_file()
+    assert not (tmp_path / "B").exists()
+
+
+def test_a_fault_shows(replays: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", *map(str, replays)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    differing = {line.split()[0] for line in lines if line.endswith(" differs")}
+    assert differing <= {"residual_mean_joint_3", "residual_rms_joint_3"} and differing
+    assert any("joint_3.sensor" in line for line in lines)
+
+
+def test_a_folder_that_is_neither(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", str(tmp_path / "nothing"), str(tmp_path)]) == 1
+    assert "no such file or directory" in capsys.readouterr().err
+
+
+def test_an_old_replay_must_be_made_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    assert main(["compare", str(tmp_path), str(tmp_path)]) == 1
+    assert "Replay the session again" in capsys.readouterr().err
