@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
 from boom_twin.monitor.playback import Playback
 from boom_twin.monitor.words import state
+from boom_twin.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -58,38 +60,47 @@ def judged(feed: Feed) -> list[Alarm]:
     return [alarm for alarm in feed.store.alarms.all if alarm.causes]
 
 
-def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, replayed: Path) -> None:
-    told = [each for each in json.loads((replayed / "summary.json").read_text())["alarms"] if each["kind"] != "gap"]
-    published = read_all(bag_feed(replayed / "bag", load_scene(), Settings()))
-    assert told
-    for alarms in (judged(feed), judged(published)):
-        for alarm, expected in zip(sorted(alarms, key=lambda alarm: alarm.begin), told, strict=True):
-            assert (alarm.name, alarm.reason) == (expected["channel"], expected["told"])
-            assert alarm.begin == pytest.approx(expected["from_s"], abs=2e-3)
-            assert alarm.end == (None if expected["to_s"] is None else pytest.approx(expected["to_s"], abs=2e-3))
-            assert alarm.level == (Level.WARN if expected["cause"] is None else Level.ERROR)
-            assert expected["cause"] in (None, alarm.causes[0][0])
-            if expected["ranked"]:
-                assert alarm.causes == tuple(
-                    (each["cause"], pytest.approx(each["probability"], rel=1e-3)) for each in expected["ranked"]
-                )
-    found = state(published.store, 20.0, 20.0)
-    assert (found["level"], found["reason"]) == ("ERROR", state(feed.store, 20.0, 20.0)["reason"])
+def assert_same(alarms: list[Alarm], told: list[dict[str, Any]]) -> None:
+    for alarm, expected in zip(sorted(alarms, key=lambda alarm: alarm.begin), told, strict=True):
+        assert (alarm.name, alarm.reason) == (expected["channel"], expected["told"])
+        assert alarm.begin == pytest.approx(expected["from_s"], abs=2e-3)
+        assert alarm.end == (None if expected["to_s"] is None else pytest.approx(expected["to_s"], abs=2e-3))
+        assert alarm.level == (Level.WARN if expected["cause"] is None else Level.ERROR)
+        assert expected["cause"] in (None, alarm.causes[0][0])
+        if expected["ranked"]:
+            assert [cause for cause, _ in alarm.causes] == [each["cause"] for each in expected["ranked"]]
+            shares = [each["probability"] for each in expected["ranked"]]
+            assert [share for _, share in alarm.causes] == pytest.approx(shares, rel=1e-3)
 
 
-def test_the_baseline_is_that_which_is_given(faulty: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["faulty", "drifting"])
+def test_alarms_are_those_of_the_summary_and_of_the_result_bag(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    session = request.getfixturevalue(name)
+    summary = replay(session, load_scene(), tmp_path).summary
+    told = [each for each in summary["alarms"] if each["kind"] != "gap"]
+    assert told and bool(told[-1]["ranked"]) == (name == "drifting")
+    feeds = [read_all(bag_feed(path, load_scene(), Settings())) for path in (session, tmp_path / "bag")]
+    for feed in feeds:
+        assert_same(judged(feed), told)
+    states = [state(feed.store, 25.0, 25.0) for feed in feeds]
+    assert {each["level"] for each in states} == {"ERROR"} and states[0]["reason"] == states[1]["reason"]
+
+
+def test_the_baseline_is_that_which_is_given(drifting: Path, tmp_path: Path) -> None:
     (tmp_path / "baseline.yaml").write_text("angle_error: 0.1\n")
-    feed = read_all(bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "baseline.yaml"))
+    feed = read_all(bag_feed(drifting, load_scene(), Settings(), baseline=tmp_path / "baseline.yaml"))
     assert not judged(feed)
     with pytest.raises(UsageError, match="none"):
-        bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
+        bag_feed(drifting, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
 
 
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
     level, reason = overall(feed.store.board(14.0).groups(14.0))
     assert level == Level.OK
     level, reason = overall(feed.store.board(25.0).groups(25.0))
-    assert level == Level.ERROR and reason.startswith("residual joint_3")
+    assert level == Level.ERROR and reason.startswith("health: joint_3")
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
     assert 15.0 < alarm.begin < 20.0 and alarm.level == Level.ERROR
 
