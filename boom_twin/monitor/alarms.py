@@ -22,9 +22,9 @@ class Alarm:
     number : int
         By which it is acknowledged.
     name, reason : str
-        The reason is that of the worst level.
+        The reason is that of the worst level; the judge's are as it told them last.
     level : Level
-        The worst.
+        The worst; of the judge ERROR where the cause is named, else WARN.
     begin : float
         Session time, s.
     end : float or None
@@ -70,10 +70,10 @@ class Alarms:
             if lamp.level > Level.OK:
                 self._raise(key, lamp.name, lamp.level, lamp.reason, time)
 
-    def judge(self, stamp: int, told: Sequence[records.Alarm], time: Callable[[int], float]) -> None:
-        """The alarms of the rig's health at `stamp` (ns), those that last and those that have just ended.
+    def judge(self, now: float, told: Sequence[records.Alarm], time: Callable[[int], float]) -> None:
+        """The alarms of the rig's health at `now` (s), those that last and those that have just ended.
 
-        `time` gives seconds of a stamp. One that is told of no more has ended. Who has seen an alarm is asked again where its
+        `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen an alarm is asked again where its
         most probable cause is another, and when it ends.
         """
         lasting: dict[tuple[str, int], Alarm] = {}
@@ -84,7 +84,7 @@ class Alarms:
             if found.until is None:
                 lasting[key] = alarm
         for alarm in self._judged.values():
-            alarm.end, alarm.is_acknowledged = time(stamp), False
+            alarm.end, alarm.is_acknowledged = now, False
         self._judged = lasting
 
     def lamps(self, time: float) -> Iterable[Lamp]:

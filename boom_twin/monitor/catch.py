@@ -147,7 +147,8 @@ class Catch:
         self._store.append("shape", columns, stamp_of(msg.markers[0]), values + self._forces + self._strokes)
 
     def _take_health(self, msg: Any, now: float) -> None:
-        self._store.alarms.judge(stamp_of(msg), decode(msg), self._store.time)
+        store = self._store
+        store.alarms.judge(store.time(stamp_of(msg)), decode(msg), store.time)
 
     def _take_uncertainty(self, msg: Any, now: float) -> None:
         self._store.append("uncertainty", PLANE, stamp_of(msg), (msg.vector.x, msg.vector.z))

@@ -91,7 +91,7 @@ def seconds(stamp: int) -> float:
 
 
 def judge(alarms: Alarms, time: float, *told: Alarm) -> None:
-    alarms.judge(round(time * 1e9), told, seconds)
+    alarms.judge(time, told, seconds)
 
 
 def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
