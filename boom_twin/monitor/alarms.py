@@ -73,7 +73,7 @@ class Alarms:
     def judge(self, now: float, told: Sequence[records.Alarm], time: Callable[[int], float]) -> None:
         """The alarms of the rig's health at `now` (s), those that last and those that have just ended.
 
-        `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen an alarm is asked again where its
+        `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen it is asked again where its
         most probable cause is another, and when it ends.
         """
         lasting: dict[tuple[str, int], Alarm] = {}
