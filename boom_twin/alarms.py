@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import nan
 
-from .records import Alarm, Health
+from .records import Alarm, Health, Ranked
 
 NANO = 1e-9
+PROBABILITY = ": probability"
 
 
 class Alarms:
@@ -55,8 +57,29 @@ def values_of(alarm: Alarm) -> dict[str, str]:
         "to_s": f"{nan if alarm.until is None else alarm.until * NANO:.3f}",
     }
     for rank in alarm.ranked:
-        found[f"{rank.cause}: probability"] = f"{rank.probability:.4g}"
+        found[rank.cause + PROBABILITY] = f"{rank.probability:.4g}"
         for kind, value, sigma, unit in rank.parts:
             named = f"{kind}_{unit}" if unit else kind
             found |= {f"{rank.cause}: {named}": f"{value:.6g}", f"{rank.cause}: sigma of {named}": f"{sigma:.3g}"}
     return found
+
+
+def alarm_of(channel: str, told: str, values: Mapping[str, str]) -> Alarm:
+    """An alarm from what `values_of` made of it: stamps to the millisecond, causes without what would be the matter.
+
+    Raises
+    ------
+    KeyError, ValueError, ArithmeticError
+        They are not the values of an alarm.
+    """
+    ranked = [
+        Ranked(key.removesuffix(PROBABILITY), float(value), ()) for key, value in values.items() if key.endswith(PROBABILITY)
+    ]
+    since, end = _stamp(values["from_s"]), values["to_s"]
+    until = None if end == "nan" else _stamp(end)
+    return Alarm(channel, values["kind"], since, until, values["cause"] or None, told, tuple(ranked))
+
+
+def _stamp(seconds: str) -> int:
+    """In ns."""
+    return round(float(seconds) / NANO)

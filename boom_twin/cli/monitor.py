@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..monitor.feed import Feed
 
 PORT = 8420
-ACTS = ("mark", "acknowledge", "record")
+ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
 NICE = 5
 """By how much it gives way to the node on the same machine."""
 
@@ -32,6 +32,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
     add_scene(parser, option=True)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
+    usual = "what is known of this rig while all is well, for a session's twin (the package's)"
+    parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
@@ -41,7 +43,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         choices=ACTS,
         default=["mark", "acknowledge"],
         metavar="ACT",
-        help="what viewers may do: mark events, acknowledge alarms, start and stop a record(ing) (mark acknowledge)",
+        help="what viewers may do: mark events, acknowledge alarms (acknowledge-at-node: the node, too, lets go of those that "
+        "ended), start and stop a record(ing) (mark acknowledge)",
     )
     parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
@@ -81,7 +84,8 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         from ..settings import load_settings
 
         print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
-        with closing(bag_feed(args.bag, open_scene(args.scene), load_settings(args.params), args.mapping)) as feed:
+        settings = load_settings(args.params)
+        with closing(bag_feed(args.bag, open_scene(args.scene), settings, args.mapping, args.baseline)) as feed:
             yield feed
         return
     from ..ros.require import require_rclpy

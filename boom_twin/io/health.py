@@ -1,10 +1,10 @@
-"""What is known of the rig's health as a message: a status for each alarm."""
+"""What is known of the rig's health to and from a message: a status for each alarm."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from ..alarms import values_of
+from ..alarms import alarm_of, values_of
 from ..records import Alarm, Health
 from .factory import RosbagsTypes
 from .places import fill_header
@@ -22,6 +22,17 @@ def encode(health: Health) -> bytes:
     fill_header(msg.header, health.stamp)
     msg.status = [_status(alarm, types) for alarm in health.alarms]
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
+
+
+def decode(msg: Any) -> tuple[Alarm, ...]:
+    """The alarms of such a message, see `boom_twin.alarms.alarm_of`; a status that is none is left out."""
+    found = []
+    for status in msg.status:
+        try:
+            found.append(alarm_of(status.name, status.message, {pair.key: pair.value for pair in status.values}))
+        except (KeyError, ValueError, ArithmeticError):
+            continue
+    return tuple(found)
 
 
 def _status(alarm: Alarm, types: RosbagsTypes) -> Any:

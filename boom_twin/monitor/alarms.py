@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..records import Health
-from .lamps import Board, Lamp, Level
+from .. import records
+from .lamps import HEALTH, Board, Lamp, Level
 
 MOST = 500
 """Alarms that are kept."""
@@ -22,9 +22,9 @@ class Alarm:
     number : int
         By which it is acknowledged.
     name, reason : str
-        The reason is that of the worst level.
+        The reason is that of the worst level; the judge's are as it told them last.
     level : Level
-        The worst.
+        The worst; of the judge ERROR where the cause is named, else WARN.
     begin : float
         Session time, s.
     end : float or None
@@ -57,33 +57,35 @@ class Alarms:
     def __init__(self) -> None:
         self.all: list[Alarm] = []
         self._open: dict[str, Alarm] = {}
-        self._judged: dict[str, Alarm] = {}
+        self._judged: dict[tuple[str, int], Alarm] = {}
         self._number = 0
 
     def follow(self, time: float, board: Board) -> None:
-        """The lamps at `time` (s)."""
-        lamps = {f"{node}: {lamp.name}": lamp for node, (_, lamps) in board.nodes.items() for lamp in lamps}
+        """The lamps at `time` (s), but for that of the rig's health, whose alarms `judge` is told of."""
+        told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in board.nodes.items() for lamp in lamps)
+        lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH}
         for key in [key for key in self._open if key not in lamps or lamps[key].level <= Level.OK]:
             self._open.pop(key).end = time
         for key, lamp in lamps.items():
             if lamp.level > Level.OK:
                 self._raise(key, lamp.name, lamp.level, lamp.reason, time)
 
-    def judge(self, health: Health, time: Callable[[int], float]) -> None:
-        """What is known of the rig's health; `time` gives seconds of a stamp."""
-        for found in health.alarms:
-            alarm = self._judged.pop(found.channel, None)
-            if alarm is None:
-                alarm = self._keep(Alarm(self._next(), found.channel, Level.ERROR, "", 0.0))
+    def judge(self, now: float, told: Sequence[records.Alarm], time: Callable[[int], float]) -> None:
+        """The alarms of the rig's health at `now` (s), those that last and those that have just ended.
+
+        `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen it is asked again where its
+        most probable cause is another, and when it ends.
+        """
+        lasting: dict[tuple[str, int], Alarm] = {}
+        for found in told:
+            key = found.channel, found.since
+            alarm = self._judged.pop(key, None) or self._keep(Alarm(self._next(), found.channel, Level.WARN, "", 0.0))
+            _renew(alarm, found, time)
             if found.until is None:
-                self._judged[found.channel] = alarm
-            causes = tuple((each.cause, each.probability) for each in found.ranked) or ((found.cause or "not known", nan),)
-            alarm.is_acknowledged &= [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
-            alarm.reason, alarm.begin, alarm.causes = found.told, time(found.since), causes
-            alarm.end = None if found.until is None else time(found.until)
-        lasting = {found.channel for found in health.alarms if found.until is None}
-        for channel in self._judged.keys() - lasting:
-            self._judged.pop(channel).end = time(health.stamp)
+                lasting[key] = alarm
+        for alarm in self._judged.values():
+            alarm.end, alarm.is_acknowledged = now, False
+        self._judged = lasting
 
     def lamps(self, time: float) -> Iterable[Lamp]:
         """What the judge had found at `time` (s), as lamps."""
@@ -102,6 +104,11 @@ class Alarms:
             alarm.is_acknowledged = True
         return alarm
 
+    def acknowledge_ended(self) -> None:
+        """Note that the node has let go of all judged alarms that ended."""
+        for alarm in self.all:
+            alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
+
     def _raise(self, key: str, name: str, level: Level, reason: str, time: float) -> None:
         alarm = self._open.get(key)
         if alarm is None:
@@ -116,3 +123,13 @@ class Alarms:
     def _keep(self, alarm: Alarm) -> Alarm:
         self.all = [*self.all[-MOST + 1 :], alarm]
         return alarm
+
+
+def _renew(alarm: Alarm, found: records.Alarm, time: Callable[[int], float]) -> None:
+    """As the judge tells it now."""
+    causes = tuple((each.cause, each.probability) for each in found.ranked) or ((found.cause or "not known", nan),)
+    is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
+    alarm.is_acknowledged &= is_same and found.until is None
+    alarm.level = Level.WARN if found.cause is None else Level.ERROR
+    alarm.reason, alarm.begin, alarm.causes = found.told, time(found.since), causes
+    alarm.end = None if found.until is None else time(found.until)

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ..errors import BagError, BoomTwinError
-from ..health.baseline import Baseline
+from ..health.baseline import Baseline, load_baseline
 from ..io.ahead import Ahead
 from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
@@ -33,7 +33,7 @@ LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-SHOWN = frozenset(Output) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
+SHOWN = frozenset(Output) - {Output.CHANGES}
 TURN = 0.04
 """Seconds of reading at a time, after which the pages have their turn."""
 
@@ -81,7 +81,9 @@ class BagFeed(Feed):
             self._steps.close()
 
 
-def bag_feed(path: Path, scene: Scene, settings: Settings, mapping: Path | None = None) -> BagFeed:
+def bag_feed(
+    path: Path, scene: Scene, settings: Settings, mapping: Path | None = None, baseline: Path | None = None
+) -> BagFeed:
     """Open a session.
 
     Parameters
@@ -94,15 +96,17 @@ def bag_feed(path: Path, scene: Scene, settings: Settings, mapping: Path | None 
         For the twin, where the session has no outputs.
     mapping : Path, optional
         How topics and sensors are read; as for `boom_twin.replay.replay`.
+    baseline : Path, optional
+        What is known of this rig while all is well; likewise.
 
     Raises
     ------
     BagError
         It cannot be read, or has nothing that can be shown.
     UsageError
-        The mapping cannot be used.
+        The mapping or the baseline cannot be used.
     """
-    session = scan(path)
+    session, usual = scan(path), load_baseline(baseline)
     topics = mapping_of(path, mapping, len(scene.joints)).topics
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
@@ -113,7 +117,7 @@ def bag_feed(path: Path, scene: Scene, settings: Settings, mapping: Path | None 
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts))
     else:
-        twin = _Twin(feed, topics, scene, settings)
+        twin = _Twin(feed, topics, scene, settings, usual)
         feed.begin(_take_predicted(session, topics, counts, len(scene.joints), twin))
     return feed
 
@@ -158,10 +162,10 @@ def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], jo
 class _Twin:
     """A twin beside the session, watched as the node watches its own; its time is that of the stamps."""
 
-    def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings) -> None:
+    def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self._twin, self._outlet = Twin(scene, settings, mounts, Baseline()), Outlet(scene, settings)
+        self._twin, self._outlet = Twin(scene, settings, mounts, usual), Outlet(scene, settings)
         self._takers = {key: feed.catch.takers[topic.absolute] for key, topic in topics.outputs.items() if key in SHOWN}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
@@ -190,8 +194,6 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
-        if report.health is not None:
-            self._feed.catch.judge(report.health)
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())

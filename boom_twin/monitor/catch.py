@@ -6,9 +6,10 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
+from ..io.health import decode
 from ..io.intake import Intake, stamp_of
 from ..io.topics import Output, Topics
-from ..records import Health, Sample, Stream
+from ..records import Sample, Stream
 from .lamps import Board, Level
 from .store import Store
 
@@ -35,7 +36,7 @@ class Catch:
     ``acceleration``   the same
     ``force``          specific force at the tip, x and z of the IMU: measured, predicted, expected deviation of the two
     ``joints``         residual of every joint, then the same over its expected deviation
-    ``uncertainty``    standard deviation of the predicted tip, x and z
+    ``uncertainty``    standard deviation of the predicted tip, x and z of ``base_link``
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
 
@@ -67,15 +68,12 @@ class Catch:
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
+            Output.HEALTH: self._take_health,
+            Output.TIP_UNCERTAINTY: self._take_uncertainty,
             Output.DIAGNOSTICS: self._take_state,
         }
         found = {topics.outputs[role].absolute: take for role, take in by_role.items()}
         return {**found, topics.inputs[Stream.IMU].absolute: self._take_measured, topics.events.absolute: self._take_event}
-
-    def judge(self, health: Health) -> None:
-        """Keep what is known of the rig's health."""
-        self._store.append("uncertainty", ("x_m", "z_m"), health.stamp, health.tip_sigmas.tolist())
-        self._store.alarms.judge(health, self._store.time)
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first."""
@@ -147,6 +145,13 @@ class Catch:
         columns += [f"force_{i + 1}_N" for i in range(len(self._forces))]
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
         self._store.append("shape", columns, stamp_of(msg.markers[0]), values + self._forces + self._strokes)
+
+    def _take_health(self, msg: Any, now: float) -> None:
+        store = self._store
+        store.alarms.judge(store.time(stamp_of(msg)), decode(msg), store.time)
+
+    def _take_uncertainty(self, msg: Any, now: float) -> None:
+        self._store.append("uncertainty", PLANE, stamp_of(msg), (msg.vector.x, msg.vector.z))
 
     def _take_state(self, msg: Any, now: float) -> None:
         store = self._store

@@ -11,6 +11,8 @@ from .recording import Recording
 LONGEST = 500
 """Characters of a note."""
 ACTS = ("mark", "acknowledge", "record")
+AT_NODE = "acknowledge-at-node"
+"""Permits ``acknowledge``, and that it makes the node let go of alarms that ended."""
 
 
 class Desk:
@@ -20,7 +22,7 @@ class Desk:
     ----------
     feed : Feed
     permitted : set of str
-        Of `ACTS`.
+        Of `ACTS`, and `AT_NODE`.
     recording : Recording, optional
         What ``record`` starts and stops.
     """
@@ -28,8 +30,10 @@ class Desk:
     def __init__(self, feed: Feed, permitted: frozenset[str], recording: Recording | None = None) -> None:
         self._feed, self._recording = feed, recording
         self.permitted = permitted if recording is not None else permitted - {"record"}
+        if AT_NODE in permitted:
+            self.permitted |= {"acknowledge"}
         if feed.end is not None:
-            self.permitted -= {"mark", "record"}
+            self.permitted -= {"mark", "record", AT_NODE}
         self._acts: dict[str, Callable[[dict[str, Any]], str]] = {
             "mark": self._mark,
             "acknowledge": self._acknowledge,
@@ -63,7 +67,9 @@ class Desk:
             return "that alarm is not kept any more"
         if self._feed.end is None:
             self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
-        return f"acknowledged: {alarm.name}"
+        is_kept_by_node = bool(alarm.causes) and alarm.end is not None
+        asked = f"; {self._feed.let_go()}" if is_kept_by_node and AT_NODE in self.permitted else ""
+        return f"acknowledged: {alarm.name}{asked}"
 
     def _record(self, request: dict[str, Any]) -> str:
         assert self._recording is not None

@@ -11,6 +11,8 @@ from typing import Any
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
+HEALTH = "health"
+"""The status that stands for all alarms of the rig's health."""
 _LIMITS = ("_error", "_warn", "_stale")
 
 
@@ -96,10 +98,9 @@ def worst(lamps: Iterable[Lamp]) -> Lamp | None:
 
 def overall(groups: Mapping[str, list[Lamp]]) -> tuple[Level, str]:
     """Level and reason of everything; without a word about the model nothing is well."""
-    if not groups["model"]:
-        return Level.STALE, "no word from the twin"
     lamp = worst(lamp for lamps in groups.values() for lamp in lamps)
-    assert lamp is not None
+    if lamp is None or (lamp.level < Level.ERROR and not groups["model"]):
+        return Level.STALE, "no word from the twin"
     return lamp.level, "everything as expected" if lamp.level == Level.OK else f"{lamp.name}: {lamp.reason}"
 
 
@@ -116,7 +117,7 @@ def _group(name: str) -> str:
     if name == "model":
         return "model"
     kind = name.split(" ")[0]
-    return {"sensor": "sensors", "residual": "residuals", "recording": "recorder"}.get(kind, "timing")
+    return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")
 
 
 def _judged(values: Mapping[str, float], level: Level) -> tuple[str, float]:

@@ -8,14 +8,14 @@ from math import isfinite
 from typing import Any
 
 from .alarms import Alarm
-from .lamps import Lamp, Level, overall, worst
+from .lamps import HEALTH, Lamp, Level, overall, worst
 from .store import Store
 
 
 def state(store: Store, now: float, time: float) -> dict[str, Any]:
     """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s)."""
     groups = store.board(now).groups(now)
-    groups["residuals"] = [*store.alarms.lamps(time), *groups["residuals"]]
+    groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
     return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told}
@@ -35,6 +35,14 @@ def alarms(found: list[Alarm]) -> dict[str, Any]:
 def dump(message: Any) -> str:
     """As JSON."""
     return json.dumps(_plain(message), allow_nan=False, separators=(",", ":"))
+
+
+def _with_alarms(lamps: list[Lamp], alarms: list[Lamp]) -> list[Lamp]:
+    """Lamps with the rig's health as the alarms that last; a lamp that stands for them goes, unless its node is silent."""
+    health = next((lamp for lamp in lamps if lamp.name == HEALTH), None)
+    if not alarms or (health is not None and health.level == Level.STALE):
+        return lamps
+    return [*alarms, *(lamp for lamp in lamps if lamp is not health)]
 
 
 def _group(lamps: list[Lamp]) -> dict[str, Any]:

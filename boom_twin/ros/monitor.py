@@ -11,8 +11,9 @@ import rclpy
 from rcl_interfaces.msg import Log
 from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
+from std_srvs.srv import Trigger
 
-from ..io.topics import Output, Topics
+from ..io.topics import NODE, Output, Topics
 from ..io.typestore import jazzy
 from ..monitor.feed import Feed
 from ..monitor.store import Store
@@ -29,6 +30,8 @@ CAPACITY = 150_000
 MOST = 400
 """Messages of one topic taken in one look, so that a flood of them leaves time for the pages."""
 NANO = 1_000_000_000
+RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)
+"""Outputs of which none may be missed."""
 
 Taker = Callable[[Any, float], None]
 
@@ -54,12 +57,13 @@ class TopicFeed(Feed):
         for topic in shown:
             if (take := self.catch.takers.get(topic.absolute)) is not None:
                 kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
-                if topic not in (topics.outputs[Output.DIAGNOSTICS], topics.events):
+                if topic not in (*(topics.outputs[role] for role in RARE), topics.events):
                     qos.reliability = ReliabilityPolicy.BEST_EFFORT
                 heard = self._node.create_subscription(kind, topic.absolute, lambda _: None, qos, raw=True)
                 self._heard.append((heard, topic.type, take))
         events = topics.events
         self._events = self._node.create_publisher(Log, events.absolute, qos_profile(events.qos))
+        self._asked = self._node.create_client(Trigger, f"/{NODE}/acknowledge")
 
     def poll(self) -> None:
         """Take what has come."""
@@ -69,6 +73,11 @@ class TopicFeed(Feed):
                 receive = partial(subscription.handle.take_message, subscription.msg_type, True)
                 for data, _ in _until_none(receive):
                     take(jazzy().deserialize_cdr(data, kind), now)
+
+        with self._asked.handle:
+            _, answer = self._asked.handle.take_response(Trigger.Response)
+        if answer is not None:
+            self._take_answer(answer)
 
     def now(self) -> float:
         """Of a clock that only goes forward."""
@@ -81,6 +90,19 @@ class TopicFeed(Feed):
         stamp = store.epoch + round(store.newest * NANO)
         message.stamp.sec, message.stamp.nanosec = divmod(stamp, NANO)
         self._events.publish(message)
+
+    def let_go(self) -> str:
+        """Ask it; the answer becomes an event."""
+        if not self._asked.service_is_ready():
+            return "the node is not there to let go of it"
+        with self._asked.handle:
+            self._asked.handle.send_request(Trigger.Request())
+        return "the node was asked to let go of what has ended"
+
+    def _take_answer(self, answer: Any) -> None:
+        if answer.success:
+            self.store.alarms.acknowledge_ended()
+        self.publish(f"{'let go of' if answer.success else 'not let go'} by the node: {answer.message}")
 
     def close(self) -> None:
         """Listen no more."""

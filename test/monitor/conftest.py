@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,31 @@ from boom_twin.settings import Settings
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
 OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
+DRIFT = 5e-4  # rad/s
 
 
 @pytest.fixture(scope="session")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
+
+    def jump(time: Any, joints: Any) -> None:
+        joints[time >= WRONG_FROM, 2] += OFFSET
+
+    return spoilt(tmp_path_factory.mktemp("faulty") / "faulty_session", jump)
+
+
+@pytest.fixture(scope="session")
+def drifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, but its encoder drifts from 15 s on."""
+
+    def drift(time: Any, joints: Any) -> None:
+        joints[:, 2] += DRIFT * np.maximum(0.0, time - WRONG_FROM)
+
+    return spoilt(tmp_path_factory.mktemp("drifting") / "drifting_session", drift)
+
+
+def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
+    """The bundled session's first 40 s with a gap, its joint angles spoilt by a function of times (s) and angles (rad)."""
     topics, intake = load_topics().inputs, Intake(4)
     values: dict[Stream, list[Any]] = {stream: [] for stream in Stream}
     names = {topic.absolute: stream for stream, topic in topics.items()}
@@ -41,8 +62,7 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     time = (stamps_ns - stamps_ns[0]) * 1e-9
     kept = (time < SECONDS) & ((time < GAP[0]) | (time > GAP[1]))
     joints = np.array(values[Stream.ANGLES])
-    joints[time >= WRONG_FROM, 2] += OFFSET
-    path = tmp_path_factory.mktemp("faulty") / "faulty_session"
+    spoil(time, joints)
     arrays = (np.array(values[Stream.STROKES])[kept], joints[kept], np.array(values[Stream.IMU])[kept])
     write_session(path, stamps_ns[kept], *arrays, {"origin": "synthetic, encoder 3 made wrong"})
     return path

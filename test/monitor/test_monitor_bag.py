@@ -5,20 +5,23 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from monitor.conftest import read_all
 
-from boom_twin.errors import BagError
+from boom_twin.errors import BagError, UsageError
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.monitor.alarms import Alarm
 from boom_twin.monitor.bag import bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
 from boom_twin.monitor.playback import Playback
 from boom_twin.monitor.words import state
+from boom_twin.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -53,11 +56,51 @@ def test_the_cause_is_named_from_when_it_shows(feed: Feed) -> None:
     assert state(feed.store, 14.0, 14.0)["level"] == "OK"
 
 
+def judged(feed: Feed) -> list[Alarm]:
+    return [alarm for alarm in feed.store.alarms.all if alarm.causes]
+
+
+def assert_same(alarms: list[Alarm], told: list[dict[str, Any]]) -> None:
+    for alarm, expected in zip(sorted(alarms, key=lambda alarm: alarm.begin), told, strict=True):
+        assert (alarm.name, alarm.reason) == (expected["channel"], expected["told"])
+        assert alarm.begin == pytest.approx(expected["from_s"], abs=2e-3)
+        assert alarm.end == (None if expected["to_s"] is None else pytest.approx(expected["to_s"], abs=2e-3))
+        assert alarm.level == (Level.WARN if expected["cause"] is None else Level.ERROR)
+        assert expected["cause"] in (None, alarm.causes[0][0])
+        if expected["ranked"]:
+            assert [cause for cause, _ in alarm.causes] == [each["cause"] for each in expected["ranked"]]
+            shares = [each["probability"] for each in expected["ranked"]]
+            assert [share for _, share in alarm.causes] == pytest.approx(shares, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["faulty", "drifting"])
+def test_alarms_are_those_of_the_summary_and_of_the_result_bag(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    session = request.getfixturevalue(name)
+    summary = replay(session, load_scene(), tmp_path).summary
+    told = [each for each in summary["alarms"] if each["kind"] != "gap"]
+    assert told and bool(told[-1]["ranked"]) == (name == "drifting")
+    feeds = [read_all(bag_feed(path, load_scene(), Settings())) for path in (session, tmp_path / "bag")]
+    for feed in feeds:
+        assert_same(judged(feed), told)
+    states = [state(feed.store, 25.0, 25.0) for feed in feeds]
+    assert {each["level"] for each in states} == {"ERROR"} and states[0]["reason"] == states[1]["reason"]
+
+
+def test_the_baseline_is_that_which_is_given(drifting: Path, tmp_path: Path) -> None:
+    (tmp_path / "baseline.yaml").write_text("angle_error: 0.1\n")
+    feed = read_all(bag_feed(drifting, load_scene(), Settings(), baseline=tmp_path / "baseline.yaml"))
+    assert not judged(feed)
+    with pytest.raises(UsageError, match="none"):
+        bag_feed(drifting, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
+
+
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
     level, reason = overall(feed.store.board(14.0).groups(14.0))
     assert level == Level.OK
     level, reason = overall(feed.store.board(25.0).groups(25.0))
-    assert level == Level.ERROR and reason.startswith("residual joint_3")
+    assert level == Level.ERROR and reason.startswith("health: joint_3")
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
     assert 15.0 < alarm.begin < 20.0 and alarm.level == Level.ERROR
 
@@ -71,7 +114,7 @@ def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replaye
 
 def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -> None:
     published = read_all(bag_feed(replayed / "bag", load_scene(), Settings()))
-    for name in ("displacement", "position", "acceleration", "shape", "joints"):
+    for name in ("displacement", "position", "acceleration", "shape", "joints", "uncertainty"):
         rows = [each.store.tables[name].rows(0, 10**6) for each in (feed, published)]
         for ours, theirs in zip(*rows, strict=True):
             assert ours == pytest.approx(theirs), name

@@ -7,14 +7,13 @@ from math import isnan
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from boom_twin.monitor.alarms import MOST, Alarms
 from boom_twin.monitor.lamps import SILENCE, Board, Level, overall, worst
 from boom_twin.monitor.store import Store
 from boom_twin.monitor.words import dump, state
-from boom_twin.records import Alarm, Health, Ranked
+from boom_twin.records import Alarm, Ranked
 
 OK, WARN, ERROR, STALE = range(4)
 
@@ -87,31 +86,63 @@ def test_what_is_not_known_is_null_in_json() -> None:
     assert "NaN" not in dump(state(store, 0.0, float("inf")))
 
 
-def health(stamp: float, *alarms: Alarm) -> Health:
-    return Health(round(stamp * 1e9), alarms, (), np.zeros(0), np.zeros(2))
+def seconds(stamp: int) -> float:
+    return stamp * 1e-9
+
+
+def judge(alarms: Alarms, time: float, *told: Alarm) -> None:
+    alarms.judge(time, told, seconds)
 
 
 def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
-    def seconds(stamp: int) -> float:
-        return stamp * 1e-9
-
     alarms, ranked = Alarms(), (Ranked("a.k", 0.6, ()), Ranked("b.k", 0.4, ()))
     unknown = Alarm("joint_2", "residual", 2 * 10**9, None, None, "cannot be told apart", ranked)
     named = replace(unknown, cause="b.k", told="b.k off", ranked=(Ranked("b.k", 0.97, ()),))
-    alarms.judge(health(3.0, unknown), seconds)
+    judge(alarms, 3.0, unknown)
     (found,) = alarms.all
     assert (found.name, found.reason, found.begin) == ("joint_2", "cannot be told apart", 2.0)
     assert found.causes == (("a.k", 0.6), ("b.k", 0.4))
     assert alarms.acknowledge(found.number) is found
-    alarms.judge(health(4.0, unknown), seconds)
+    judge(alarms, 4.0, unknown)
     assert found.is_acknowledged and [lamp.reason for lamp in alarms.lamps(3.5)] == ["cannot be told apart"]
-    alarms.judge(health(5.0, named), seconds)
-    assert not found.is_acknowledged and found.causes == (("b.k", 0.97),)
-    alarms.judge(health(6.0, replace(named, until=round(5.5e9))), seconds)
-    assert found.end == 5.5 and list(alarms.lamps(5.6)) == [] and list(alarms.lamps(1.9)) == []
-    alarms.judge(health(7.0, replace(unknown, since=7 * 10**9)), seconds)
-    alarms.judge(health(8.0), seconds)
+    assert found.level == Level.WARN
+    judge(alarms, 5.0, named)
+    assert found.level == Level.ERROR and not found.is_acknowledged and found.causes == (("b.k", 0.97),)
+    assert alarms.acknowledge(found.number) is found
+    judge(alarms, 6.0, replace(named, until=round(5.5e9)))
+    assert found.end == 5.5 and not found.is_acknowledged and list(alarms.lamps(5.6)) == [] and list(alarms.lamps(1.9)) == []
+    judge(alarms, 7.0, replace(unknown, since=7 * 10**9))
+    judge(alarms, 8.0)
     assert [(each.begin, each.end) for each in alarms.all] == [(2.0, 5.5), (7.0, 8.0)]
+    alarms.acknowledge_ended()
+    assert all(each.is_acknowledged for each in alarms.all)
+
+
+def test_two_alarms_of_one_channel_are_two() -> None:
+    alarms, stuck = Alarms(), Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck")
+    for time in (3.0, 4.0, 5.0):
+        judge(alarms, time, stuck, replace(stuck, kind="residual", since=3 * 10**9))
+    assert [(each.begin, each.end) for each in alarms.all] == [(2.0, None), (3.0, None)]
+
+
+def test_alarms_that_last_stand_in_place_of_the_lamp_for_them() -> None:
+    def told(now: float) -> dict[str, str]:
+        lamps = next(group["lamps"] for group in state(store, now, 4.0)["groups"] if group["name"] == "residuals")
+        return {lamp["name"]: lamp["level"] for lamp in lamps}
+
+    store = Store(10)
+    store.light(0.0, Board().told(0.0, [status("n: model"), status("n: health", ERROR)], 0.0))
+    assert told(0.0) == {"health": "ERROR"} and not store.alarms.all
+    judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
+    assert told(0.0) == {"joint_3": "ERROR"}
+    assert told(0.1 + SILENCE) == {"health": "STALE"}
+
+
+def test_an_alarm_is_seen_without_a_word_from_the_twin() -> None:
+    store = Store(10)
+    judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
+    found = state(store, 3.0, 3.0)
+    assert (found["level"], found["reason"]) == ("ERROR", "joint_3: stuck")
 
 
 def test_an_alarm_lasts_until_its_lamp_is_well_or_out() -> None:

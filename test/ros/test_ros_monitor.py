@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
 
+from boom_twin.io.health import encode
 from boom_twin.io.topics import Output, load_topics
+from boom_twin.monitor.desk import AT_NODE, Desk
 from boom_twin.monitor.lamps import Level, overall
-from boom_twin.records import Stream
+from boom_twin.records import Alarm, Health, Ranked, Stream
 
 TOPICS = load_topics()
 EPOCH = 1_700_000_000
+BEGIN, END = EPOCH * 10**9 + 25_000_000, EPOCH * 10**9 + 75_000_000
+CAUSES = (Ranked("joint_3.sensor", 0.9, ()), Ranked("cylinder_3.k", 0.1, ()))
+ALARM = Alarm("joint_3", "residual", BEGIN, None, "joint_3.sensor", "joint_3.sensor jumped", CAUSES)
 
 
 class Rig:
@@ -36,14 +44,25 @@ class Rig:
         self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
 
     def is_heard(self) -> bool:
-        shown = set(self._publishers) - {Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY}
-        return all(self._publishers[role].get_subscription_count() for role in shown)
+        return all(self._publishers[role].get_subscription_count() for role in set(self._publishers) - {Output.CHANGES})
 
     def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:
         message = self._kinds[role]()
         message.header.stamp.sec, message.header.stamp.nanosec = EPOCH, nanosec
         fill(message)
         self._publishers[role].publish(message)
+
+
+def tell(end: int | None, message: Any) -> None:
+    """One alarm, that has ended or lasts."""
+    from rclpy.serialization import deserialize_message
+
+    health = Health(ALARM.since, (replace(ALARM, until=end),), (), np.zeros(0), np.zeros(2))
+    message.status = deserialize_message(encode(health), type(message)).status
+
+
+def judged(feed: Any) -> Any:
+    return next((alarm for alarm in feed.store.alarms.all if alarm.causes), None)
 
 
 def until(feed: Any, condition: Callable[[], Any]) -> None:
@@ -126,6 +145,48 @@ def test_an_event_is_published_with_the_stamp_of_the_newest_row_and_shown(pair: 
     event = rig.events[0]
     assert (event.msg, event.stamp.sec, event.stamp.nanosec) == ("mark: hose moved", EPOCH, 20_000_000)
     until(feed, lambda: any(alarm.name == "event" for alarm in feed.store.alarms.all))
+
+
+def test_alarms_and_the_band_of_the_tip_come_from_their_topics(pair: tuple[Any, Rig]) -> None:
+    feed, rig = pair
+    rig.send(Output.HEALTH, 60_000_000, partial(tell, None))
+    rig.send(Output.TIP_UNCERTAINTY, 60_000_000, lambda message: setattr(message.vector, "z", 0.002))
+    until(feed, lambda: "uncertainty" in feed.store.tables and judged(feed))
+    assert feed.store.tables["uncertainty"].rows(0, 1)[1].tolist() == [[0.0, pytest.approx(0.002)]]
+    alarm = judged(feed)
+    assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Level.ERROR, ALARM.told, None)
+    assert alarm.causes == (("joint_3.sensor", 0.9), ("cylinder_3.k", 0.1)) and alarm.begin == pytest.approx(0.02, abs=1e-3)
+
+
+def test_only_with_permission_the_node_lets_go_and_only_of_what_ended(pair: tuple[Any, Rig]) -> None:
+    import rclpy
+    from std_srvs.srv import Trigger
+
+    feed, rig = pair
+    asked: list[Any] = []
+
+    def let_go(request: Any, response: Any) -> Any:
+        asked.append(request)
+        response.success, response.message = True, "joint_3: it jumped"
+        return response
+
+    service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", let_go)
+    usual, permitted = Desk(feed, frozenset({"acknowledge"})), Desk(feed, frozenset({AT_NODE}))
+    request = {"do": "acknowledge", "number": judged(feed).number}
+    assert usual.act(request)["words"] == permitted.act(request)["words"] == "acknowledged: joint_3"
+    rig.send(Output.HEALTH, 80_000_000, partial(tell, END))
+    until(feed, lambda: judged(feed).end is not None)
+    assert not judged(feed).is_acknowledged and usual.act(request)["words"] == "acknowledged: joint_3"
+    until(feed, feed._asked.service_is_ready)
+    assert permitted.act(request)["words"].endswith("the node was asked to let go of what has ended")
+
+    def is_told() -> bool:
+        rclpy.spin_once(rig.node, timeout_sec=0.0)
+        return any(alarm.reason == "let go of by the node: joint_3: it jumped" for alarm in feed.store.alarms.all)
+
+    until(feed, is_told)
+    assert len(asked) == 1
+    rig.node.destroy_service(service)
 
 
 def test_time_set_back_begins_anew(pair: tuple[Any, Rig]) -> None:

@@ -13,6 +13,7 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -26,11 +27,13 @@ pytest.importorskip("playwright.sync_api", reason="playwright is not installed: 
 from aiohttp import ClientSession
 from playwright import sync_api
 
+from boom_twin.io.health import decode
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.reader import read, scan
 from boom_twin.io.topics import Output, load_topics
 from boom_twin.monitor.bag import bag_feed
 from boom_twin.monitor.lamps import LEVELS
+from boom_twin.records import Alarm
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 
@@ -41,7 +44,14 @@ pytestmark = [
 ]
 LIVE = Path(__file__).parents[1] / "bench" / "live.py"
 TOPICS = load_topics()
-HEARD = [Output.TIP_DISPLACEMENT, Output.TIP_ACCELERATION, Output.RESIDUALS, Output.DIAGNOSTICS]
+HEARD = [
+    Output.TIP_DISPLACEMENT,
+    Output.TIP_ACCELERATION,
+    Output.RESIDUALS,
+    Output.HEALTH,
+    Output.TIP_UNCERTAINTY,
+    Output.DIAGNOSTICS,
+]
 SPAN = 10.0
 
 
@@ -193,13 +203,36 @@ def test_every_lamp_is_that_of_diagnostics(page: Any, witness: Witness) -> None:
     lamps = {row[1].strip(): row for row in (text.split("\t") for text in page.locator("#lamps tr").all_inner_texts()[1:])}
     messages = witness.heard[Output.DIAGNOSTICS][-4:]
     newest = [{status.name.partition(": ")[2]: status for status in message.status} for message in messages]
-    assert set(lamps) == set(newest[-1])
-    for name, row in lamps.items():
+    judged = {alarm.channel for alarm in decode(witness.heard[Output.HEALTH][-1]) if alarm.until is None}
+    assert set(lamps) == set(newest[-1]) - ({"health"} if judged else set()) | judged
+    for name, row in ((name, row) for name, row in lamps.items() if name not in judged):
         told = [statuses[name] for statuses in newest]
         assert any(row[2].endswith(LEVELS[status.level[0]].name) and row[3].strip() == status.message for status in told), name
         values = [{pair.key: pair.value for pair in status.values}.get(row[4].strip()) for status in told]
         if row[4].strip():
             assert any(float(row[5]) == pytest.approx(float(value), rel=6e-3) for value in values if value), name
+
+
+def test_alarms_and_the_band_of_the_tip_are_those_of_their_topics(page: Any, witness: Witness) -> None:
+    """The source's angles lack the boom's deflection, so something is the matter from the start on."""
+    page.keyboard.press("5")
+    page.wait_for_timeout(1500)
+    rows = [text.split("\t") for text in page.locator("#alarms tr").all_inner_texts()[1:]]
+    recent = [alarm for message in witness.heard[Output.HEALTH][-4:] for alarm in decode(message) if alarm.until is None]
+    told = {(alarm.channel, alarm.told, causes_of(alarm)) for alarm in recent}
+    shown = {(row[0].strip(), row[2].strip(), row[3].strip()) for row in rows}
+    assert told and told & shown and {channel for channel, *_ in told} <= {row[0].strip() for row in rows}
+    stamps, sigmas = witness.rows(Output.TIP_UNCERTAINTY, lambda msg: [msg.vector.x, msg.vector.z])
+    table = "twin.link.table('uncertainty')"
+    time_s, *values = page.evaluate(f"(r => [r.time(r.count - 3), r.at(0, r.count - 3), r.at(1, r.count - 3)])({table})")
+    place = np.abs((stamps - int(page.evaluate("String(twin.link.epoch)"))) * 1e-9 - time_s).argmin()
+    assert values == pytest.approx(sigmas[place], rel=1e-6)
+
+
+def causes_of(alarm: Alarm) -> str:
+    """As the page writes them."""
+    ranked = [f"{rank.cause} {Decimal(100 * rank.probability).quantize(0, ROUND_HALF_UP)} %" for rank in alarm.ranked]
+    return ", ".join(ranked) or alarm.cause or "not known"
 
 
 def test_what_is_shown_is_young(page: Any) -> None:
