@@ -26,25 +26,27 @@ class Plausible:
 
     def __init__(self) -> None:
         self.estimate: Array | None = None
-        self._stamp = 0
+        self._stamp = self._trusted = self._before = 0
 
     def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
         """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events."""
         if self.estimate is None:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
-            self._stamp = stamp
+            self._stamp = self._trusted = stamp
             return values, []
         span, self._stamp = (stamp - self._stamp) * NANO, stamp
         limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-        far: Flags = np.abs(values - self.estimate) > limit
-        if not far.any() and np.isfinite(values.sum()):
-            self._strange[:] = 0
-            self._seen[:] = stamp
+        away = np.abs(values - self.estimate)
+        if away.max() <= limit:
+            self._trusted = stamp
             return values, []
-        return self._doubted(stamp, values, far)
+        return self._doubted(stamp, values, away > limit)
 
     def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         assert self.estimate is not None
+        if self._trusted > self._before:  # all were well since the last doubt
+            self._strange[:], self._seen[:] = 0, self._trusted
+        self._before = stamp
         self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
         implausible = far & (self._strange <= MOST)
         taken = np.where(implausible, np.nan, values)

@@ -268,7 +268,7 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
         {
             "channel": alarm.channel,
             "kind": alarm.kind,
-            "from_s": (alarm.since - first) * NANO,
+            "from_s": max(0.0, (alarm.since - first) * NANO),
             "to_s": None if alarm.until is None else (alarm.until - first) * NANO,
             "cause": alarm.cause,
             "told": alarm.told,

@@ -258,7 +258,8 @@ class Twin:
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         run.plausible.estimate = prediction.strokes
         self._remember(run, prediction)
-        self.counts.update(events)
+        if events:
+            self.counts.update(events)
         if self.judge is not None:
             self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
         residuals = self._settle_pending(run)
@@ -283,8 +284,10 @@ class Twin:
         if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
             return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
         self._newest_measured[sample.stream] = sample.stamp
-        events = () if complete else ("partial",)
-        self.counts.update(events)
+        events: tuple[str, ...] = ()
+        if not complete:
+            events = ("partial",)
+            self.counts.update(events)
         if self._run is None or sample.stamp > self._run.newest:
             if len(self._pending) == PENDING:
                 self._pending.popleft()

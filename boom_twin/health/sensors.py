@@ -82,18 +82,20 @@ class SensorCheck:
         if not len(stamps):
             return self._nothing(count, now)
         times = np.concatenate([self._stamps, stamps])
-        all_raw = np.vstack([self._raw, raw])
-        left = np.vstack([self._left, raw - expected])
-        self._heard = _newest(stamps, raw, self._heard)
-        spikes = self._spikes(left)
-        self._listen(left[1:], stamps[-1] - stamps[0], len(stamps))
+        all_raw = np.concatenate([self._raw, raw])
+        left = np.concatenate([self._left, raw - expected])
+        whole, span = bool(np.isfinite(raw.sum())), float(stamps[-1] - stamps[0])
+        self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
+        self._listen(left[1:], span)
+        steps = np.diff(left, axis=0)
+        sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
         findings = Findings(
             stuck=self._stuck(times[2:], all_raw[2:]),
             noisy=self._power > (NOISY * self._sigma) ** 2,
-            spikes=spikes,
-            jumped=self._jumps(times, all_raw, left),
-            silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, stamps[-1] - stamps[0]),
-            outside=((raw < self._low) | (raw > self._high)).mean(axis=0) > 0.5,
+            spikes=self._spikes(steps) if sudden else np.zeros(count, dtype=bool),
+            jumped=self._jumps(times, all_raw, left) if sudden else np.zeros(count),
+            silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
+            outside=((raw < self._low) | (raw > self._high)).sum(axis=0) > 0.5 * len(raw),
         )
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
         return findings
@@ -102,29 +104,30 @@ class SensorCheck:
         none = np.zeros(count, dtype=bool)
         return Findings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
 
-    def _spikes(self, left: Array) -> Flags:
-        """A reading that leaves both neighbours the same way, while these agree."""
+    def _spikes(self, steps: Array) -> Flags:
+        """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next."""
         with np.errstate(invalid="ignore"):
-            out, back = left[1:-1] - left[:-2], left[1:-1] - left[2:]
+            out, back = steps[:-1], -steps[1:]
             lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * self._sigma) & (out * back > 0.0)
             lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
         return np.asarray(lone.any(axis=0))
 
-    def _listen(self, left: Array, span: float, number: int) -> None:
+    def _listen(self, left: Array, span: float) -> None:
         """Power of the noise, by second differences of neighbours; single outliers are cut off."""
-        with np.errstate(invalid="ignore"):
-            bend2 = np.minimum((left[2:] - 2.0 * left[1:-1] + left[:-2]) ** 2 / 6.0, (4.0 * NOISY * self._sigma) ** 2)
-        known = np.isfinite(bend2)
-        power = np.where(known.any(axis=0), np.nansum(bend2, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
+        bend2 = np.minimum((left[2:] - 2.0 * left[1:-1] + left[:-2]) ** 2 / 6.0, (4.0 * NOISY * self._sigma) ** 2)
+        power = bend2.sum(axis=0) / len(bend2)
+        if not np.isfinite(power.sum()):
+            known = np.isfinite(bend2)
+            power = np.where(known.any(axis=0), np.nansum(bend2, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
         share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
         fresh = np.isnan(self._power)
         mixed = np.where(fresh, np.minimum(power, self._sigma**2), self._power + share * (power - self._power))
         self._power = np.where(np.isnan(power), self._power, mixed)
 
-    def _lacks(self, raw: Array, span: float) -> Flags:
+    def _lacks(self, raw: Array, span: float, whole: bool) -> Flags:
         """Channels of which too many readings are missing, in messages that come."""
         share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
-        self._missing += share * (np.isnan(raw).mean(axis=0) - self._missing)
+        self._missing += share * ((0.0 if whole else np.isnan(raw).mean(axis=0)) - self._missing)
         return np.asarray(self._missing > MISSING)
 
     def _stuck(self, times: Array, raw: Array) -> Flags:
