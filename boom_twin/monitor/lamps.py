@@ -116,7 +116,8 @@ def _group(name: str) -> str:
     if name == "model":
         return "model"
     kind = name.split(" ")[0]
-    return {"sensor": "sensors", "residual": "residuals", "recording": "recorder"}.get(kind, "timing")
+    groups = {"sensor": "sensors", "residual": "residuals", "health": "residuals", "recording": "recorder"}
+    return groups.get(kind, "timing")
 
 
 def _judged(values: Mapping[str, float], level: Level) -> tuple[str, float]:
