@@ -32,7 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("simulate", "the boom's answer to a stroke history"),
     "replay": ("replay", "a recorded session through the twin"),
     "calibrate": ("calibrate", "parameters of a scene from healthy sessions"),
-    "compare": ("compare", "two recorded sessions side by side: what differs, and how sure that is"),
+    "compare": ("compare", "two recorded sessions side by side"),
     "study": ("study", "reports on the methods: error against run time"),
     "rig": ("rig", "make a synthetic session on the virtual rig (extra peers)"),
 }

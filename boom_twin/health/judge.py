@@ -99,6 +99,7 @@ class Judge:
         news += self._stroke_watch.take(strokes, start, block.end)
         if self._stroke_watch.masked.any() or self._noise is None:
             ended = self.residuals.close(start)
+            self.residuals.begin()
             return news if ended is None else [*news, ended]
         told = self.residuals.take(self._means(block, left), self._noise)
         return news if told is None else [*news, told]

@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 from calibrate.sessions import ENCODERS, cut_to, made, off
 
-from boom_twin import load_scene, rig
+from boom_twin import load_scene
 from boom_twin.calibrate import Choice, calibrate
-from boom_twin.calibrate.blocks import blocks_of, channel_names
-from boom_twin.calibrate.course import course_of
-from boom_twin.calibrate.fit import fitted
-from boom_twin.calibrate.measured import Measured, Series
-from boom_twin.calibrate.problem import Problem
-from boom_twin.calibrate.unknowns import unknowns_of, usual_names
-from boom_twin.records import Stream
 from boom_twin.scene.named import parameter
-from boom_twin.settings import Settings
 
 
 def expected(name, truth, zeros):
@@ -103,23 +95,3 @@ def test_two_sections_without_an_imu(short, two_sections, tmp_path):
         assert abs(wrong[f"cylinder_{i}.k"]) < 0.02 * parameter(short.truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
     judge(found, 2)
-
-
-@pytest.mark.slow
-def test_intervals_cover_over_many_sets_of_noise(short, two_sections):
-    settings, scores = Settings(), []
-    unknowns = unknowns_of(two_sections, usual_names(two_sections, imu=True))
-    truth = np.array([expected(unknown.name, short.truth, np.zeros(2)) for unknown in unknowns])
-    for seed in range(100, 130):
-        seen = rig.observe(short.truth, short.programme, short.rows, rig.Sensors(), seed)
-        values = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: seen.imu}
-        session = Measured("made", "", {stream: Series(seen.stamps, rows) for stream, rows in values.items()})
-        course = course_of(session, settings)
-        blocks = blocks_of(session, course, 0.05, True, [None, None])
-        problem = Problem(two_sections, unknowns, [(course, blocks)], channel_names(2, True), settings)
-        fit = fitted(problem, lambda: None)
-        off_by = np.array([u.value(d) for u, d in zip(unknowns, fit.deviations, strict=True)]) - truth
-        scale = [u.kind.prior * (at if u.kind.relative else 1.0) for u, at in zip(unknowns, truth, strict=True)]
-        scores.append(off_by / scale / np.sqrt(np.diag(fit.covariance())))
-    assert 0.90 <= np.mean(np.abs(scores) < 1.96) <= 0.99
-    assert 0.8 < np.std(scores) < 1.25

@@ -4,7 +4,8 @@
 
 A fault is detected by an alarm that began no earlier than half a second before it; alarms before that, and in healthy sessions,
 are false. `first`: the cause that is named when the first move is over (a quarter of a second after it), or none; `end`: the
-one named last, if one still is; `ranked`: the cause stands first, or among the first two, at the end. Intervals are Wilson's, 95 %.
+one named last, if one still is; `ranked`: the cause stands first, or among the first two, at the end. Intervals are
+Wilson's, 95 %.
 """
 
 from __future__ import annotations
