@@ -21,7 +21,7 @@ from ..view.timeline import timeline_picture
 from .decay import Vibration
 from .html import heading, image, page, paragraph, table
 from .loads import BOX, Load, loads
-from .vibration import LEAST, NEAR, SURE, Hold, course
+from .vibration import LEAST, NEAR, Hold, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
@@ -194,7 +194,7 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
         f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "
-        f"within {NEAR:.0%} of a mode and sure to {SURE:.1%}."
+        f"within {NEAR:.0%} of a mode and clear of the noise."
     )
     rows = [
         (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))

@@ -44,7 +44,7 @@ def quantities(
     """All figures of one replay."""
     return [
         *_residuals(history, baseline, len(scene.joints)),
-        *_frequencies(still),
+        *_frequencies(still, baseline.detuning),
         *_tip(recording, history),
         *_loads(history, scene),
         *_travels(history, settings),
@@ -73,21 +73,25 @@ def batch_mean(values: Array) -> tuple[float, float]:
     return float(values.mean()), float(means.std(ddof=1) / sqrt(BATCHES))
 
 
-def _frequencies(still: list[Hold]) -> Iterator[Quantity]:
-    """Of every mode that was seen: measured over model frequency, which no posture changes, and damping."""
+def _frequencies(still: list[Hold], detuning: float) -> Iterator[Quantity]:
+    """Of every mode that was seen: measured over model frequency, and damping.
+
+    The ratio is that of the rig to the model in any posture, but for the `detuning` that the model may have in each.
+    """
     for mode in sorted({mode for hold in still for mode in hold.measured}):
         seen = [(hold.model[mode], hold.measured[mode]) for hold in still if mode in hold.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
-        yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios)
-        yield _weighted(f"damping_mode_{mode + 1}", np.array([(each.damping, each.damping_sigma) for _, each in seen]))
+        dampings = np.array([(each.damping, each.damping_sigma) for _, each in seen])
+        yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios, detuning)
+        yield _weighted(f"damping_mode_{mode + 1}", dampings, 0.0)
 
 
-def _weighted(name: str, rows: Array) -> Quantity:
-    """Weighted mean of values and deviations (k, 2); it is as unsure as they say, or as they scatter if that is more."""
+def _weighted(name: str, rows: Array, error: float) -> Quantity:
+    """Weighted mean of values and deviations (k, 2), as unsure as these say or the values scatter, and by `error` besides."""
     weights = rows[:, 1] ** -2.0
     mean = float(weights @ rows[:, 0] / weights.sum())
     scatter = float(weights @ (rows[:, 0] - mean) ** 2 / max(len(rows) - 1, 1))
-    return Quantity(name, mean, sqrt(max(1.0, scatter) / weights.sum()), "1")
+    return Quantity(name, mean, hypot(sqrt(max(1.0, scatter) / weights.sum()), error), "1")
 
 
 def _tip(recording: Recording, history: History) -> Iterator[Quantity]:

@@ -20,8 +20,8 @@ LEAST = 3.0
 """s; the shortest stretch that is looked at."""
 NEAR = 0.2
 """A vibration belongs to the nearest mode of the model, if it is no further from it than this share."""
-SURE = 0.005
-"""Largest standard deviation of a measured frequency, as a share."""
+SURE = 0.02
+"""Largest standard deviation of a frequency, in cycles over the stretch; in noise alone it is about 0.2."""
 POINTS = 60
 """Most times at which the model's frequencies are told."""
 
@@ -43,7 +43,8 @@ def holds(history: History, scene: Scene) -> list[Hold]:
     for start, stop in still(history.stamps_s, history.strokes):
         inside, there = _between(history.stamps_s, start, stop), _between(times, start, stop)
         model = modes.at(np.median(history.strokes[inside], axis=0).tolist())
-        found.append(Hold(start, stop, model, _by_mode(vibrations(times[there], values[there]), model)))
+        sure = [each for each in vibrations(times[there], values[there]) if each.frequency_sigma * (stop - start) < SURE]
+        found.append(Hold(start, stop, model, _by_mode(sure, model)))
     return found
 
 
@@ -91,7 +92,6 @@ def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]
     for each in found if model else ():
         mode = int(np.argmin(np.abs(np.array(model) - each.frequency)))
         is_near = abs(each.frequency - model[mode]) <= NEAR * model[mode]
-        is_sure = each.frequency_sigma <= SURE * each.frequency
-        if is_near and is_sure and (mode not in near or each.frequency_sigma < near[mode].frequency_sigma):
+        if is_near and (mode not in near or each.frequency_sigma < near[mode].frequency_sigma):
             near[mode] = each
     return near

@@ -24,14 +24,14 @@ def status(name: str, level: int = OK, message: str = "well", **values: Any) -> 
 
 
 def test_every_status_lights_the_lamp_of_its_group() -> None:
-    names = ["model", "sensor cylinder_1", "residual joint_1", "cylinder_strokes", "outputs"]
+    names = ["model", "sensor cylinder_1", "residual joint_1", "health", "cylinder_strokes", "outputs"]
     board = Board().told(1.0, [status(f"boom_twin: {name}") for name in names], 0.0)
     board = board.told(1.0, [status("boom_twin_recorder: recording")], 0.0)
     groups = {group: [lamp.name for lamp in lamps] for group, lamps in board.groups(1.0).items()}
     assert groups == {
         "sensors": ["sensor cylinder_1"],
         "model": ["model"],
-        "residuals": ["residual joint_1"],
+        "residuals": ["residual joint_1", "health"],
         "timing": ["cylinder_strokes", "outputs"],
         "recorder": ["recording"],
     }

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from boom_twin.records import Array
-from boom_twin.view import History, ImuTrace, Truth, replay_pictures
+from boom_twin.view import AlarmSpan, History, ImuTrace, Truth, replay_pictures
 from boom_twin.view.posture import spread
-from boom_twin.view.residuals import running_mean
+from boom_twin.view.residuals import residual_picture, running_mean
 from boom_twin.view.spectrum import density
 from boom_twin.view.style import broken, limits
 from boom_twin.view.tip import liveliest, rms_difference
@@ -147,3 +147,14 @@ def test_numbers_behind_the_pictures() -> None:
 def test_plotting_library_is_not_imported_before_a_picture_is_drawn() -> None:
     code = "import sys, boom_twin.view, boom_twin.view.boom; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_alarms_are_shaded_where_they_show(tmp_path: Path) -> None:
+    whole = history(2)
+    alarmed = replace(whole, alarms=[AlarmSpan("joint_2", 4.0, 8.0, "joint_2.sensor")])
+    for name, each in (("plain", whole), ("alarmed", alarmed)):
+        (tmp_path / name).mkdir()
+        residual_picture(tmp_path / name / "r.png", "test", each, "")
+    differ = np.abs(pixels(tmp_path / "plain" / "r.png") - pixels(tmp_path / "alarmed" / "r.png")).max(axis=2) > 0.02
+    rows = np.flatnonzero(differ.any(axis=1))
+    assert 0.3 * len(differ) < rows.min() < rows.max() < 0.7 * len(differ)  # the second of four panels
