@@ -100,11 +100,7 @@ def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
     level, reason = overall(feed.store.board(14.0).groups(14.0))
     assert level == Level.OK
     level, reason = overall(feed.store.board(25.0).groups(25.0))
-<<<<<<< HEAD
     assert level == Level.ERROR and reason.startswith("health: joint_3")
-=======
-    assert level == Level.ERROR and reason.startswith("health: joint_3: joint_3.sensor")
->>>>>>> wt-report
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
     assert 15.0 < alarm.begin < 20.0 and alarm.level == Level.ERROR
 
