@@ -24,9 +24,10 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from ..records import Array
-from .parameters import Parameter, variances
+from .parameters import Form, Parameter, variances
 
 UNKNOWN, UNKNOWN_PRIOR = "unknown", 0.01
+SLOWEST = 6.0  # s
 
 
 @dataclass(frozen=True)
@@ -156,10 +157,20 @@ class Bank:
         self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
         self._faulty = variances(known, "faulty")[self._places]
         self._one_sided = np.array([known[i].one_sided for i in self._places])
+        self._drifts = np.array([known[i].form is Form.DRIFT for i in self._places])
         self._priors = np.log([*(known[i].prior for i in self._places), UNKNOWN_PRIOR])
 
-    def explain(self, evidence: Evidence, mean: Array, covariance: Array) -> Verdict:
-        """Weigh all faults; `mean` and `covariance` are those of the parameters while all was well."""
+    def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float) -> Verdict:
+        """Weigh all faults.
+
+        Parameters
+        ----------
+        evidence : Evidence
+        mean, covariance : ndarray
+            Of the parameters while all was well.
+        span : float
+            Time (s) that the evidence has taken: what changes within less than `SLOWEST` is no drift.
+        """
         healthy = evidence.given(mean, covariance)
         matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
         spread = self._faulty / (1.0 + self._faulty * matrix)
@@ -169,6 +180,7 @@ class Bank:
         factors += np.where(self._one_sided, log_ndtr(values / sigmas) + log(2.0), 0.0)
         excess = max(1.0, (healthy.squares - float(fitted.max())) / max(healthy.rows, 1))
         weights = np.append(factors, healthy.unknown - healthy.log) / excess + self._priors
+        weights[:-1][self._drifts & (span < SLOWEST)] = -np.inf
         shares = np.exp(weights - weights.max())
         found = [Explanation(int(p), *each) for p, *each in zip(self._places, factors, values, sigmas, strict=True)]
         found.append(Explanation(None, healthy.unknown - healthy.log))

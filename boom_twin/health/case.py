@@ -46,7 +46,7 @@ class Case:
         self._faulty = Whitening(channels, 1 + len(mean), block, DETUNING)
         self._unknown = Whitening(channels, 1, block, DETUNING)
         self._size, self._beyond = np.zeros(channels), 0.0
-        self._evidence = Evidence.none(len(mean))
+        self._evidence, self._span = Evidence.none(len(mean)), 0.0
         self._recent: deque[Evidence] = deque(maxlen=RECENT)
         self._turn = drifts_from(bank.known, (start - clock) * NANO)
         self._modes: Modes | None = None
@@ -61,6 +61,7 @@ class Case:
         measured = np.isfinite(left)
         self._size[measured] += BLOCK * NANO / LEVEL * (left[measured] - self._size[measured])
         shaking = self._shaking(problem)
+        self._span = (problem.start - self.start) * NANO
         noise = np.diag(problem.own * self._noise2) + problem.strokes
         crude = self._errors2 + (CRUDE * self._size) ** 2
         faulty = self._faulty.step(problem.table, noise, crude, shaking, problem.travel)
@@ -78,7 +79,7 @@ class Case:
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses; drifts begin with the case."""
-        return self._bank.explain(self._evidence.turned(self._turn), self._mean, self._covariance)
+        return self._bank.explain(self._evidence.turned(self._turn), self._mean, self._covariance, self._span)
 
     def has_ended(self, verdict: Verdict) -> bool:
         """Whether the last seconds speak against the fault that explains all of the case best."""

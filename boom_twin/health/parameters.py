@@ -97,7 +97,7 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
     found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4, prior=0.3) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 5e-4, one_sided=True) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, True, 0.1) for i in each]
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
     if has_imu:
         found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]

@@ -12,7 +12,7 @@ from .bank import UNKNOWN, Cause, Explanation, Verdict
 from .parameters import Form, Parameter, physical
 from .signatures import Signature, Signatures
 
-NAMED, KEPT = 0.95, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
+NAMED, KEPT = 0.9, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through

@@ -50,7 +50,7 @@ class Problem:
         return log_density(self.values, at, self.spread + more * np.outer(column, column))
 
     def verdict(self):
-        return BANK.explain(self.evidence(), self.mean, self.covariance)
+        return BANK.explain(self.evidence(), self.mean, self.covariance, 60.0)
 
 
 def explained(verdict):

@@ -26,6 +26,7 @@ from boom_twin.records import Alarm
 from boom_twin.settings import Settings
 
 NANO = 1e-9
+CALM, LOAD = 1.0, 0.25  # s over which a force is averaged; share of it that counts as a change of load
 
 
 def main(args: Namespace) -> None:
@@ -70,9 +71,25 @@ def _outcome(sessions: Path, out: Path, entry: dict[str, Any]) -> tuple[dict[str
             if last.get((alarm.channel, alarm.since)) != state:
                 last[alarm.channel, alarm.since] = state
                 told.append(_told(alarm, sample.stamp))
-    moves = arrays["moves"]
-    first = float((moves[:, 1] + moves[:, 2]).min()) if len(moves) else None
-    return entry, {"told": told, "first_move_end": first, "seconds": float(arrays["stamps"][-1] - stored.EPOCH) * NANO}
+    seconds = float(arrays["stamps"][-1] - stored.EPOCH) * NANO
+    return entry, {"told": told, "telling_move_end": _telling_move(entry, arrays), "seconds": seconds}
+
+
+def _telling_move(entry: dict[str, Any], arrays: Any) -> float | None:
+    """End (s) of the first move after the fault began that changes the load: of the soft cylinder, by a quarter at least."""
+    moves, times = arrays["moves"], (arrays["stamps"] - stored.EPOCH) * NANO
+    begin = entry["onset"] or 0.0
+    forces = arrays["true_forces"]
+    for end in sorted(end for end in (moves[:, 1] + moves[:, 2]).tolist() if end > begin):
+        cause = entry["cause"] or ""
+        if not (cause.startswith("cylinder_") and cause.endswith(".k")):
+            return float(end)
+        force = forces[:, int(cause[9]) - 1]
+        before = force[(times >= begin) & (times <= begin + CALM)].mean()
+        after = force[(times >= end) & (times <= end + CALM)].mean()
+        if abs(after - before) > LOAD * abs(before):
+            return float(end)
+    return None
 
 
 def _told(alarm: Alarm, stamp: int) -> dict[str, Any]:

@@ -3,7 +3,7 @@
     python test/bench/health/table.py out/health/outcomes.json
 
 A fault is detected by an alarm that began no earlier than half a second before it; alarms before that, and in healthy sessions,
-are false. `first`: the cause that is named when the first move is over (a quarter of a second after it), or none; `end`: the
+are false. `first`: the cause that is named half a second after the first move that changes the load, or none; `end`: the
 one named last, if one still is; `ranked`: the cause stands first, or among the first two, at the end. Intervals are
 Wilson's, 95 %.
 """
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-EARLY, AFTER = 0.5, 0.25  # s
+EARLY, AFTER = 0.5, 0.5  # s
 Outcome = dict[str, Any]
 
 
@@ -91,7 +91,7 @@ def judge(outcome: Outcome) -> dict[str, Any]:
     every = alarms(outcome)
     own = [told for (_, since), told in every.items() if since >= onset - EARLY]
     told = sorted((each for alarm in own for each in alarm), key=lambda each: each["at"])
-    move = outcome["first_move_end"]
+    move = outcome["telling_move_end"]
     early = [each for each in told if move is not None and each["at"] <= max(move, onset) + AFTER]
     last = told[-1] if told else None
     named = [each["cause"] for each in told if each["cause"] is not None]
