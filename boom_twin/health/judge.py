@@ -44,7 +44,7 @@ class Judge:
         self._low[absolute], self._high[absolute] = -np.inf, np.inf
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self.residuals = ResidualWatch(scene, settings, mounts, baseline, self.names)
-        self._angle_watch, self._stroke_watch = SensorWatch(self._angle_names), SensorWatch(self._stroke_names)
+        self._angle_watch, self._stroke_watch = SensorWatch(self._angle_names, "rad"), SensorWatch(self._stroke_names, "m")
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()

@@ -34,10 +34,12 @@ class SensorWatch:
     ----------
     names : tuple of str
         Of its channels.
+    unit : str
+        Of its readings.
     """
 
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._names = names
+    def __init__(self, names: tuple[str, ...], unit: str) -> None:
+        self._names, self._unit = names, unit
         self._faults: dict[tuple[int, str], _Fault] = {}
 
     @property
@@ -82,6 +84,6 @@ class SensorWatch:
             fault.seen = end
             return []
         name = self._names[channel]
-        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g}" if size else "")
+        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._unit}" if size else "")
         self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size)
         return [self._faults[key].alarm]

@@ -135,9 +135,9 @@ class Catch:
 
     def _take_shape(self, msg: Any, now: float) -> None:
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
-        if not self._forces:
+        boom, straight = lines.get(("boom", 0)), lines.get(("boom_undeflected", 0))
+        if not self._forces or boom is None or straight is None:  # not the twin's own
             return
-        boom, straight = lines["boom", 0], lines["boom_undeflected", 0]
         pins = [point for (kind, _), ends in lines.items() if kind == "cylinders" for point in ends]
         values = [number for point in (*boom, *straight, *pins) for number in (point.x, point.z)]
         names = [("line", len(boom)), ("straight", len(straight)), ("pins", len(pins))]

@@ -27,7 +27,7 @@ def test_threshold_grows_with_the_run():
 
 
 def test_false_alarms_are_as_rare_as_stated():
-    """20 an hour stated: counted over 8 hours, the whole detector gives no more, and not far fewer."""
+    """200 an hour stated: counted over a simulated hour, the whole detector gives no more, and not far fewer."""
     stated, channels = 200.0 / 3600.0, 6
     detector, rng, count = Detector(channels, BLOCK, stated), np.random.default_rng(3), 0
     blocks = round(3600.0 / BLOCK)

@@ -24,7 +24,7 @@ class Watched:
     """Takes block after block."""
 
     def __init__(self) -> None:
-        self.watch, self.block = SensorWatch(NAMES), 0
+        self.watch, self.block = SensorWatch(NAMES, "rad"), 0
 
     def take(self, found: Findings):
         self.block += 1
