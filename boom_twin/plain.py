@@ -78,12 +78,10 @@ class _Values:
         self._count += 1
         if self._count > MOST or depth > DEEPEST:
             raise ValueError(f"more than {MOST} values by aliases, or nested deeper than {DEEPEST}")
-        if isinstance(node, ScalarNode):
-            return self._scalar(node)
-        if str(node.tag) not in (_TAG + "map", _TAG + "seq"):
-            raise ValueError(f"line {node.start_mark.line + 1}: the tag {node.tag}, which is not allowed")
         if isinstance(node, MappingNode):
             return self._mapping(node, depth)
+        if isinstance(node, ScalarNode):
+            return self._scalar(node)
         return [self.of(item, depth + 1) for item in node.value]
 
     def _mapping(self, node: MappingNode, depth: int) -> dict[Any, Any]:
