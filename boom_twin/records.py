@@ -223,6 +223,7 @@ class Health:
     levels: Array
     tip_sigmas: Array
 
+
 @dataclass(frozen=True, slots=True)
 class Report:
     """What one sample caused.

@@ -68,10 +68,12 @@ def test_parameters_of_the_scene(made):
             continue
         step = {"": 0.03, "kg": 5.0, "kg/m": 1.0}[each.unit]
         own = parameter(scene, each.cause)
-        if own < step and each.unit:
-            scene_of = lambda value, each=each, own=own, step=step: with_parameters(scene, {each.cause: own + value + step})  # noqa: E731
-        else:
-            scene_of = lambda value, each=each: with_parameters(scene, {each.cause: physical(each, scene, value)})  # noqa: E731
+        more = step if own < step and each.unit else 0.0  # so that both sides of the difference have a positive load
+
+        def scene_of(value, each=each, own=own, more=more):
+            changed = own + value + more if more else physical(each, scene, value)
+            return with_parameters(scene, {each.cause: changed})
+
         close(found(signature, len(strokes), column), central(scene_of, lambda _: strokes, step), 0.05)
 
 

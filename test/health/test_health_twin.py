@@ -183,4 +183,3 @@ def test_an_alarm_ends_with_its_fault():
     assert outcome.causes() == {"joint_2.sensor"}
     assert any(alarm.until is not None for _, alarm in outcome.states())
     assert outcome.health[-1].alarms == ()
-

@@ -3,7 +3,8 @@
     python test/bench/health/table.py out/health/outcomes.json
 
 A fault is detected by an alarm that began no earlier than half a second before it; alarms before that, and in healthy sessions,
-are false. `first`: the cause that is named half a second after the first move that changes the load, or none; `end`: the
+are false. `first`: the cause that is named half a second after the first move that changes the load (sessions
+without one do not count); `end`: the
 one named last, if one still is; `ranked`: the cause stands first, or among the first two, at the end. Intervals are
 Wilson's, 95 %.
 """
@@ -98,7 +99,7 @@ def judge(outcome: Outcome) -> dict[str, Any]:
     return {
         "after": told[0]["at"] - onset if told else None,
         "false": len(every) - len(own),
-        "first": verdict(early[-1]["cause"] if early else None, cause),
+        "first": "none" if move is None else verdict(early[-1]["cause"] if early else None, cause),
         "end": verdict(named[-1] if named and last is not None and last["cause"] is not None else None, cause),
         "rank": rank(last, cause),
         "error": error_of(outcome, told, cause),
