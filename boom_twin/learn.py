@@ -30,7 +30,7 @@ def learn_baseline(
     Raises
     ------
     UsageError
-        Less than a minute of usable samples in all.
+        Too few usable samples to learn from.
     """
     problems: list[list[Problem]] = []
     for name, session in zip(names, sessions, strict=True):

@@ -29,7 +29,7 @@ BOUNDS = {
 RATIOS = (2.0, 1.25)  # of the grid, coarse and fine
 ROUNDS = 2
 WIDER = 4.0  # times the covariance that is learnt, because the model is not exact
-LEAST = 60.0  # s
+LEAST = 45.0  # s
 
 Session = Sequence[Problem]
 
@@ -46,7 +46,7 @@ def learn(
     Raises
     ------
     UsageError
-        Less than a minute of sessions.
+        Sessions shorter than `LEAST` in all.
     """
     span = sum(len(session) for session in sessions) * BLOCK * NANO
     if span < LEAST:
