@@ -11,7 +11,7 @@ from .bank import Bank, Evidence, Verdict
 from .blocks import BLOCK, NANO
 from .linear import CALM, Problem
 from .parameters import Form, Parameter
-from .whitening import Modes, Whitening
+from .whitening import Whitening
 
 DETUNING = 0.4  # share by which a fault may change natural frequencies
 CRUDE = 0.07  # share of a deviation by which its signature, a derivative, may be wrong
@@ -49,20 +49,17 @@ class Case:
         self._evidence, self._span = Evidence.none(len(mean)), 0.0
         self._recent: deque[Evidence] = deque(maxlen=RECENT)
         self._turn = drifts_from(bank.known, (start - clock) * NANO)
-        self._modes: Modes | None = None
 
     def take(self, problem: Problem) -> None:
         """Take one block."""
-        if problem.modes is not self._modes:
-            self._modes = problem.modes
-            self._faulty.tune(problem.modes)
-            self._unknown.tune(problem.modes)
+        self._faulty.tune(problem.modes)
+        self._unknown.tune(problem.modes)
         left = problem.table[:, 0]
         measured = np.isfinite(left)
         self._size[measured] += BLOCK * NANO / LEVEL * (left[measured] - self._size[measured])
         shaking = self._shaking(problem)
         self._span = (problem.start - self.start) * NANO
-        noise = np.diag(problem.own * self._noise2) + problem.strokes
+        noise = problem.noise(self._noise2)
         crude = self._errors2 + (CRUDE * self._size) ** 2
         faulty = self._faulty.step(problem.table, noise, crude, shaking, problem.travel)
         large = UNKNOWN_TIMES**2 * self._errors2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..analysis.noise import StrokeNoise
-from ..records import Alarm, Array, Health, Mount, Prediction, Residuals
+from ..records import Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
 from ..scene.parts import Scene
 from ..settings import Settings
 from .baseline import Baseline
@@ -35,16 +35,16 @@ class Judge:
     def __init__(self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], baseline: Baseline) -> None:
         n = len(scene.joints)
         self._n, self._settings = n, settings
-        self._angle_names = tuple(f"joint_{i + 1}" for i in range(n))
-        self._stroke_names = tuple(f"cylinder_{i + 1}" for i in range(n))
-        self.names = (*self._angle_names, "tip_imu_x", "tip_imu_z")
+        channels = channels_of(n)
+        self.names = (*channels[Stream.ANGLES], *channels[Stream.IMU])
         self._low = np.array([np.radians(joint.range_deg[0]) for joint in scene.joints])
         self._high = np.array([np.radians(joint.range_deg[1]) for joint in scene.joints])
         absolute = np.array([mount is not None for mount in mounts])
         self._low[absolute], self._high[absolute] = -np.inf, np.inf
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self.residuals = ResidualWatch(scene, settings, mounts, baseline, self.names)
-        self._angle_watch, self._stroke_watch = SensorWatch(self._angle_names, "rad"), SensorWatch(self._stroke_names, "m")
+        self._angle_watch = SensorWatch(channels[Stream.ANGLES], "rad")
+        self._stroke_watch = SensorWatch(channels[Stream.STROKES], "m")
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -56,7 +56,6 @@ class Judge:
         self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
         zero = np.zeros(self._n)
         self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
-        self._rates: Array | None = None
         ended = self.residuals.close(self._told)
         if ended is not None:
             self._ended.append(ended)

@@ -19,7 +19,7 @@ from .blocks import BLOCK, NANO
 from .linear import Problem
 from .parameters import Parameter
 from .regression import GATE, Regression
-from .whitening import Modes, Whitening
+from .whitening import Whitening
 
 SEARCHED = ("angle_error", "force_error", "angle_noise", "force_noise", "detuning")
 BOUNDS = {
@@ -99,19 +99,15 @@ def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int,
     errors2, noise2 = trial.errors(joints) ** 2, trial.noise(joints) ** 2
     for session in sessions:
         whitening = Whitening(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning)
-        modes: Modes | None = None
         for problem in session:
-            if problem.modes is not modes:
-                modes = problem.modes
-                whitening.tune(modes)
-            noise = np.diag(problem.own * noise2) + problem.strokes
-            found = whitening.step(problem.table, noise, errors2, problem.shaking, problem.travel)
+            whitening.tune(problem.modes)
+            found = whitening.step(problem.table, problem.noise(noise2), errors2, problem.shaking, problem.travel)
             log += _log(regression, found.white, found.log)
     return regression, log
 
 
 def _log(regression: Regression, white: Array, log: float) -> float:
     """Logarithm of the probability of one block, and the regression narrowed by it; outliers count as if at the gate."""
-    first = white[:, 0].copy()
+    first = white[:, 0]
     left, spread = regression.take(white, True)
     return log + 0.5 * float(first @ first) - 0.5 * float(np.minimum(left**2, GATE**2).sum()) - spread

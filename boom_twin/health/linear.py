@@ -72,6 +72,10 @@ class Problem(NamedTuple):
     travel: float
     modes: Modes
 
+    def noise(self, factors2: Array) -> Array:
+        """Covariance (c, c) of the residuals where the sensors' own noise is `factors2` (c,) times as strong in power."""
+        return np.asarray(np.diag(self.own * factors2) + self.strokes)
+
 
 class Linear:
     """Follows the posture.

@@ -14,6 +14,8 @@ LEAST = 1e-3  # of the prior's variance, what must have been learnt for that
 class Regression:
     """Parameters that are constant in time, normal before anything is measured; what is measured narrows them.
 
+    Mean and covariance are never changed, but replaced: what was known at a time may be kept.
+
     Parameters
     ----------
     mean : ndarray, shape (parameters,)
@@ -27,7 +29,7 @@ class Regression:
 
     def restart(self) -> None:
         """Know no more than before anything was measured."""
-        self.mean, self.covariance = self._prior[0].copy(), self._prior[1].copy()
+        self.mean, self.covariance = self._prior
 
     @property
     def has_strayed(self) -> bool:
@@ -60,6 +62,6 @@ class Regression:
         step = np.linalg.solve(root, np.column_stack([white[:, 0] - signature @ self.mean, gain]))
         left = step[:, 0]
         if learn and np.abs(left).max() < GATE:
-            self.mean += step[:, 1:].T @ left
-            self.covariance -= step[:, 1:].T @ step[:, 1:]
+            self.mean = self.mean + step[:, 1:].T @ left
+            self.covariance = self.covariance - step[:, 1:].T @ step[:, 1:]
         return left, float(np.log(np.diag(root)).sum())

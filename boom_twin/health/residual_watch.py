@@ -20,7 +20,7 @@ from .linear import Linear, Means, Problem
 from .parameters import parameters
 from .regression import Regression
 from .signatures import Signature
-from .whitening import Modes, Whitening
+from .whitening import Whitening
 from .words import Teller
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a case is begun, and given up if it has not become an alarm
@@ -75,7 +75,6 @@ class ResidualWatch:
         channels, size, block = len(self._names), 1 + self._count, BLOCK * NANO
         self._healthy = Whitening(channels, size, block, self._detuning)
         self._linear.begin()
-        self._modes: Modes | None = None
         self._detector.reset()
         self._case: Case | None = None
         self._blocks = 0
@@ -108,12 +107,10 @@ class ResidualWatch:
 
     def _watch(self, problem: Problem) -> None:
         """Innovations beyond what healthy parameters explain; the first suspicious one begins a case."""
-        if problem.modes is not self._modes:
-            self._modes = problem.modes
-            self._healthy.tune(problem.modes)
-        noise = np.diag(problem.own * self._noise2) + problem.strokes
+        self._healthy.tune(problem.modes)
+        noise = problem.noise(self._noise2)
         found = self._healthy.step(problem.table, noise, self._errors2, problem.shaking, problem.travel)
-        known = self._regression.mean.copy(), self._regression.covariance.copy()
+        known = self._regression.mean, self._regression.covariance
         left, _ = self._regression.take(found.white, self.alarm is None)
         self.surprise = np.full(len(self._names), np.nan)
         self.surprise[np.isfinite(problem.table[:, 0])] = left
@@ -132,14 +129,12 @@ class ResidualWatch:
 
     def _open(self, start: int) -> Alarm | None:
         """An alarm where the detector says so, if a fault explains the case better than none."""
-        levels = self.levels
-        channel = int(np.argmax(levels))
         if self._case is None or self._detector.suspicion < CLEAN:
             self._case = None
             return None
-        if levels[channel] < 1.0:
-            return None
-        if start < self._case.start + ENOUGH * BLOCK:
+        levels = self.levels
+        channel = int(np.argmax(levels))
+        if levels[channel] < 1.0 or start < self._case.start + ENOUGH * BLOCK:
             return None
         verdict = self._case.explain()
         if verdict.strength < SURE:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..records import Array
+from ..watch.frozen import readings_of_frozen
 
 Flags = NDArray[np.bool_]
 
@@ -17,6 +18,7 @@ JUMP = 10.0  # likewise, by which readings change at once and for good
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is stated; time (s) over which it is taken
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
+REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s
 MISSING = 0.1  # share of the readings
@@ -160,7 +162,6 @@ def _newest(stamps: Array, raw: Array, before: Array) -> Array:
 
 
 def repeats(sigma: float, resolution: float) -> int:
-    """Readings in a row that are the same with a probability below `FALSE_ALARM` while the sensor lives."""
-    spread = math.sqrt(2.0) * max(sigma, 1e-300)
-    same = math.erf(resolution / (2.0 * spread))  # that rounding hides the difference of two readings, at most
-    return 3 if same < 1e-4 else min(math.ceil(math.log(FALSE_ALARM) / math.log(min(same, 0.9999))), 1_000_000)
+    """Times that a reading repeats with a probability below `FALSE_ALARM` while the sensor lives, within `REPEATS`."""
+    least, most = REPEATS
+    return int(min(max(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, least), most))

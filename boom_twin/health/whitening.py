@@ -143,18 +143,22 @@ class Whitening:
     def __init__(self, channels: int, columns: int, block: float, detuning: float) -> None:
         self._block, self._detuning2, self._channels = block, detuning**2, channels
         self._x, self._p = np.zeros((channels, columns)), np.zeros((channels, channels))
-        self._fresh, self._modes = True, 0
+        self._fresh, self._size = True, 0
+        self._posture: Modes | None = None
 
     def tune(self, modes: Modes) -> None:
-        """Take the modes of another posture; coordinates of modes that were there go on."""
-        size, old, c = len(modes.turn), self._modes, self._channels
+        """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
+        if modes is self._posture:
+            return
+        self._posture = modes
+        size, old, c = len(modes.turn), self._size, self._channels
         kept = min(size, old)
         places = [*range(kept), *range(old, old + c)]
         at = [*range(kept), *range(size, size + c)]
         x, p = np.zeros((size + c, self._x.shape[1])), np.zeros((size + c, size + c))
         p[:size, :size] = modes.rest
         x[at], p[np.ix_(at, at)] = self._x[places], self._p[np.ix_(places, places)]
-        self._x, self._p, self._modes = x, p, size
+        self._x, self._p, self._size = x, p, size
         self._turn, self._least, self._driven = modes.turn, modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         self._shown = np.hstack([modes.shown, np.eye(c)])
@@ -192,7 +196,7 @@ class Whitening:
 
     def _go_on(self, errors2: Array, shaking: float, travel: float) -> None:
         """To the next block, before it is measured."""
-        m = self._modes
+        m = self._size
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
         self._x[:m] = self._turn @ self._x[:m]

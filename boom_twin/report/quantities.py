@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import BagError
 from ..health.baseline import Baseline
 from ..moments import stations
-from ..records import Array
+from ..records import Array, Stream, channels_of
 from ..replay import Recording
 from ..scene.parts import Scene
 from ..settings import Settings
@@ -53,7 +53,8 @@ def quantities(
 
 def _residuals(history: History, baseline: Baseline, joints: int) -> Iterator[Quantity]:
     """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean."""
-    channels = [*(f"joint_{i + 1}" for i in range(joints)), "tip_imu_x", "tip_imu_z"]
+    named = channels_of(joints)
+    channels = [*named[Stream.ANGLES], *named[Stream.IMU]]
     errors = dict(zip(channels, baseline.errors(joints), strict=True))
     for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
         values, unit = column[np.isfinite(column)], "rad" if name.startswith("joint") else "m/s^2"
