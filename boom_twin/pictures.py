@@ -14,7 +14,7 @@ from .scene.kinematics import gravity_in_base
 from .scene.parts import Scene
 from .truth import TipTruth
 from .view import AlarmSpan, History, ImuTrace, Truth, replay_pictures
-from .view.orbits import Orbits
+from .view.records import Orbits
 
 NANO = 1e-9
 

@@ -48,7 +48,8 @@ def run(args: Namespace) -> int:
     for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
         print(f"{name}: contact lost {lost} times")
     if args.orbits:
-        from ..view.orbits import Orbits, orbits_picture  # with the plotting library
+        from ..view.orbits import orbits_picture  # with the plotting library
+        from ..view.records import Orbits
 
         gaps = compile_scene(scene).tables.clearances.gap
         orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)

@@ -24,7 +24,7 @@ A looped session repeats stamps; a stray stamp is far from its stream.
 """
 
 
-def encode(change: Change) -> bytes:
+def encode_changes(change: Change) -> bytes:
     """The message of a change, in CDR."""
     values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
     types = RosbagsTypes()
@@ -34,7 +34,7 @@ def encode(change: Change) -> bytes:
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
 
 
-def decode(msg: Any) -> Change:
+def decode_changes(msg: Any) -> Change:
     """The change of a message.
 
     Raises
@@ -92,4 +92,4 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     info = session.find(topic.absolute)
     if info is None or info.count == 0:
         return Changes([])
-    return Changes((log, decode(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
+    return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))

@@ -15,7 +15,7 @@ OK, WARN, ERROR = range(3)
 """Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""
 
 
-def encode(health: Health) -> bytes:
+def encode_health(health: Health) -> bytes:
     """A diagnostic_msgs/DiagnosticArray in CDR, with the stamp of `health`; see ``topics.yaml`` for its values."""
     types = RosbagsTypes()
     msg = types.make(TYPES[Output.HEALTH])
@@ -24,7 +24,7 @@ def encode(health: Health) -> bytes:
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
 
 
-def decode(msg: Any) -> tuple[Alarm, ...]:
+def decode_health(msg: Any) -> tuple[Alarm, ...]:
     """The alarms of such a message, see `boom_twin.alarms.alarm_of`; a status that is none is left out."""
     found = []
     for status in msg.status:

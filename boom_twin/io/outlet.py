@@ -15,9 +15,9 @@ from ..records import Prediction, Report, Residuals
 from ..scene.parts import Scene
 from ..scene.passive import PassiveJoints
 from ..settings import Settings
-from .changes import encode
+from .changes import encode_changes
 from .factory import RosbagsTypes
-from .health import encode as encode_health
+from .health import encode_health
 from .markers import ShapeMarkers
 from .places import fill_xz
 from .template import Holes, Template, stamped
@@ -71,7 +71,7 @@ class Outlet:
             ]
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
-            messages.append((Output.CHANGES, encode(report.change)))
+            messages.append((Output.CHANGES, encode_changes(report.change)))
         if (health := report.health) is not None:
             messages.append((Output.HEALTH, encode_health(health)))
             messages.append((Output.TIP_UNCERTAINTY, self._uncertainty.fill(health.stamp, health.tip_sigmas)))

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
-from ..io.health import decode
+from ..io.health import decode_health
 from ..io.intake import Intake, stamp_of
 from ..io.topics import Output, Topics
 from ..records import Sample, Stream
@@ -148,7 +148,7 @@ class Catch:
 
     def _take_health(self, msg: Any, now: float) -> None:
         store = self._store
-        store.alarms.judge(store.time(stamp_of(msg)), decode(msg), store.time)
+        store.alarms.judge(store.time(stamp_of(msg)), decode_health(msg), store.time)
 
     def _take_uncertainty(self, msg: Any, now: float) -> None:
         self._store.append("uncertainty", PLANE, stamp_of(msg), (msg.vector.x, msg.vector.z))

@@ -13,7 +13,8 @@ from ..errors import UsageError
 from ..plan.compile import compile_scene
 from ..scene.parts import IDEAL_BELOW, Scene
 from ..view.clearance import Sinking, Trace, sinking_picture, swing_picture
-from ..view.orbits import Orbits, orbits_picture
+from ..view.orbits import orbits_picture
+from ..view.records import Orbits
 from ..view.work_precision import Curve, Panel, work_precision_picture
 from .clearance_convergence import MEASURES, Convergence, Line, convergence
 from .clearance_cost import STEP, VIOLENT, Cost, costs, violent

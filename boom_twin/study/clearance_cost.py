@@ -15,7 +15,7 @@ from .motion import motion_of
 
 STEP = 1e-3  # s
 GENTLE, QUICK_GENTLE = 2.0, 0.2  # s
-RAMP, STOP, BRAKE, VIOLENT = 0.05, 0.1, 0.01, 0.3  # s: full speed, stop, its length, end
+RAMP, STOP, HARD_BRAKE, VIOLENT = 0.05, 0.1, 0.01, 0.3  # s: full speed, stop, its length, end
 REPEATS, QUICK_REPEATS = 7, 1
 TREATMENTS: tuple[Treatment, ...] = ("contact", "spring-damper")
 
@@ -47,7 +47,7 @@ def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
 
 def violent(scene: Scene, posture: str | None) -> Halt:
     """To full speed and to a stop as no operator would."""
-    return replace(halt(scene, posture, BRAKE), ramp=RAMP, stop=STOP)
+    return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
 
 
 def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:

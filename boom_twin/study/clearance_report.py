@@ -9,11 +9,10 @@ import numpy as np
 from ..scene.parts import IDEAL_BELOW, Scene
 from . import clearance_convergence as near
 from .clearance_convergence import MEASURES, Convergence, Line
-from .clearance_cost import BRAKE, RAMP, STOP, VIOLENT, Cost
+from .clearance_cost import HARD_BRAKE, RAMP, STOP, VIOLENT, Cost
 from .clearance_scenes import pins_of
 from .clearance_static import Shift
-from .clearance_stop import BRAKE as SOFT
-from .clearance_stop import HOLD, SETTLED, Swing
+from .clearance_stop import BRAKE, HOLD, SETTLED, Swing
 from .report import provenance, table
 
 STOP_HEAD = ("posture", "pins", "rest, mm", "peak, mm", "rms, mm", "peak acc., m/s²", "rms acc., m/s²", "halved after, s",
@@ -45,7 +44,7 @@ def _stops(found: list[Swing]) -> list[str]:
         "## After a stop\n",
         "![The tip after a stop](clearance.png)\n",
         "From rest in each posture the cylinders of the study's motion run at full speed (the whole stroke in 10 s, or as "
-        f"fast as the motion's travel allows), brake within {1e3 * SOFT:g} ms, and hold for up to {HOLD:g} s. "
+        f"fast as the motion's travel allows), brake within {1e3 * BRAKE:g} ms, and hold for up to {HOLD:g} s. "
         "Vertical movement "
         "of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance "
         "from that rest "
@@ -132,7 +131,7 @@ def _costs(found: list[Cost]) -> list[str]:
     return [
         "## What a pin costs\n",
         f"Step 1 ms. Gentle: the move of the other studies. Violent: to full speed within {1e3 * RAMP:g} ms, after "
-        f"{1e3 * STOP:g} ms to a stop within {1e3 * BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. "
+        f"{1e3 * STOP:g} ms to a stop within {1e3 * HARD_BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. "
         "Factor: real time "
         "over run time.\n",
         table(("pins", "treatment", "gentle, us a step", "factor", "violent, us a step", "factor"), rows),

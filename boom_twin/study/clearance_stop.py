@@ -68,16 +68,16 @@ def swings(scene: Scene, postures: tuple[str, ...], hold: float = HOLD) -> list[
     for posture in postures:
         drive = halt(scene, posture, BRAKE)
         scenes = (ideal(scene), treated(scene, "contact"), treated(scene, "spring-damper"))
-        reference = _rest(scenes[0], drive)
+        reference = _rest_of(scenes[0], drive)
         for model, one in zip(MODELS, scenes, strict=True):
             moved = march(one, drive, drive.still + hold, STEP, angles=drive.angles)
             # a linearised pin belongs to the rest at the start; at the end contact says where it lies
-            rest = _rest(scenes[1] if model != "ideal" else one, drive)
+            rest = _rest_of(scenes[1] if model != "ideal" else one, drive)
             found.append(_swing(posture, model, moved, drive, rest - reference, reference))
     return found
 
 
-def _rest(scene: Scene, drive: Halt) -> float:
+def _rest_of(scene: Scene, drive: Halt) -> float:
     """Height (m) of the tip at rest where the drives have stopped."""
     return float(statics(scene, strokes=drive.last, modes=0).tip[1])
 

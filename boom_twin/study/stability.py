@@ -23,10 +23,10 @@ from .stability_report import mark, text
 from .stability_roundoff import Loss, losses
 from .stability_run import METHODS, Row, run
 from .stability_step import digits
-from .stability_turnup import STEPS, TARGET, TurnUp, turn_up
+from .stability_turnup import TARGET, TURN_UP_STEPS, TurnUp, turn_up
 from .stability_verdict import BOUNDS
 
-QUICK_STEPS = tuple(step for step in STEPS if step >= 1e-5)
+QUICK_STEPS = tuple(step for step in TURN_UP_STEPS if step >= 1e-5)
 NO_EQUILIBRIUM = "no equilibrium"
 
 
@@ -65,7 +65,7 @@ def write(
     tell("round-off in one step")
     lost = losses(scene, quick)
     tell("error over the step")
-    turned = turn_up(scene, QUICK_STEPS if quick else STEPS)
+    turned = turn_up(scene, QUICK_STEPS if quick else TURN_UP_STEPS)
     return write_files(out, rows, long_rows, limits, lost, turned, move_in_words(scene))
 
 

@@ -12,7 +12,7 @@ from ..scene.parts import Scene
 from .stability_motions import smooth
 
 SPAN, RISE, SHARE, ROWS = 0.2, 0.16, 0.1, 10  # s, s, of the study's move, rows compared
-STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)  # s
+TURN_UP_STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)  # s
 COARSE, FINE = 2e-5, 1e-5  # s, steps that the reference is extrapolated from
 FITTED = 1e-4  # s, the order is fitted down to this step
 TARGET = 1e-8  # of the boom's length: above it the error may not turn up
@@ -55,7 +55,7 @@ class TurnUp:
         return bool(rises.size and self.errors[rises[0]] > TARGET)
 
 
-def turn_up(scene: Scene, steps: tuple[float, ...] = STEPS, method: Method | None = None) -> TurnUp:
+def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS, method: Method | None = None) -> TurnUp:
     """March a short smooth move by all `steps` (s), among them `COARSE` and `FINE`."""
     found = {step: _rows(scene, step, method) for step in steps}
     weight = FINE**2 / (COARSE**2 - FINE**2)

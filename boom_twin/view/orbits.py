@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..records import Array
+from .records import Orbits
 from .style import GREY, INK, ORANGE, picture
 
 if TYPE_CHECKING:
@@ -20,30 +18,6 @@ COLUMNS = 4
 WIDTH = 4.2  # of a panel, hundreds of pixels
 MICRO = 1e6
 ROOM = 1.25  # clearances from the middle of a bush to the edge of its panel, at least
-
-
-@dataclass(frozen=True)
-class Orbits:
-    """m instants of k pins with clearance.
-
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s.
-    names : tuple of str
-    clearances : ndarray, shape (k,)
-        Radial, m.
-    pins : ndarray, shape (m, k, 4)
-        Offset x, y of the journal (m, model axes), force (N), 1 where it touches.
-    lost : ndarray of int, shape (k,)
-        How often contact was lost.
-    """
-
-    times: Array
-    names: tuple[str, ...]
-    clearances: Array
-    pins: Array
-    lost: NDArray[np.int64]
 
 
 def orbits_picture(path: Path, title: str, orbits: Orbits, note: str = "") -> None:

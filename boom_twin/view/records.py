@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..records import Array
-from .orbits import Orbits
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,30 @@ class Truth:
     stamps_s: Array
     tip_position: Array
     tip_acceleration: Array
+
+
+@dataclass(frozen=True)
+class Orbits:
+    """m instants of k pins with clearance.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        s.
+    names : tuple of str
+    clearances : ndarray, shape (k,)
+        Radial, m.
+    pins : ndarray, shape (m, k, 4)
+        Offset x, y of the journal (m, model axes), force (N), 1 where it touches.
+    lost : ndarray of int, shape (k,)
+        How often contact was lost.
+    """
+
+    times: Array
+    names: tuple[str, ...]
+    clearances: Array
+    pins: Array
+    lost: NDArray[np.int64]
 
 
 @dataclass(frozen=True)

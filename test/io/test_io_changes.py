@@ -10,7 +10,7 @@ import pytest
 
 from boom_twin import load_scene, replay
 from boom_twin.errors import BagError
-from boom_twin.io.changes import Changes, decode, encode
+from boom_twin.io.changes import Changes, decode_changes, encode_changes
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import _Messages
@@ -31,7 +31,7 @@ def change(stamp: int, **live: float) -> Change:
 
 def test_there_and_back() -> None:
     there = Change(12 * SECOND + 5, True, Settings(payload=40.0, gap=0.3).live, {"joint_2": 0.01, "tip_imu_x": -0.2})
-    assert decode(jazzy().deserialize_cdr(encode(there), TYPE)) == there
+    assert decode_changes(jazzy().deserialize_cdr(encode_changes(there), TYPE)) == there
 
 
 @pytest.mark.parametrize(("name", "value"), [("gap", -1.0), ("payload", np.nan), ("gap", np.inf)])
@@ -39,7 +39,7 @@ def test_values_of_a_stranger_are_checked(name: str, value: float) -> None:
     msg = RosbagsTypes().make(TYPE)
     msg.name, msg.position = [name], np.array([value])
     with pytest.raises(BagError, match=name):
-        decode(msg)
+        decode_changes(msg)
 
 
 def begun(logged: list[tuple[float, float]], strokes: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -85,7 +85,7 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
             bag.write("s", stamp, messages.joint_state("cylinder", stamp, strokes))
             bag.write("a", stamp, messages.joint_state("joint", stamp, joints))
             if stamp == told.stamp:
-                bag.write_encoded("c", stamp + 1_000_000, encode(told))
+                bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
     predictions, residuals = result.recording.predictions, result.recording.of(Stream.ANGLES)
     assert predictions[49].tip_position[1] - predictions[50].tip_position[1] > 0.01
@@ -95,5 +95,5 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
     unchanged = replay(tmp_path / "bag", scene, tmp_path / "other", changes=False)
     assert unchanged.summary["events"] == {}
     topic = keys["c"]
-    again = [decode(msg) for _, _, msg in read(scan(tmp_path / "out" / "bag"), {topic.absolute: topic.type})]
+    again = [decode_changes(msg) for _, _, msg in read(scan(tmp_path / "out" / "bag"), {topic.absolute: topic.type})]
     assert [each.stamp for each in again] == [4 * SECOND, 5 * SECOND] and again[1] == told

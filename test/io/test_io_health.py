@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from boom_twin.io.health import decode, encode
+from boom_twin.io.health import decode_health, encode_health
 from boom_twin.io.topics import TYPES, Output
 from boom_twin.io.typestore import jazzy
 from boom_twin.records import Alarm, Health, Ranked
@@ -21,12 +21,12 @@ STUCK = Alarm("joint_3", "stuck", BEGIN, BEGIN + 1_500_000_000, "joint_3.sensor"
 
 
 def sent(*alarms: Alarm):
-    data = encode(Health(BEGIN + 2_000_000_000, alarms, (), np.zeros(0), np.zeros(2)))
+    data = encode_health(Health(BEGIN + 2_000_000_000, alarms, (), np.zeros(0), np.zeros(2)))
     return jazzy().deserialize_cdr(data, TYPES[Output.HEALTH])
 
 
 def test_alarms_come_back_to_the_millisecond_without_the_sizes_of_what_may_be():
-    found = decode(sent(OPEN, STUCK))
+    found = decode_health(sent(OPEN, STUCK))
     bare = tuple(replace(each, parts=()) for each in RANKED)
     assert [abs(a.since - b.since) < 1000 for a, b in zip(found, (OPEN, STUCK), strict=True)] == [True, True]
     assert found[0].until is None and abs(found[1].until - STUCK.until) < 1000
@@ -39,4 +39,4 @@ def test_a_status_that_is_no_alarm_is_left_out():
     message.status[0].values = []
     for status, text in zip(message.status[1:], ("nan", "1e400", "soon"), strict=True):
         status.values[2].value = text
-    assert decode(message) == ()
+    assert decode_health(message) == ()

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from boom_twin.health.baseline import load_baseline
-from boom_twin.io.changes import decode, recorded_changes
+from boom_twin.io.changes import decode_changes, recorded_changes
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.reader import read, scan
@@ -134,7 +134,7 @@ def test_residuals_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: Any
 
 def test_what_was_asked_is_in_the_recording(recorded: Path) -> None:
     topic = load_topics().outputs[Output.CHANGES]
-    changes = [decode(msg) for _, _, msg in read(scan(recorded), {topic.absolute: topic.type})]
+    changes = [decode_changes(msg) for _, _, msg in read(scan(recorded), {topic.absolute: topic.type})]
     assert [change.from_rest for change in changes] == [True, True, False, True, False, True, True]
     assert [change.settings["payload"] for change in changes] == [-1.0] + 6 * [35.0]
     assert (changes[-1].settings["line_fill"], changes[-1].settings["gap"]) == (8.0, 0.2)

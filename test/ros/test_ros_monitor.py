@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.health import encode
+from boom_twin.io.health import encode_health
 from boom_twin.io.topics import Output, load_topics
 from boom_twin.monitor.desk import AT_NODE, Desk
 from boom_twin.monitor.lamps import Level, overall
@@ -58,7 +58,7 @@ def tell(end: int | None, message: Any) -> None:
     from rclpy.serialization import deserialize_message
 
     health = Health(ALARM.since, (replace(ALARM, until=end),), (), np.zeros(0), np.zeros(2))
-    message.status = deserialize_message(encode(health), type(message)).status
+    message.status = deserialize_message(encode_health(health), type(message)).status
 
 
 def judged(feed: Any) -> Any:

@@ -27,7 +27,7 @@ pytest.importorskip("playwright.sync_api", reason="playwright is not installed: 
 from aiohttp import ClientSession
 from playwright import sync_api
 
-from boom_twin.io.health import decode
+from boom_twin.io.health import decode_health
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.reader import read, scan
 from boom_twin.io.topics import Output, load_topics
@@ -203,7 +203,7 @@ def test_every_lamp_is_that_of_diagnostics(page: Any, witness: Witness) -> None:
     lamps = {row[1].strip(): row for row in (text.split("\t") for text in page.locator("#lamps tr").all_inner_texts()[1:])}
     messages = witness.heard[Output.DIAGNOSTICS][-4:]
     newest = [{status.name.partition(": ")[2]: status for status in message.status} for message in messages]
-    judged = {alarm.channel for alarm in decode(witness.heard[Output.HEALTH][-1]) if alarm.until is None}
+    judged = {alarm.channel for alarm in decode_health(witness.heard[Output.HEALTH][-1]) if alarm.until is None}
     assert set(lamps) == set(newest[-1]) - ({"health"} if judged else set()) | judged
     for name, row in ((name, row) for name, row in lamps.items() if name not in judged):
         told = [statuses[name] for statuses in newest]
@@ -218,7 +218,7 @@ def test_alarms_and_the_band_of_the_tip_are_those_of_their_topics(page: Any, wit
     page.keyboard.press("5")
     page.wait_for_timeout(1500)
     rows = [text.split("\t") for text in page.locator("#alarms tr").all_inner_texts()[1:]]
-    recent = [alarm for message in witness.heard[Output.HEALTH][-4:] for alarm in decode(message) if alarm.until is None]
+    recent = [alarm for message in witness.heard[Output.HEALTH][-4:] for alarm in decode_health(message) if alarm.until is None]
     told = {(alarm.channel, alarm.told, causes_of(alarm)) for alarm in recent}
     shown = {(row[0].strip(), row[2].strip(), row[3].strip()) for row in rows}
     assert told and told & shown and {channel for channel, *_ in told} <= {row[0].strip() for row in rows}

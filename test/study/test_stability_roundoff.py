@@ -13,7 +13,7 @@ from boom_twin.scene.kinematics import posture_angles
 from boom_twin.study.long_booms import long_boom
 from boom_twin.study.stability_dense import Kinematics
 from boom_twin.study.stability_step import digits, one_step
-from boom_twin.study.stability_turnup import STEPS, TARGET, TurnUp, turn_up
+from boom_twin.study.stability_turnup import TARGET, TURN_UP_STEPS, TurnUp, turn_up
 
 
 @pytest.mark.parametrize("scene", [load_scene(), long_boom(4, kinds=("B3", "B2", "B1"))], ids=["default", "long"])
@@ -45,7 +45,7 @@ def test_plain_product_loses_digits_with_the_length_and_riccati_does_not():
 
 
 def test_error_of_the_tip_falls_with_the_square_of_the_step():
-    found = turn_up(load_scene(), tuple(step for step in STEPS if step >= 1e-5))
+    found = turn_up(load_scene(), tuple(step for step in TURN_UP_STEPS if step >= 1e-5))
     assert found.order == pytest.approx(2.0, abs=0.05)
     assert not found.turned_up_above_target
     assert found.floor[1] < 0.1 * TARGET

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.view.orbits import Orbits, orbits_picture
+from boom_twin.view.orbits import orbits_picture
+from boom_twin.view.records import Orbits
 
 
 def circling(pins: int, instants: int) -> Orbits:
