@@ -1,55 +1,20 @@
-"""Changes of a running twin, to and from messages: a JointState serves as a stamped list of named values."""
+"""Changes of a recorded session, each told before the stroke sample that it began with."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any
 
-from ..errors import BagError, UsageError
 from ..records import Change
-from ..settings import Settings
-from .factory import RosbagsTypes
-from .intake import stamp_of
-from .places import fill_header
+from .change_messages import decode_changes
 from .reader import Session, read
-from .topics import TYPES, Output, Topics
-from .typestore import jazzy
+from .topics import Output, Topics
 
-FROM_REST = "from_rest"
 NEAR = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
 
 A looped session repeats stamps; a stray stamp is far from its stream.
 """
-
-
-def encode_changes(change: Change) -> bytes:
-    """The message of a change, in CDR."""
-    values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
-    types = RosbagsTypes()
-    msg = types.make(TYPES[Output.CHANGES])
-    fill_header(msg.header, change.stamp)
-    msg.name, msg.position = list(values), types.doubles(list(values.values()))
-    return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
-
-
-def decode_changes(msg: Any) -> Change:
-    """The change of a message.
-
-    Raises
-    ------
-    BagError
-        It has names or values that a change cannot have.
-    """
-    values = dict(zip(msg.name, map(float, msg.position), strict=False))
-    from_rest = bool(values.pop(FROM_REST, 0.0))
-    settings = {name: values.pop(name) for name in Settings.live_names() if name in values}
-    try:
-        Settings().tuned(settings)
-    except UsageError as error:
-        raise BagError(f"a message of changes cannot be used: {error}") from None
-    return Change(stamp_of(msg), from_rest, settings, {name: value for name, value in values.items() if value != 0.0})
 
 
 class Changes:

@@ -15,7 +15,7 @@ from ..records import Prediction, Report, Residuals
 from ..scene.parts import Scene
 from ..scene.passive import PassiveJoints
 from ..settings import Settings
-from .changes import encode_changes
+from .change_messages import encode_changes
 from .factory import RosbagsTypes
 from .health import encode_health
 from .markers import ShapeMarkers

@@ -10,7 +10,8 @@ import pytest
 
 from boom_twin import load_scene, replay
 from boom_twin.errors import BagError
-from boom_twin.io.changes import Changes, decode_changes, encode_changes
+from boom_twin.io.change_messages import decode_changes, encode_changes
+from boom_twin.io.changes import Changes
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import _Messages

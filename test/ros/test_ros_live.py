@@ -14,7 +14,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from boom_twin.health.baseline import load_baseline
-from boom_twin.io.changes import decode_changes, recorded_changes
+from boom_twin.io.change_messages import decode_changes
+from boom_twin.io.changes import recorded_changes
 from boom_twin.io.intake import Intake, stamp_of
 from boom_twin.io.outlet import Outlet
 from boom_twin.io.reader import read, scan
