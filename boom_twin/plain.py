@@ -11,6 +11,7 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from .errors import BoomTwinError
+from .received import open_received
 
 LARGEST = 4 * 2**20
 """Bytes of a file that is read."""
@@ -21,10 +22,13 @@ DEEPEST = 30
 _TAG = "tag:yaml.org,2002:"
 
 
-def read_plain(path: Path, failure: type[BoomTwinError], remedy: str) -> Any:
-    """The values of a YAML file; `failure` with the path, the reason and the remedy if it cannot be read."""
+def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: bool = False) -> Any:
+    """The values of a YAML file; `failure` with the path, the reason and the remedy if it cannot be read.
+
+    `received` says that it lies in a folder from somebody else, see `boom_twin.received.open_received`.
+    """
     try:
-        with path.open("rb") as stream:
+        with open_received(path) if received else path.open("rb") as stream:
             data = stream.read(LARGEST + 1)
         if len(data) > LARGEST:
             raise ValueError(f"more than {LARGEST} bytes")

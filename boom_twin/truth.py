@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import BagError
+from .received import holds_file, open_received
 from .records import Array, Prediction
 
 FILE_NAME = "truth.csv.gz"
@@ -55,10 +56,10 @@ def _rms(vectors: Array) -> float:
 def load_truth(folder: Path) -> TipTruth | None:
     """The truth beside a session, or None if there is none; `folder` is the session's own."""
     path = folder / FILE_NAME
-    if not path.is_file():
+    if not holds_file(path):
         return None
     try:
-        with gzip.open(path) as file:
+        with open_received(path) as packed, gzip.open(packed) as file:
             text = file.read(LARGEST + 1)
         if len(text) > LARGEST:
             raise ValueError(f"more than {LARGEST} bytes unpacked")

@@ -15,6 +15,7 @@ from ..errors import BagError
 from ..io.ahead import Ahead
 from ..io.reader import Session, check_topic, scan
 from ..io.topics import Topics
+from ..received import open_received
 from ..records import Array, Change, Sample, Stream
 
 NANO = 1e-9
@@ -128,6 +129,6 @@ def _told(samples: Ahead) -> str:
 def _digest(session: Session) -> str:
     digest = hashlib.sha256()
     for file in session.files:
-        with file.path.open("rb") as stream:
+        with open_received(file.path) as stream:
             digest.update(hashlib.file_digest(stream, "sha256").digest())
     return digest.hexdigest()[:SHOWN]

@@ -109,7 +109,7 @@ def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
     if found.mapped.source == DEFAULT_NAME:
         return ""
     sheet = (bag if bag.is_dir() else bag.parent) / FILE_NAME
-    return str(read_plain(sheet, BagError, "Give the mapping by --mapping.")["mapping"])
+    return str(read_plain(sheet, BagError, "Give the mapping by --mapping.", received=True)["mapping"])
 
 
 def _changes(before: Any, after: Any, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:

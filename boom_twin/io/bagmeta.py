@@ -85,7 +85,7 @@ def read_metadata(path: Path) -> BagMetadata:
         If it is no such file, or its bag is stored in a way that is not read here (sqlite3, compressed as a whole).
     """
     remedy = "Move it away: the .mcap files can be read without it."
-    document = read_plain(path, BagError, remedy)
+    document = read_plain(path, BagError, remedy, received=True)
     try:
         metadata = BagMetadata.model_validate((document or {})[_ROOT])
     except (KeyError, TypeError) as error:

@@ -15,7 +15,8 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, McapRecord, Message
 from mcap.stream_reader import StreamReader
 
-from .content import LARGEST, MESSAGE_HEAD, definition_of, message_of, parts, unpack
+from ..received import open_received
+from .content import LARGEST, MESSAGE_HEAD, UnpackBudget, definition_of, message_of, parts, unpack
 from .damage import STUMBLES
 
 TOGETHER = 2**30
@@ -26,12 +27,13 @@ MOST_TOGETHER = 2**22
 
 def records(path: Path) -> Iterator[McapRecord]:
     """All records in the order of the file; those inside a chunk follow it."""
-    with path.open("rb") as file:
+    budget = UnpackBudget()
+    with open_received(path) as file:
         limit = min(LARGEST, path.stat().st_size)
         for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
             yield record
             if isinstance(record, Chunk):
-                yield from _content(record)
+                yield from _content(record, budget)
 
 
 def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
@@ -43,11 +45,12 @@ def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
     if not chunks:
         yield from sorted(_held(records(path)), key=by_time)
         return
-    with path.open("rb") as file:
+    budget = UnpackBudget()
+    with open_received(path) as file:
         for group in _overlapping(chunks):
             if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
                 raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
-            content = (record for index in group for record in _content(chunk_at(file, index)))
+            content = (record for index in group for record in _content(chunk_at(file, index), budget))
             yield from sorted(_held(content), key=by_time)
 
 
@@ -69,9 +72,10 @@ def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, 
             if isinstance(record, Message):
                 yield record.channel_id, record.log_time, record.data
         return
-    with path.open("rb") as file:
+    budget = UnpackBudget()
+    with open_received(path) as file:
         for index in sorted(chunks, key=attrgetter("chunk_start_offset")):
-            for opcode, body in parts(unpack(chunk_at(file, index))):
+            for opcode, body in parts(unpack(chunk_at(file, index), budget)):
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)
                     yield channel, log_time, body[MESSAGE_HEAD.size :]
@@ -102,10 +106,10 @@ def _overlapping(chunks: Sequence[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
     yield sorted(group, key=attrgetter("chunk_start_offset"))
 
 
-def _content(chunk: Chunk) -> list[McapRecord]:
+def _content(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
     """The messages and definitions inside a chunk, its checksum verified."""
     try:
-        return [record for opcode, body in parts(unpack(chunk)) if (record := _record(opcode, body)) is not None]
+        return [record for opcode, body in parts(unpack(chunk, budget)) if (record := _record(opcode, body)) is not None]
     except STUMBLES as error:
         span = f"{chunk.message_start_time} to {chunk.message_end_time} ns"
         raise McapError(f"chunk with log times {span}: {error}") from error

@@ -13,7 +13,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from .content import LARGEST, PREFIX, unpack_start, whole_parts
+from .content import LARGEST, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
 from .damage import STUMBLES
 
 _FIELDS = struct.Struct("<BQQQQII")
@@ -83,7 +83,7 @@ def head_at(file: BinaryIO, offset: int) -> ChunkHead | None:
     return found if found.is_certain or (opcode == Opcode.CHUNK and name in _COMPRESSIONS) else None
 
 
-def sound_content(file: BinaryIO, head: ChunkHead, size: int) -> tuple[bytes, int]:
+def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudget) -> tuple[bytes, int]:
     """Content of a chunk in a file of `size` bytes, and the offset after it.
 
     With a checksum, everything else in the head may be wrong; without, all of it must fit.
@@ -96,7 +96,7 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int) -> tuple[bytes, in
     if head.crc == 0:
         if not head.is_certain:
             raise McapError("its lengths do not agree")
-        content = _unpacked(file, head, head.size, head.compression, head.unpacked)
+        content = _unpacked(file, head, head.size, head.compression, head.unpacked, budget)
         if len(content) != head.unpacked:
             raise McapError(f"unpacks to another size than the {head.unpacked} bytes that it states")
         if len(whole_parts(content)) != len(content):
@@ -105,7 +105,7 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int) -> tuple[bytes, in
     reason = "its checksum does not fit its content"
     for packed, compression, unpacked in _readings(head, size):
         try:
-            content = _unpacked(file, head, packed, compression, unpacked)
+            content = _unpacked(file, head, packed, compression, unpacked, budget)
         except STUMBLES as error:
             reason = str(error)
             continue
@@ -115,10 +115,18 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int) -> tuple[bytes, in
     raise McapError(reason)
 
 
-def loose_start(file: BinaryIO, head: ChunkHead) -> bytes:
-    """The whole records at the start of a chunk that is cut off or wrong; no checksum vouches for them."""
+def loose_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
+    """The whole records at the start of a chunk that is cut off or wrong; no checksum vouches for them.
+
+    Raises
+    ------
+    UnpackError
+        It unpacks to more than `budget` allows.
+    """
     try:
-        content = _unpacked(file, head, min(head.size, LARGEST), head.compression, min(head.unpacked, LARGEST))
+        content = _unpacked(file, head, min(head.size, LARGEST), head.compression, min(head.unpacked, LARGEST), budget)
+    except UnpackError:
+        raise
     except STUMBLES:
         return b""
     return whole_parts(content)
@@ -133,7 +141,9 @@ def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str, int]]:
     yield from product(packed, known, sizes)
 
 
-def _unpacked(file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int) -> bytes:
+def _unpacked(
+    file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int, budget: UnpackBudget
+) -> bytes:
     if packed > LARGEST:
         raise McapError(f"{packed} bytes: at most {LARGEST} are read")
     file.seek(head.offset + head.head)
@@ -145,4 +155,4 @@ def _unpacked(file: BinaryIO, head: ChunkHead, packed: int, compression: str, un
         uncompressed_crc=head.crc,
         uncompressed_size=unpacked,
     )
-    return unpack_start(chunk)
+    return unpack_start(chunk, budget)

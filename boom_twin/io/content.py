@@ -16,12 +16,18 @@ from zstandard import ZstdDecompressor
 
 LARGEST = 64 * 2**20
 """Bytes of one record, and of one chunk unpacked, that are read at most."""
+BYTES_PER_BYTE = 1000
+"""Bytes that a packed byte of a chunk may unpack to; recorded numbers give 2 to 20, an empty picture more."""
+RECORDS_PER_BYTE = 0.5
+"""Records that a packed byte may hold; a message has two times and a number, which pack to 5 bytes and more."""
 
 PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
 
+_LENGTH = struct.Struct("<xQ")
+_TOO_MUCH = "the most that is read. No recorder packs like that"
 _WINDOW = 2**27  # of zstd, as its command line allows without --long
 
 
@@ -37,15 +43,58 @@ def _lz4(data: bytes, limit: int) -> bytes:
 _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: data[:limit], "zstd": _zstd, "lz4": _lz4}
 
 
-def unpack(chunk: Chunk) -> bytes:
+class UnpackError(McapError):
+    """A chunk unpacks to more than its `UnpackBudget` allows."""
+
+
+class UnpackBudget:
+    """What the chunks of one file may unpack to: so much for every packed byte, and a reserve for all of them together.
+
+    64 kB can hold chunks that unpack to gigabytes, or to millions of records that take seconds to go through. The reserve
+    is for small chunks that pack well; a chunk that stays within its own share is read whatever stands before it.
+
+    Attributes
+    ----------
+    bytes, records : int
+        What is left of the reserve.
+    """
+
+    def __init__(self) -> None:
+        self.bytes, self.records = LARGEST, 20_000
+
+    def unpack(self, chunk: Chunk, limit: int) -> bytes:
+        """The first `limit` bytes of the content of a chunk; UnpackError if that, or what is in it, is too much."""
+        packed = len(chunk.data)
+        own = BYTES_PER_BYTE * packed
+        room = min(own + self.bytes, LARGEST)
+        content = _UNPACK[chunk.compression](chunk.data, min(limit, room + 1))
+        self.bytes -= max(0, len(content) - own)
+        if len(content) > room:
+            raise UnpackError(f"{packed} bytes unpack to more than {room} bytes, {_TOO_MUCH}")
+        self._take_records(content, packed)
+        return content
+
+    def _take_records(self, content: bytes, packed: int) -> None:
+        own = int(RECORDS_PER_BYTE * packed)
+        most = own + self.records
+        count = place = 0
+        while place + PREFIX.size <= len(content) and count <= most:
+            (length,) = _LENGTH.unpack_from(content, place)
+            place, count = place + PREFIX.size + length, count + 1
+        self.records -= max(0, min(count, most) - own)
+        if count > most:
+            raise UnpackError(f"{packed} bytes unpack to more than {most} records, {_TOO_MUCH}")
+
+
+def unpack(chunk: Chunk, budget: UnpackBudget) -> bytes:
     """The content of a chunk, its size and checksum (where it has one) verified.
 
     Raises
     ------
     McapError
-        If the compression is unknown, more than `LARGEST` bytes would come out, or size or checksum do not fit.
+        If the compression is unknown, more would come out than `budget` allows, or size or checksum do not fit.
     """
-    content = unpack_start(chunk)
+    content = unpack_start(chunk, budget)
     if len(content) != chunk.uncompressed_size:
         raise McapError(f"unpacks to another size than the {chunk.uncompressed_size} bytes that it states")
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
@@ -53,13 +102,13 @@ def unpack(chunk: Chunk) -> bytes:
     return content
 
 
-def unpack_start(chunk: Chunk) -> bytes:
+def unpack_start(chunk: Chunk, budget: UnpackBudget) -> bytes:
     """What can be unpacked of a chunk that may be cut off, at most one byte more than it states; nothing verified."""
     if chunk.compression not in _UNPACK:
         raise McapError(f"compression = {chunk.compression!r}: only zstd, lz4 and none are known")
     if chunk.uncompressed_size > LARGEST:
         raise McapError(f"unpacked size = {chunk.uncompressed_size} bytes: at most {LARGEST} are read")
-    return _UNPACK[chunk.compression](chunk.data, chunk.uncompressed_size + 1)
+    return budget.unpack(chunk, chunk.uncompressed_size + 1)
 
 
 def parts(content: bytes) -> Iterator[tuple[int, bytes]]:

@@ -11,6 +11,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import BagError
+from ..received import open_received
 from .damage import RESCUE
 
 BLOCK = 2**20
@@ -33,7 +34,7 @@ def check_ends(path: Path, file: BinaryIO) -> None:
 
 def summary_start(path: Path) -> int | None:
     """Where the summary of a file begins, if it has a whole one that no checksum denies."""
-    with path.open("rb") as file:
+    with open_received(path) as file:
         ends = _footer(file, path.stat().st_size)
     return ends[0] if ends and ends[1] else None
 

@@ -6,13 +6,14 @@ import re
 from pathlib import Path
 
 from ..errors import BagError
+from ..received import holds_file
 from .bagmeta import FILE_NAME, BagMetadata, read_metadata
 
 
 def mcap_files(path: Path) -> list[Path]:
     """The files of a session without metadata; BagError if there are none."""
     if path.is_file():
-        return [path]
+        return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
     if not path.is_dir():
         raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
     files = sorted(path.glob("*.mcap"))
@@ -34,13 +35,14 @@ def check_listed(path: Path, named: list[Path]) -> None:
 def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
     """The .mcap files of a session: those that its metadata names, then all others by number; and the metadata."""
     metadata: BagMetadata | None = None
+    is_described = holds_file(path / FILE_NAME)
     try:
-        metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
+        metadata = read_metadata(path / FILE_NAME) if is_described else None
     except BagError:
         if path.is_file():
             raise
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else []
-    there = [file for file in named if file.is_file()]
+    there = [file for file in named if holds_file(file)]
     others = [] if there and not any(path.glob("*.mcap")) else mcap_files(path)
     return there + sorted(set(others) - set(there), key=_by_number), metadata
 

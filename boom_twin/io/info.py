@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mcap.reader import NonSeekingReader
 
+from ..received import open_received
 from ..records import Stream
 from .blocks import chunk_at, heads
 from .cdr import has_header
@@ -91,7 +92,7 @@ def _count(file: McapFile, tallies: dict[str, Tally]) -> None:
 
 def _writer(file: McapFile) -> tuple[str, str]:
     """The program that wrote a file, and the compression of its first chunk."""
-    with file.path.open("rb") as stream:
+    with open_received(file.path) as stream:
         library = NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library
         if not file.chunks:
             return library, "no index of chunks"

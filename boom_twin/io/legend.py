@@ -13,6 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
 from ..errors import BagError
+from ..received import open_received
 from .bagmeta import BagMetadata, offered_qos
 from .content import LARGEST, definition_of, parts
 from .ends import checksum_of, summary_start
@@ -124,7 +125,7 @@ def _is_summed(path: Path, offset: int, body: bytes) -> bool:
     told: int = DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc
     if told == 0:
         return False
-    with path.open("rb") as file:
+    with open_received(path) as file:
         return checksum_of(file, 0, offset) == told
 
 

@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ..errors import BagError, Fault, UsageError
 from ..plain import plain, read_plain
+from ..received import holds_file
 from .sensors import Sensor, kind_faults, set_faults, stream_of, usual
 from .sheet import FILE_NAME
 from .topics import TYPES, Qos, Topic, Topics, default_document, load_topics
@@ -71,8 +72,8 @@ def mapping_of(session: Path, path: Path | None = None, joints: int | None = Non
     if path is not None:
         return Mapped(load_mapping(path, joints), str(path))
     sheet = (session if session.is_dir() else session.parent) / FILE_NAME
-    if sheet.is_file():
-        document = read_plain(sheet, BagError, "Move it away, and give the mapping by --mapping.")
+    if holds_file(sheet):
+        document = read_plain(sheet, BagError, "Move it away, and give the mapping by --mapping.", received=True)
         text = document.get("mapping") if isinstance(document, dict) else None
         if text is not None:
             source = f"{sheet}, mapping"

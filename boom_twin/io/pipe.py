@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from ..child_process import python_command
 from ..errors import BagError
 
 READY = "ready"
@@ -19,7 +20,7 @@ READY = "ready"
 
 
 class Pipe:
-    """The replay's end: start ``python -m MODULE ARGUMENTS``, send to it, receive from it.
+    """The replay's end: start a module with its arguments, send to it, receive from it.
 
     Raises
     ------
@@ -28,9 +29,8 @@ class Pipe:
     """
 
     def __init__(self, module: str, *arguments: str) -> None:
-        command = [sys.executable, "-m", module, *arguments]
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe)
+        self._process = subprocess.Popen(python_command(module, *arguments), stdin=pipe, stdout=pipe, stderr=pipe)
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
 
     def wait_ready(self) -> None:

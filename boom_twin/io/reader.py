@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BagError
+from ..received import holds_file
 from .bagmeta import FILE_NAME, BagMetadata, read_metadata
 from .blocks import messages
 from .damage import RESCUE, STUMBLES, blame, compare_counts
@@ -77,7 +78,7 @@ def scan(path: Path) -> Session:
     BagError
         If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
-    metadata = read_metadata(path / FILE_NAME) if (path / FILE_NAME).is_file() else None
+    metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
     if metadata is not None:

@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 
 from ..errors import BagError
 from ..plain import LARGEST
+from ..received import holds_file, open_received
 from .bagmeta import FILE_NAME, BagMetadata
 from .bagwriter import BagWriter, file_name
 from .blocks import heads
@@ -116,8 +117,9 @@ def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorde
 def _copy_sheet(path: Path, out: Path) -> None:
     """Keep what the session was recorded with, for a replay: scene and mapping."""
     sheet = (path if path.is_dir() else path.parent) / SHEET
-    if sheet.is_file() and sheet.stat().st_size <= LARGEST:
-        (out / SHEET).write_bytes(sheet.read_bytes())
+    if holds_file(sheet) and sheet.stat().st_size <= LARGEST:
+        with open_received(sheet) as file:
+            (out / SHEET).write_bytes(file.read(LARGEST))
 
 
 def _count(out: Path) -> Counter[str]:

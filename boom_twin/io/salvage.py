@@ -14,8 +14,9 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
+from ..received import open_received
 from .chunkhead import ChunkHead, head_at, loose_start, sound_content
-from .content import LARGEST, MESSAGE_HEAD, PREFIX
+from .content import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError
 from .damage import STUMBLES
 from .ends import BLOCK
 
@@ -68,13 +69,13 @@ def walk(path: Path, unverified: bool = False, channels: Container[int] | None =
     channels : container of int, optional
         Those that are known: messages of others outside chunks are not looked for behind damage.
     """
-    size = path.stat().st_size
-    with path.open("rb") as file:
+    size, budget = path.stat().st_size, UnpackBudget()
+    with open_received(path) as file:
         offset = len(MCAP0_MAGIC)
         if file.read(offset) != MCAP0_MAGIC:
             yield Fault(0, min(offset, size), "it does not begin as an MCAP file")
         while offset < size - len(MCAP0_MAGIC) or (offset < size and not _ends(file, offset)):
-            pieces, after = _next(file, offset, size, unverified)
+            pieces, after = _next(file, offset, size, unverified, budget)
             if after is None:
                 after = _behind(file, offset + 1, size, channels or ())
                 if not any(isinstance(piece, Fault) for piece in pieces):
@@ -83,31 +84,38 @@ def walk(path: Path, unverified: bool = False, channels: Container[int] | None =
             offset = after
 
 
-def _next(file: BinaryIO, offset: int, size: int, unverified: bool) -> tuple[list[Piece | Fault], int | None]:
+def _next(
+    file: BinaryIO, offset: int, size: int, unverified: bool, budget: UnpackBudget
+) -> tuple[list[Piece | Fault], int | None]:
     """What begins at `offset`, and where the next record begins; None where that is not known."""
     head = head_at(file, offset)
     if head is None:
         record = _whole_record(file, offset, size)
         return ([Piece(offset, False, record)], offset + len(record)) if record else ([], None)
     if head.is_certain and head.after > size:
-        fault = Fault(offset, size - offset, f"{head}: cut off, {size - offset} of {head.after - offset} bytes are there")
-        return [*_loose(file, head, unverified), fault], size
+        reason = f"cut off, {size - offset} of {head.after - offset} bytes are there"
+        return _broken(file, head, size - offset, reason, unverified, budget), size
     try:
-        content, after = sound_content(file, head, size)
+        content, after = sound_content(file, head, size, budget)
         return [Piece(offset, head.crc != 0, content)], after
     except STUMBLES as error:
         if not head.is_certain:
             return [], None
-        fault = Fault(offset, head.after - offset, f"{head}: {error}")
-        return [*_loose(file, head, unverified), fault], head.after
+        return _broken(file, head, head.after - offset, str(error), unverified, budget), head.after
 
 
-def _loose(file: BinaryIO, head: ChunkHead, unverified: bool) -> list[Piece]:
-    """The whole records at the start of a chunk that is not sound, where no checksum denies them or all are wanted."""
-    if head.crc != 0 and not unverified:
-        return []
-    content = loose_start(file, head)
-    return [Piece(head.offset, False, content)] if content else []
+def _broken(
+    file: BinaryIO, head: ChunkHead, length: int, reason: str, unverified: bool, budget: UnpackBudget
+) -> list[Piece | Fault]:
+    """A chunk that is not sound, behind the whole records at its start where no checksum denies them or all are wanted."""
+    content = b""
+    if head.crc == 0 or unverified:
+        try:
+            content = loose_start(file, head, budget)
+        except UnpackError as error:
+            reason = str(error)
+    fault = Fault(head.offset, length, f"{head}: {reason}")
+    return [Piece(head.offset, False, content), fault] if content else [fault]
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:

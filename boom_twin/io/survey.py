@@ -12,6 +12,7 @@ from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata,
 from mcap.summary import Summary
 
 from ..errors import BagError
+from ..received import open_received
 from .blocks import chunk_at, records
 from .content import LARGEST
 from .damage import blame, compare_counts
@@ -68,7 +69,7 @@ def survey(path: Path) -> McapFile:
     BagError
         If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
     """
-    with blame(path), path.open("rb") as file:
+    with blame(path), open_received(path) as file:
         check_ends(path, file)
         file.seek(0)
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))

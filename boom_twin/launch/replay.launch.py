@@ -3,12 +3,12 @@
 ros2 launch boom_twin replay.launch.py bag:=bags/arch_session rate:=2.0
 """
 
-import sys
-
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, Shutdown
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
+
+from boom_twin.child_process import python_command
 
 ARGUMENTS = [
     DeclareLaunchArgument("bag", description="session to play: rosbag2 directory or .mcap file"),
@@ -35,5 +35,5 @@ def twin() -> IncludeLaunchDescription:
 def player() -> ExecuteProcess:
     """The session's inputs and its clock, once the node listens."""
     options = [part for name in ("rate", "start", "wait") for part in (f"--{name}", LaunchConfiguration(name))]
-    command = [sys.executable, "-m", "boom_twin.cli.main", "play", LaunchConfiguration("bag"), "--clock", *options]
+    command = [*python_command("boom_twin.cli.main", "play"), LaunchConfiguration("bag"), "--clock", *options]
     return ExecuteProcess(cmd=command, name="play", output="screen", on_exit=Shutdown(reason="the session has been played"))

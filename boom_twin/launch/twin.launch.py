@@ -3,8 +3,6 @@
 ros2 launch boom_twin twin.launch.py scene:=my_boom.yaml rviz:=true record:=sessions/first
 """
 
-import sys
-
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.conditions import IfCondition
@@ -13,6 +11,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
+from boom_twin.child_process import python_command
 from boom_twin.io.urdf import urdf
 from boom_twin.scene import load_scene
 
@@ -90,5 +89,5 @@ def recorder(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """The recorder, if a folder is given."""
     out = LaunchConfiguration("record").perform(context)
     mapping = LaunchConfiguration("mapping").perform(context)
-    command = [sys.executable, "-m", "boom_twin.cli.main", "record", "--out", out, *(["--mapping", mapping] if mapping else [])]
+    command = python_command("boom_twin.cli.main", "record", "--out", out, *(["--mapping", mapping] if mapping else []))
     return [ExecuteProcess(cmd=command, name="record", output="screen")] if out else []

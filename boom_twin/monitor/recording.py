@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
+
+from ..child_process import python_command
 
 PARTING = 10.0
 """Seconds that it may take to complete its files."""
@@ -35,8 +36,8 @@ class Recording:
         if self.is_running:
             return "recording already"
         out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
-        command = ["-m", "boom_twin.cli.main", "record", "--out", str(out), "--note", "started from the monitor"]
-        self._process = subprocess.Popen([sys.executable, *command], stdin=subprocess.DEVNULL)
+        command = python_command("boom_twin.cli.main", "record", "--out", str(out), "--note", "started from the monitor")
+        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
         return f"recording into {out}"
 
     def stop(self) -> str:

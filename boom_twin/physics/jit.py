@@ -1,74 +1,65 @@
 """The one place that compiles: the decorators that every kernel wears.
 
 numba is imported, and a kernel compiled, when Python first calls one: geometry that is only read stays plain Python. The
-compiled code is kept in a cache. numba's cache does not see that a kernel in another file has changed, so the cache folder
-is named after a hash of all kernel sources, and an edit anywhere gives a new folder. ``fastmath`` stays off: it turns
-isfinite(nan) into True. Kernels do not own memory (``_nrt=False``), so none can allocate, and passing a part of an array on
-costs no reference counting, which was nearly half of a step.
+compiled code is kept on disk, see `boom_twin.physics.kernel_cache`. ``fastmath`` stays off: it turns isfinite(nan) into
+True. Kernels do not own memory (``_nrt=False``), so none can allocate, and passing a part of an array on costs no reference
+counting, which was nearly half of a step.
 """
 
 from __future__ import annotations
 
-import hashlib
 import logging
-import os
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-KERNEL_FOLDERS = ("physics", "chain", "estimate")
+from ..errors import UsageError
+from .kernel_cache import SUFFIX, KernelCache, cache_folder, fault_of
+
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+DOCUMENTED = frozenset({"nogil", "error_model"})
 COMPILING = "compiling the model, about half a minute; done once for this version and kept in %s"
-
-
-def _source_hash() -> str:
-    """Hash of every kernel source, 16 hex digits."""
-    digest = hashlib.sha256()
-    for folder in KERNEL_FOLDERS:
-        for path in sorted((ROOT / folder).glob("*.py")):
-            digest.update(path.name.encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Where compiled kernels of this source state are kept: NUMBA_CACHE_DIR, or a folder of our own."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return Path(os.environ["NUMBA_CACHE_DIR"])
-    home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return home / "boom_twin" / _source_hash()
+NOT_KEPT = "compiling the model, about half a minute each time, because compiled code is not kept: %s"
+CONFIG_FILE = ".numba_config.yaml"
+"""numba takes its settings from this file in the working directory, which may be a received session's."""
 
 
 @cache
 def _numba() -> Any:
-    """numba, its cache pointed at our folder; says so if that is empty."""
-    folder = cache_folder()
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    """numba, with its settings from the environment only."""
+    if Path(CONFIG_FILE).exists():
+        file = Path(CONFIG_FILE).absolute()
+        raise UsageError(f"{file}: would change how the model is compiled. Move it away, or start elsewhere.")
     import numba
 
-    numba.config.CACHE_DIR = str(folder)
-    if not numba.config.DISABLE_JIT and not any(folder.glob("**/*.nbi")):
-        logging.getLogger("boom_twin").warning(COMPILING, folder)
     return numba
 
 
-def _cache(function: Callable[..., Any]) -> Any:
-    """A cache on disk that loads compiled code without first filling numba's tables of types and of BLAS.
+@cache
+def _folder() -> Path | None:
+    """Where compiled kernels are kept, None if nowhere; says so if that is nowhere, or an empty folder."""
+    folder = cache_folder()
+    if (fault := fault_of(folder)) is not None:
+        _tell_not_kept(fault)
+        return None
+    if not any(folder.glob(f"*{SUFFIX}")):
+        logging.getLogger("boom_twin").warning(COMPILING, folder)
+    return folder
 
-    Filling them takes 0.25 s, most of it an import of scipy.linalg, and only compiling needs them: it fills them itself.
-    """
-    from numba.core.caching import FunctionCache
-    from numba.core.runtime import rtsys
 
-    class Quick(FunctionCache):  # type: ignore[misc]
-        def load_overload(self, sig: Any, target_context: Any) -> Any:
-            rtsys.initialize(target_context)  # the symbols that loaded code refers to
-            with self._guard_against_spurious_io_errors():
-                return self._load_overload(sig, target_context)
+@cache
+def _tell_not_kept(reason: str) -> None:
+    logging.getLogger("boom_twin").warning(NOT_KEPT, reason)
 
-    return Quick(function)
+
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    """Those options that this numba has; it can compile without the ones that are not documented, only slower code."""
+    try:
+        from numba.core.cpu import CPUTargetOptions
+    except ImportError:
+        CPUTargetOptions = None
+    return {name: value for name, value in options.items() if name in DOCUMENTED or hasattr(CPUTargetOptions, name)}
 
 
 class Kernel:
@@ -83,9 +74,13 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """numba's object, made on first use."""
-        dispatcher = _numba().njit(**OPTIONS, **self._options)(self.py_func)
-        if self._cached and hasattr(dispatcher, "enable_caching"):  # not where numba is told not to compile
-            dispatcher._cache = _cache(self.py_func)
+        numba = _numba()
+        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}))(self.py_func)
+        if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
+            try:
+                dispatcher._cache = KernelCache(self.py_func, folder)
+            except (ImportError, AttributeError) as error:
+                _tell_not_kept(f"numba {numba.__version__} is not the one that was tested ({error})")
         return dispatcher
 
     @property

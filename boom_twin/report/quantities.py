@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import BagError
 from ..health.baseline import Baseline
 from ..moments import stations
+from ..received import open_received
 from ..records import Array, Stream, channels_of
 from ..replay import Recording
 from ..scene.parts import Scene
@@ -149,7 +150,8 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
     """Digest of the scene, and the figures, of a replay folder; BagError if they are not there."""
     path = folder / FILE_NAME
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        with open_received(path) as file:
+            content = json.load(file)
         return str(content["scene_sha256"]), [Quantity(**row) for row in content["quantities"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{path}: {error}. Replay the session again with `boom_twin replay`.") from None

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import BagError
 from ..health.baseline import load_baseline
 from ..pictures import history_of
+from ..received import holds_file, open_received
 from ..replay import Replay
 from ..scene.parts import Scene
 from ..settings import Settings
@@ -47,10 +48,11 @@ def side_of(path: Path, replayed: Callable[[Path], Path]) -> Side:
     BagError
         The session cannot be replayed, or the folder lacks figures or has none that can be read.
     """
-    folder = path if (path / "summary.json").is_file() else replayed(path)
+    folder = path if holds_file(path / "summary.json") else replayed(path)
     scene, found = read(folder)
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        with open_received(folder / "summary.json") as file:
+            summary = json.load(file)
         alarms = list(summary["alarms"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None

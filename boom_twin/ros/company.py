@@ -13,6 +13,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..child_process import python_command
 from ..errors import BoomTwinError
 from .stop import on_stop_signal
 
@@ -30,21 +31,21 @@ LISTENERS = 2
 
 
 class Child:
-    """A running Python process whose words go into a log.
+    """A running module of this package whose words go into a log.
 
     Parameters
     ----------
     arguments : list of str
-        Of Python.
+        The module and its arguments.
     log : Path
     parting : Signals
         What ends it in order.
     """
 
     def __init__(self, arguments: list[str], log: Path, parting: signal.Signals) -> None:
-        self._name, self._log, self._parting = " ".join(arguments[:3]), log, parting
+        self._name, self._log, self._parting = " ".join(arguments[:2]), log, parting
         with log.open("w", encoding="utf-8") as file:
-            self._process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
+            self._process = subprocess.Popen(python_command(*arguments), stdout=file, stderr=file)
 
     def said(self) -> str:
         """All that it said so far."""
@@ -87,8 +88,8 @@ class Company:
 
     def begin(self, origin: str) -> None:
         """Start node and recorder; `origin` is kept in the recording."""
-        self.start("node", ["-m", "boom_twin.ros.main"], signal.SIGTERM)
-        record = ["-m", "boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin]
+        self.start("node", ["boom_twin.ros.main"], signal.SIGTERM)
+        record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin]
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
     def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:

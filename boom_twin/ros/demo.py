@@ -6,7 +6,6 @@ session is synthetic (virtual rig, surrogate parameters).
 
 from __future__ import annotations
 
-import shutil
 import sys
 import time
 from argparse import ArgumentParser, Namespace
@@ -17,6 +16,7 @@ from tqdm import tqdm
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
 from ..pictures import draw, history_of
+from ..received import holds_file, open_received
 from ..records import Stream
 from ..replay import Replay, replay
 from ..scene import load_scene
@@ -39,14 +39,15 @@ def main() -> int:
         about = session.notes.get("origin", "origin not noted")
         with company(args.out, f"live run of: {about}") as running:
             sent, recorded = _play(session, args.duration, running), running.recorded
-        if (args.bag / TRUTH).is_file():
-            shutil.copy(args.bag / TRUTH, recorded)
+        if holds_file(args.bag / TRUTH):
+            with open_received(args.bag / TRUTH) as truth:
+                (recorded / TRUTH).write_bytes(truth.read())
         card, scene = score(recorded), load_scene()
         again = replay(recorded, scene, args.out / "replay")
         print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
         for path in [recorded, *draw(again, history_of(again.recording, scene), args.out)]:
             print(path)
-        print(f"see it in a browser: {sys.executable} -m boom_twin.cli.main monitor --bag {recorded}")
+        print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
         return 0
     except BoomTwinError as error:
         print(f"demo: {error}", file=sys.stderr)

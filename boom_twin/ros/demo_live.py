@@ -46,7 +46,7 @@ def _play(args: Namespace, running: Company) -> None:
     from .context import ros
     from .player import Player
 
-    command = ["-m", "boom_twin.cli.main", "monitor", *(["--port", args.port] if args.port else [])]
+    command = ["boom_twin.cli.main", "monitor", *(["--port", args.port] if args.port else [])]
     monitor = running.start("monitor", command, signal.SIGTERM)
     with ros([]):
         player = Player(scan(args.bag))

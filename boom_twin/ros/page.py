@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Sequence
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from ..child_process import python_command
 from ..io.topics import Topics
 
 LOOK = 1.0
@@ -60,5 +60,4 @@ class Page:
 
 
 def _start(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "boom_twin.cli.main", "monitor", *arguments]
-    return subprocess.Popen(command, stdin=subprocess.PIPE)
+    return subprocess.Popen(python_command("boom_twin.cli.main", "monitor", *arguments), stdin=subprocess.PIPE)

@@ -1,0 +1,33 @@
+"""The command line of a child process that runs a module of this package, and nothing from the working directory."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).absolute().parents[1]
+"""The folder, or zip archive, from which this process has its ``boom_twin``."""
+
+_START = (
+    "import runpy, sys; from importlib import machinery, util; "
+    "spec = machinery.PathFinder.find_spec('boom_twin', [sys.argv[1]]); "
+    "sys.modules['boom_twin'] = package = util.module_from_spec(spec); spec.loader.exec_module(package); "
+    "module = sys.argv[2]; del sys.argv[1:3]; runpy.run_module(module, run_name='__main__', alter_sys=True)"
+)
+
+
+def python_command(module: str, *arguments: str) -> list[str]:
+    """The command line that runs `module` of this package as ``python -m`` does, without the working directory's modules.
+
+    ``python -m`` puts the working directory first on ``sys.path``, so that a ``numpy.py`` beside a received session would
+    run; ``-P`` keeps it away. Environment and working directory are the parent's, so relative paths mean the same. The
+    package is taken from where the parent has it, also where the parent alone knows that place (a changed ``sys.path``).
+
+    Parameters
+    ----------
+    module : str
+        Full name, ``boom_twin.cli.main``.
+    *arguments : str
+        Of the module.
+    """
+    return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]

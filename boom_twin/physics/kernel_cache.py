@@ -1,0 +1,175 @@
+"""Compiled kernels kept on disk: in which folder, whether it can be trusted, one checked file for every kernel and signature.
+
+Loading one runs machine code. So nobody but the user (and root) may be able to write it, and a file that is cut off or
+altered must not be taken: every file begins with the SHA-256 of the rest, and is written whole or not at all. numba's own
+cache has neither check. It does not see either that a kernel in another file has changed: the folder is named after a hash of
+all kernel sources, so an edit anywhere gives a new folder.
+"""
+
+from __future__ import annotations
+
+import grp
+import hashlib
+import os
+import pickle
+import pwd
+import stat
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+KERNEL_FOLDERS = ("physics", "chain", "estimate")
+SUFFIX = ".kernel"
+_DIGEST = hashlib.sha256().digest_size
+
+
+def source_hash(root: Path = ROOT) -> str:
+    """Hash of every kernel source, and of numba's settings in the environment, 16 hex digits."""
+    digest = hashlib.sha256()
+    for folder in KERNEL_FOLDERS:
+        for path in sorted((root / folder).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes())
+    settings = sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] != "NUMBA_CACHE_DIR")
+    digest.update(repr(settings).encode())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Where kernels of this source state are kept: in ``NUMBA_CACHE_DIR``, else in ``boom_twin`` of the user's cache folder.
+
+    A relative path in ``XDG_CACHE_HOME`` counts as none, as its specification says.
+    """
+    if own := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(own) / source_hash()
+    home = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (home if home.is_absolute() else Path(os.path.expanduser("~/.cache"))) / "boom_twin" / source_hash()
+
+
+def fault_of(folder: Path) -> str | None:
+    """Why machine code from `folder`, which is made if needed, is not to be trusted or cannot be kept; None if all is well."""
+    if not folder.is_absolute():
+        return f"{folder} is a relative path: give NUMBA_CACHE_DIR an absolute one"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        real = folder.resolve(strict=True)
+        for place in (real, *real.parents):
+            if fault := _writers(place.stat(), may_be_sticky=place != real):
+                return f"{place} {fault}"
+        with NamedTemporaryFile(dir=real):
+            pass
+    except OSError as error:
+        return f"{error.filename or folder}: {error.strerror}"
+    return None
+
+
+def _writers(state: os.stat_result, may_be_sticky: bool = False) -> str | None:
+    """Who but the user and root can write something, in words with the remedy; None if nobody."""
+    if state.st_uid not in (os.getuid(), 0):
+        return f"belongs to user {state.st_uid}: set NUMBA_CACHE_DIR to a folder of your own"
+    if may_be_sticky and state.st_mode & stat.S_ISVTX:  # as /tmp: others may add entries, but not exchange them
+        return None
+    if state.st_mode & stat.S_IWOTH or (state.st_mode & stat.S_IWGRP and not _is_own_group(state.st_gid)):
+        return "can be written by others: `chmod go-w` it"
+    return None
+
+
+def _is_own_group(number: int) -> bool:
+    """Whether a group holds nobody but the user, or root: by its name and its members."""
+    if number == 0:
+        return True
+    try:
+        group, name = grp.getgrgid(number), pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return False
+    return group.gr_name == name and set(group.gr_mem) <= {name}
+
+
+class KernelCache:
+    """The compiled code of one kernel on disk; has what numba's dispatcher asks of a cache.
+
+    It loads without first filling numba's tables of types and of BLAS: that takes 0.25 s, most of it an import of
+    scipy.linalg, and only compiling needs them, which fills them itself.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel in Python.
+    folder : Path
+        From `cache_folder`, without a `fault_of`.
+
+    Raises
+    ------
+    ImportError, AttributeError
+        numba does not have its parts where they were in the versions that are tested.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        from numba import __version__
+        from numba.core.compiler import CompileResult
+        from numba.core.runtime import rtsys
+        from numba.core.serialize import dumps
+
+        self._rebuild, self._reduce = CompileResult._rebuild, CompileResult._reduce
+        self._initialize, self._dumps = rtsys.initialize, dumps
+        self._name, self._folder = f"{function.__module__}.{function.__qualname__}", folder
+        self._version = (__version__, sys.implementation.cache_tag, function.__code__.co_code)
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(self._folder)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The compiled kernel for a signature; None if it is not there, or not as it was written."""
+        self._initialize(context)  # the symbols that loaded code refers to
+        data = read_checked(self._path(signature, context.codegen()))
+        return None if data is None else self._rebuild(context, *pickle.loads(data))
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep a compiled kernel; a full disk or a folder that went away is no reason to stop."""
+        if compiled.lifted or compiled.library.has_dynamic_globals:
+            return
+        with suppress(OSError):
+            write_checked(self._path(signature, compiled.codegen), self._dumps(self._reduce(compiled)))
+
+    def enable(self) -> None:
+        """It always is."""
+
+    def flush(self) -> None:
+        """Nothing is kept in memory."""
+
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        key = repr((self._version, str(signature), codegen.magic_tuple()))
+        return self._folder / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
+
+
+def read_checked(path: Path) -> bytes | None:
+    """What `write_checked` wrote; None if nothing is there, it is not as it was written, or others can write it."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return None
+    with open(descriptor, "rb") as file:
+        state = os.fstat(descriptor)
+        if not stat.S_ISREG(state.st_mode) or _writers(state):
+            return None
+        told, data = file.read(_DIGEST), file.read()
+    return data if hashlib.sha256(data).digest() == told else None
+
+
+def write_checked(path: Path, data: bytes) -> None:
+    """Write a file with the checksum of its content before it, whole or not at all."""
+    with NamedTemporaryFile(dir=path.parent, prefix=".", suffix=".draft", delete=False) as file:
+        draft = Path(file.name)
+        try:
+            file.write(hashlib.sha256(data).digest() + data)
+            file.flush()
+            draft.replace(path)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise

@@ -1,0 +1,73 @@
+"""Files of a folder that was received from somebody: only regular files that lie in it are opened.
+
+A link in such a folder can lead to any file of the reader, a pipe makes a program wait for ever, a device can be a disk.
+What the user names on the command line may be a link; what a folder brings along may not.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from contextlib import ExitStack
+from errno import ENOENT
+from pathlib import Path
+from typing import BinaryIO
+
+from .errors import BagError
+
+_KINDS = (
+    (stat.S_ISLNK, "a symbolic link"),
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISCHR, "a device"),
+)
+
+
+def holds_file(path: Path) -> bool:
+    """Whether there is a file at `path` that `open_received` would open; False if nothing is there.
+
+    Raises
+    ------
+    BagError
+        There is something else than a regular file: a link, a directory, a pipe, a socket, a device.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except (OSError, ValueError) as error:
+        raise BagError(f"{path}: cannot be read ({error}). Check its name and its permissions.") from None
+    _check_regular(path, mode)
+    return True
+
+
+def open_received(path: Path) -> BinaryIO:
+    """Open a file of a received folder for reading.
+
+    Raises
+    ------
+    BagError
+        It is no regular file: a link, a directory, a pipe, a socket, a device.
+    OSError
+        It is not there, or cannot be read.
+    """
+    if not holds_file(path):
+        raise FileNotFoundError(ENOENT, os.strerror(ENOENT), str(path))
+    with ExitStack() as stack:
+        file = stack.enter_context(open(path, "rb", opener=_without_links))
+        _check_regular(path, os.fstat(file.fileno()).st_mode)
+        stack.pop_all()
+        return file
+
+
+def _without_links(path: str, flags: int) -> int:
+    """Open what was looked at before: if it has been exchanged since, neither follow it nor wait for it."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def _check_regular(path: Path, mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), "no regular file")
+        raise BagError(f"{path}: {kind}, not opened in a session's folder. Put the file itself there, or move it away.")
