@@ -9,11 +9,13 @@ from types import SimpleNamespace
 from typing import Any
 
 from ..errors import BagError, BoomTwinError
-from ..health.baseline import Baseline, load_baseline
+from ..health.baseline import Baseline
 from ..io.ahead import Ahead
+from ..io.boom_names import refuse_other_names
 from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
 from ..io.reader import Session, read, scan
+from ..io.session_model import SessionScene, baseline_of
 from ..io.topics import NODE, TYPES, Output, Topic, Topics
 from ..io.typestore import jazzy
 from ..records import Change, Sample, Stream
@@ -21,6 +23,7 @@ from ..scene.parts import Scene
 from ..settings import Settings
 from ..thresholds import Thresholds
 from ..twin import Twin
+from ..watch.other_boom import OtherBoom
 from ..watch.peers import Peers
 from ..watch.sensors import sensors_of
 from ..watch.status import Status
@@ -82,7 +85,7 @@ class BagFeed(Feed):
 
 
 def bag_feed(
-    path: Path, scene: Scene, settings: Settings, mapping: Path | None = None, baseline: Path | None = None
+    path: Path, taken: SessionScene, settings: Settings, mapping: Path | None = None, baseline: Path | None = None
 ) -> BagFeed:
     """Open a session.
 
@@ -90,7 +93,7 @@ def bag_feed(
     ----------
     path : Path
         A recording, or the result bag of a replay.
-    scene : Scene
+    taken : SessionScene
         Of the rig.
     settings : Settings
         For the twin, where the session has no outputs.
@@ -102,12 +105,13 @@ def bag_feed(
     Raises
     ------
     BagError
-        It cannot be read, or has nothing that can be shown.
+        It cannot be read, is of another boom, or has nothing that can be shown.
     UsageError
         The mapping or the baseline cannot be used.
     """
-    session, usual = scan(path), load_baseline(baseline)
+    session, usual, scene = scan(path), baseline_of(path, baseline).baseline, taken.scene
     topics = mapping_of(path, mapping, len(scene.joints)).topics
+    refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
     store = Store(max(counts.values(), default=1), keeps_boards=True)
@@ -171,6 +175,7 @@ class _Twin:
         sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
+        self._other_boom = OtherBoom()
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
         self._twin.warm_up()
@@ -194,6 +199,8 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
+        if reason := self._other_boom.took(sample, report):
+            raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -19,10 +20,12 @@ class Recording:
     ----------
     folder : Path
         Every recording gets a directory in it, named by its time (UTC).
+    options : sequence of str
+        Further arguments of ``boom_twin record``.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
+        self._folder, self._options = folder, options
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -36,6 +39,7 @@ class Recording:
             return "recording already"
         out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
         command = ["-m", "boom_twin.cli.main", "record", "--out", str(out), "--note", "started from the monitor"]
+        command += self._options
         self._process = subprocess.Popen([sys.executable, *command], stdin=subprocess.DEVNULL)
         return f"recording into {out}"
 
