@@ -147,7 +147,7 @@ def replay(
         recorded with cannot be used; or `out` cannot be written.
     """
     session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
-    taken = _taken(scene, session)
+    taken = scene_for(session.path, scene)
     scene, joints = taken.scene, len(taken.scene.joints)
     mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints)
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
@@ -199,10 +199,10 @@ def replay(
     return Replay(summary, recording, session, truth)
 
 
-def _taken(scene: Scene | SessionScene | None, session: Session) -> SessionScene:
-    """The scene of a replay, with its text and where it was taken from."""
+def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene:
+    """The scene that a session is read with: as given, or if it is None as `boom_twin.io.session_model.scene_of` finds it."""
     if scene is None:
-        return scene_of(session.path)
+        return scene_of(session)
     return scene if isinstance(scene, SessionScene) else SessionScene(scene, anew(scene), GIVEN)
 
 

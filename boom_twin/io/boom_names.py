@@ -58,7 +58,7 @@ def told_beyond(topic: str, names: Collection[str], stream: Stream, joints: int,
     kind = KINDS[stream]
     return (
         f"{topic} names {_listed(names)}; {_scene(scene)} has {_counted(joints, kind)}, so this is another boom. "
-        f"Give its scene, or a mapping whose sensors list every {kind} of this one."
+        f"Give its scene by --scene (the node: parameter scene), or a mapping whose sensors list every {kind} of this one."
     )
 
 

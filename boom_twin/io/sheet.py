@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ruamel.yaml.scalarstring import LiteralScalarString
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
 from ..errors import BagError
 from ..plain import LARGEST, plain, read_plain
@@ -141,11 +141,14 @@ def _block(text: str | None) -> str | None:
     """A text to be written line by line, if YAML gives it again so; quoted if not."""
     if not text:
         return None
-    block = LiteralScalarString(text)
+    block: str = LiteralScalarString(text)
     try:
-        return block if plain(dump({"": block})) == {"": text} else text
+        if plain(dump({"": block})) == {"": text}:
+            return block
     except ValueError:
-        return text
+        pass
+    quoted: str = DoubleQuotedScalarString(text)
+    return quoted
 
 
 def _time(moment: datetime) -> str:

@@ -19,6 +19,7 @@ from ..io.session_model import SessionScene, baseline_of
 from ..io.topics import NODE, TYPES, Output, Topic, Topics
 from ..io.typestore import jazzy
 from ..records import Change, Sample, Stream
+from ..replay import scene_for
 from ..scene.parts import Scene
 from ..settings import Settings
 from ..thresholds import Thresholds
@@ -85,7 +86,11 @@ class BagFeed(Feed):
 
 
 def bag_feed(
-    path: Path, taken: SessionScene, settings: Settings, mapping: Path | None = None, baseline: Path | None = None
+    path: Path,
+    scene: Scene | SessionScene | None,
+    settings: Settings,
+    mapping: Path | None = None,
+    baseline: Path | None = None,
 ) -> BagFeed:
     """Open a session.
 
@@ -93,8 +98,8 @@ def bag_feed(
     ----------
     path : Path
         A recording, or the result bag of a replay.
-    taken : SessionScene
-        Of the rig.
+    scene : Scene or SessionScene, optional
+        Of the rig; None: the one that the session was made with, else the package's own.
     settings : Settings
         For the twin, where the session has no outputs.
     mapping : Path, optional
@@ -109,7 +114,8 @@ def bag_feed(
     UsageError
         The mapping or the baseline cannot be used.
     """
-    session, usual, scene = scan(path), baseline_of(path, baseline).baseline, taken.scene
+    session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
+    scene = taken.scene
     topics = mapping_of(path, mapping, len(scene.joints)).topics
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
@@ -157,6 +163,7 @@ def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], jo
             if sample is not None:
                 twin.take(sample)
             yield
+        twin.finish()
         if not twin.has_predicted:
             raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
     finally:
@@ -199,13 +206,20 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
-        if reason := self._other_boom.took(sample, report):
-            raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
+        self._refuse(self._other_boom.took(sample, report))
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():
             self._look()
+
+    def finish(self) -> None:
+        """The session has ended."""
+        self._refuse(self._other_boom.judge())
+
+    def _refuse(self, reason: str) -> None:
+        if reason:
+            raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
         found = self._watch.look(self._twin.counts, True, self._peers, (), self._time)

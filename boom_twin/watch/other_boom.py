@@ -58,4 +58,4 @@ class OtherBoom:
         if 2 * len(far) <= len(live):
             return ""
         told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
-        return f"{told} off what the strokes say, of {degrees(FAR):g} deg that a sound boom stays within"
+        return f"{told} off what the strokes say, and at most {degrees(FAR):g} deg can be a fault of the rig"
