@@ -19,25 +19,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import __version__
 from .alarms import Alarms
 from .errors import BagError
-from .health.baseline import Baseline, load_baseline
+from .health.baseline import Baseline
 from .io.ahead import Ahead
 from .io.behind import Behind
+from .io.boom_names import refuse_other_names
 from .io.mapping import mapping_of
 from .io.reader import Session, scan
+from .io.session_model import SessionScene, baseline_of, scene_of
+from .io.sheet import Sheet
 from .io.topics import Topics
 from .io.writer import FILE_NAME
 from .records import Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
+from .study.rewrite import anew
 from .truth import TipTruth, load_truth
+from .watch.other_boom import OtherBoom
 
 if TYPE_CHECKING:
     from .twin import Twin
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 NANO = 1e-9
+GIVEN = "given as a Scene"
+"""Source of a scene that came by no file."""
 
 
 @dataclass
@@ -96,7 +104,7 @@ class Replay:
 
 def replay(
     bag: str | Path,
-    scene: Scene,
+    scene: Scene | SessionScene | None,
     out: str | Path,
     settings: Settings | None = None,
     progress: Progress | None = None,
@@ -111,6 +119,8 @@ def replay(
     ----------
     bag : path
         A rosbag2 directory, a directory of .mcap files, or one .mcap.
+    scene : Scene or SessionScene, optional
+        None: the one that the session was made with, else the package's own.
     out : path
         Made if needed; a result bag of an earlier replay in it is replaced.
     settings : Settings, optional
@@ -126,23 +136,27 @@ def replay(
         Judge the rig's health, see `Report.health`.
     baseline : path, optional
         What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
-        package's own.
+        one that the session was recorded with, else the package's own.
 
     Raises
     ------
     UsageError
         The mapping, a setting or the baseline cannot be used.
     BagError
-        The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written.
+        The session cannot be read, has no strokes, is of another boom than the scene, or gave no prediction; what it was
+        recorded with cannot be used; or `out` cannot be written.
     """
     session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
-    mapped = mapping_of(session.path, Path(mapping) if mapping else None, len(scene.joints))
+    taken = scene_for(session.path, scene)
+    scene, joints = taken.scene, len(taken.scene.joints)
+    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints)
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
-    usual = load_baseline(Path(baseline) if baseline else None) if health else None
+    refuse_other_names(session, topics, joints, taken.source)
+    usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
     _clear(out)
-    recording = Recording()
+    recording, other_boom = Recording(), OtherBoom()
     with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, out / "bag") as (ahead, behind):
-        twin = _ready_twin(scene, settings, topics, usual)
+        twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
         behind.wait_ready()
         samples: Iterator[Sample | Change | None] = iter(ahead)
@@ -160,6 +174,8 @@ def replay(
             report = twin.update(sample)
             recording.add(report)
             behind.put(report)
+            _refuse(session, taken, other_boom.took(sample, report))
+        _refuse(session, taken, other_boom.judge())
         behind.close()
         wall = time.perf_counter() - began
     twin.counts.update(ahead.oddities)
@@ -170,11 +186,33 @@ def replay(
             "and stamps."
         )
     truth = load_truth(session.path)
-    summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {"mapping": mapped.source}
+    Sheet(__version__, taken.text).write(out / "bag")
+    summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
+        "scene": taken.source,
+        "scene_sha256": taken.sha256,
+        "baseline": None if usual is None else usual.source,
+        "mapping": mapped.source,
+    }
     if truth is not None:
         summary |= truth.errors(recording.predictions)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return Replay(summary, recording, session, truth)
+
+
+def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene:
+    """The scene that a session is read with: as given, or if it is None as `boom_twin.io.session_model.scene_of` finds it."""
+    if scene is None:
+        return scene_of(session)
+    return scene if isinstance(scene, SessionScene) else SessionScene(scene, anew(scene), GIVEN)
+
+
+def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
+    """BagError if there is a `reason` for which the session is of another boom than the scene."""
+    if reason:
+        raise BagError(
+            f"{session.path}: {reason}. The scene ({scene.source}) is of another boom, or the sensors' zeros and units are "
+            "others: give the scene by --scene, or those by --mapping."
+        )
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:

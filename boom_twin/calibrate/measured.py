@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import BagError
 from ..io.ahead import Ahead
+from ..io.boom_names import refuse_other_names
 from ..io.reader import Session, check_topic, scan
 from ..io.topics import Topics
 from ..received import open_received
@@ -64,9 +65,11 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[Me
     Raises
     ------
     BagError
-        One cannot be read, or lacks strokes or angles of this boom.
+        One cannot be read, is of another boom, or lacks strokes or angles of this one.
     """
     sessions = [scan(path) for path in paths]
+    for session in sessions:
+        refuse_other_names(session, topics, joints)
     wanted = [_wanted(session, topics) for session in sessions]
     with ExitStack() as stack:
         readers = []

@@ -9,16 +9,15 @@ from typing import Any
 
 from ruamel.yaml.error import YAMLError
 
-from ..errors import BagError, SceneError, UsageError
-from ..io.mapping import DEFAULT_NAME, load_mapping
+from ..errors import SceneError, UsageError
+from ..io.mapping import load_mapping
 from ..io.sensors import factor
-from ..io.sheet import FILE_NAME
-from ..plain import plain, read_plain
+from ..io.sheet import kept
+from ..plain import plain
 from ..records import Stream
 from ..retouch import with_value, yaml_text
-from ..scene.load import default_text
 from ..scene.parts import Scene
-from ..scene.read import parse, read_text
+from ..scene.read import parse
 from ..scene.structure import structure
 from ..study.rewrite import anew
 from .run import Calibration
@@ -53,9 +52,8 @@ def provenance(found: Calibration, credit: str) -> str:
     return "\n".join(lines)
 
 
-def write_scene(found: Calibration, scene: Scene, source: str | None, out: Path, credit: str) -> None:
-    """Write the scene of `source` (None: the default one) with the values that changed, and their provenance."""
-    text = default_text() if source is None else read_text(Path(source))
+def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: str) -> None:
+    """Write the scene, of which the text is given, with the values that changed, and their provenance."""
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
@@ -106,10 +104,8 @@ def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
     """The text that the sessions' mapping was read from; empty for the package's own."""
     if mapping is not None:
         return mapping.read_text(encoding="utf-8-sig")
-    if found.mapped.source == DEFAULT_NAME:
-        return ""
-    sheet = (bag if bag.is_dir() else bag.parent) / FILE_NAME
-    return str(read_plain(sheet, BagError, "Give the mapping by --mapping.", received=True)["mapping"])
+    own = kept(bag, "mapping", "--mapping")
+    return "" if own is None else own.text
 
 
 def _changes(before: Any, after: Any, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:

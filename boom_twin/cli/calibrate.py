@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
-from .common import add_json, add_scene, open_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
     from ..calibrate.run import Calibration, Progress
+    from ..io.session_model import SessionScene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
-    add_scene(parser, option=True)
+    add_session_scene(parser)
     result = parser.add_mutually_exclusive_group(required=True)
     result.add_argument("--out", type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
     learn = "learn what is healthy on this rig, for alarms (replay --baseline, the node's parameter); changes no scene"
@@ -49,11 +50,11 @@ def _learn(args: Namespace) -> int:
     from ..calibrate.baseline import baseline_of, write_baseline
     from ..settings import load_settings
 
-    scene, settings = open_scene(args.scene), load_settings(Path(args.params) if args.params else None)
+    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
     with _bar() as progress:
-        learnt = baseline_of(args.bags, scene, settings, args.mapping, progress)
+        learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress)
     write_baseline(learnt, args.baseline, _credit(args), args.force)
     if args.json:
         print_json(learnt.model_dump(exclude={"mean", "covariance", "names"}))
@@ -63,6 +64,17 @@ def _learn(args: Namespace) -> int:
     print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {learnt.detuning:.1%}")
     print(args.baseline)
     return 0
+
+
+def _scene(args: Namespace) -> SessionScene:
+    """The scene that all sessions have; UsageError if theirs differ."""
+    from ..io.session_model import scene_of
+
+    found = open_session_scene(args.bags[0], args.scene)
+    for bag in args.bags[1:] if args.scene is None else []:
+        if scene_of(Path(bag)).scene != found.scene:
+            raise UsageError(f"{bag}: made with another scene than {args.bags[0]}. Give the one that is right by --scene.")
+    return found
 
 
 def _credit(args: Namespace) -> str:
@@ -76,17 +88,17 @@ def _calibrate(args: Namespace) -> int:
     from ..settings import load_settings
 
     refuse_overwriting(args.out, args.scene, args.force)
-    scene = open_scene(args.scene)
+    scene = _scene(args)
     settings = load_settings(Path(args.params) if args.params else None)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()
     with _bar() as progress:
-        found = calibrate(args.bags, scene, choice, settings, args.mapping, progress)
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress)
     wall = time.perf_counter() - began
     credit = _credit(args)
-    write_scene(found, scene, args.scene, args.out, credit)
-    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.joints))
+    write_scene(found, scene.scene, scene.text, args.out, credit)
+    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
     files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
     if args.json:
         print_json(as_object(found) | {"wall_s": wall, "files": [str(path) for path in files]})

@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Fault
 
 if TYPE_CHECKING:
+    from ..io.session_model import SessionScene
     from ..scene import Scene
 
 
-def add_scene(parser: ArgumentParser, *, option: bool = False) -> None:
-    """The scene file: a positional argument, or ``--scene``; without it, the default scene."""
-    names = ["--scene"] if option else ["scene"]
-    extra: dict[str, Any] = {} if option else {"nargs": "?"}
-    parser.add_argument(*names, metavar="SCENE", help="scene file (YAML); without it, the default scene", **extra)
+def add_scene(parser: ArgumentParser) -> None:
+    """The scene file, as a positional argument; without it, the default scene."""
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="scene file (YAML); without it, the default scene")
+
+
+def add_session_scene(parser: ArgumentParser) -> None:
+    """``--scene`` of a command that reads a session; see `open_session_scene`."""
+    told = "scene file (YAML); without it, the one that the session was made with, else the default scene"
+    parser.add_argument("--scene", metavar="SCENE", help=told)
 
 
 def add_json(parser: ArgumentParser) -> None:
@@ -35,7 +41,17 @@ def open_scene(source: str | None) -> Scene:
     return scene
 
 
-def tell(oddities: list[Fault]) -> None:
+def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
+    """The scene of a session, see `boom_twin.io.session_model.scene_of`; which was taken goes to stderr, with its warnings."""
+    from ..io.session_model import scene_of
+
+    found = scene_of(Path(session), source)
+    print(f"scene: {found.source} (sha256 {found.sha256[:12]}..)", file=sys.stderr)
+    tell(found.oddities)
+    return found
+
+
+def tell(oddities: Iterable[Fault]) -> None:
     """Print warnings on stderr."""
     for oddity in oddities:
         print(f"warning: {oddity}", file=sys.stderr)

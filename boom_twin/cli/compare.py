@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .common import add_json, add_scene, open_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
     from ..report.compare import Row
@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     for name in ("A", "B"):
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
-    add_scene(parser, option=True)
+    add_session_scene(parser)
     parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
     parser.add_argument("--baseline", metavar="FILE", help="as for replay")
     parser.add_argument("--out", metavar="DIR", help="folder for compare.png and the replays; without it nothing is kept")
@@ -53,9 +53,9 @@ def _side(args: Namespace, path: Path, folder: Path) -> Side:
 
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
-        scene, settings = open_scene(args.scene), load_settings(Path(args.params) if args.params else None)
+        scene, settings = open_session_scene(session, args.scene), load_settings(Path(args.params) if args.params else None)
         result = replay(session, scene, folder, settings, baseline=args.baseline)
-        worked_out(result, scene, settings, Path(args.baseline) if args.baseline else None, folder)
+        worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, folder)
         return folder
 
     return side_of(path, replayed)

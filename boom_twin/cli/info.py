@@ -6,17 +6,18 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_json, add_scene, open_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
     from ..io.info import BagInfo
+    from ..io.session_model import SessionScene
     from ..io.tally import Tally
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
-    add_scene(parser, option=True)
+    add_session_scene(parser)
     add_json(parser)
 
 
@@ -24,20 +25,21 @@ def run(args: Namespace) -> int:
     """Read the session once and tell."""
     from ..io.info import inspect
 
-    joints = len(open_scene(args.scene).joints) if args.scene else None
     info = inspect(Path(args.bag))
+    scene = open_session_scene(args.bag, args.scene)
     if args.json:
-        print_json(as_json(info, joints))
+        print_json(as_json(info, scene))
     else:
-        print("\n".join(as_text(info, joints)))
+        print("\n".join(as_text(info, scene)))
     return 0
 
 
-def as_json(info: BagInfo, joints: int | None) -> dict[str, Any]:
+def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
     """All that is known; lists have one entry for each of ``topics``."""
     from ..io.needs import missing, names_extra, names_missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
+    joints = len(scene.scene.joints)
     return {
         "path": str(session.path),
         "storage": "mcap",
@@ -68,7 +70,9 @@ def as_json(info: BagInfo, joints: int | None) -> dict[str, Any]:
         "log_minus_stamp_max_s": [_skew(tally, 1) for tally in tallies],
         "names_missing": names_missing(info, joints),
         "names_extra": names_extra(info, joints),
-        "missing_for_replay": missing(info, joints),
+        "scene": scene.source,
+        "scene_sha256": scene.sha256,
+        "missing_for_replay": missing(info, joints, scene.source),
         "remarks": remarks(info),
     }
 
@@ -85,9 +89,9 @@ def _skew(tally: Tally, which: int) -> float | None:
     return tally.skews[which] * 1e-9 / (tally.skewed if which == 2 else 1)
 
 
-def as_text(info: BagInfo, joints: int | None) -> list[str]:
+def as_text(info: BagInfo, scene: SessionScene) -> list[str]:
     """The same for people."""
-    told = as_json(info, joints)
+    told = as_json(info, scene)
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
     files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
     distro = told["distro"] or "distribution not noted"
@@ -98,6 +102,7 @@ def as_text(info: BagInfo, joints: int | None) -> list[str]:
         f"checksums {'present' if told['checksums'] else 'absent'}",
         f"written    by {told['library'] or 'an unnamed program'}; profile ros2, {distro}, {version}",
         f"made by    {told['origin'] or 'origin not noted'} ({made})",
+        f"scene      {told['scene']}, sha256 {told['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages",
         "",
         *_table(info),

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .common import add_scene, open_scene
+from .common import add_session_scene, open_scene, open_session_scene
 
 if TYPE_CHECKING:
     from ..monitor.feed import Feed
@@ -30,9 +30,9 @@ BACKLOG = 16
 def add_arguments(parser: ArgumentParser) -> None:
     """What is shown, to whom, and what may be done."""
     parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
-    add_scene(parser, option=True)
+    add_session_scene(parser)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
-    usual = "what is known of this rig while all is well, for a session's twin (the package's)"
+    usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
@@ -59,7 +59,7 @@ def run(args: Namespace) -> int:
     from ..monitor.recording import Recording
 
     _give_way()
-    recording = Recording(args.record_into) if "record" in args.allow and args.bag is None else None
+    recording = Recording(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
         with _feed(args) as feed:
             _serve(args, feed, Desk(feed, frozenset(args.allow), recording))
@@ -67,6 +67,13 @@ def run(args: Namespace) -> int:
         if recording is not None:
             recording.close()
     return 0
+
+
+def _passed_on(args: Namespace) -> list[str]:
+    """What `boom_twin record` is to know of what this was started with."""
+    options = {"--scene": args.scene, "--mapping": args.mapping, "--baseline": args.baseline, "--params": args.params}
+    given = [part for option, value in options.items() if value for part in (option, str(value))]
+    return [*given, *(["--ros-args", *args.ros_args] if args.ros_args else [])]
 
 
 def _give_way() -> None:
@@ -85,7 +92,8 @@ def _feed(args: Namespace) -> Iterator[Feed]:
 
         print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
         settings = load_settings(args.params)
-        with closing(bag_feed(args.bag, open_scene(args.scene), settings, args.mapping, args.baseline)) as feed:
+        scene = open_session_scene(args.bag, args.scene)
+        with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline)) as feed:
             yield feed
         return
     from ..ros.require import require_rclpy
@@ -96,8 +104,8 @@ def _feed(args: Namespace) -> Iterator[Feed]:
     from ..ros.monitor import TopicFeed
 
     with ros(["--ros-args", *args.ros_args]):
-        scene = open_scene(args.scene) if args.scene else None
-        with closing(TopicFeed(load_mapping(args.mapping), scene)) as feed:
+        shown = open_scene(args.scene) if args.scene else None
+        with closing(TopicFeed(load_mapping(args.mapping), shown)) as feed:
             yield feed
 
 

@@ -5,24 +5,27 @@ from __future__ import annotations
 import re
 import sys
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import REMAINDER, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..errors import BoomTwinError
+from ..errors import BagError, BoomTwinError
 from ..io.mapping import load_mapping
-from ..io.topics import DEFAULT_FILE, Topic
+from ..io.sheet import Sheet
+from ..io.topics import DEFAULT_FILE, Topic, Topics
 from ..ros.require import require_rclpy
-from .common import open_scene
+from ..settings import DEFAULT_FILE as DEFAULT_PARAMETERS
+from ..thresholds import load_thresholds
+from .common import tell
 from .play import positive
 
 if TYPE_CHECKING:
     from ..ros.recorder import Count
     from ..ros.wanted import Wanted
-    from ..thresholds import Thresholds
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -42,58 +45,96 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (on Ctrl-C)")
     parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file from this size on: 500M, 2G")
     parser.add_argument("--split-duration", type=positive, metavar="S", help="begin a new file after so many seconds")
-    parser.add_argument("--scene", metavar="SCENE", help="scene of the rig, copied into session.yaml (the default one)")
+    kept = "kept in session.yaml (that of the running twin, if it is there)"
+    parser.add_argument("--scene", metavar="SCENE", type=Path, help=f"scene of the rig, {kept}")
+    parser.add_argument("--baseline", metavar="FILE", type=Path, help=f"what is known of the rig while all is well, {kept}")
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
     parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
+    ros_args = "namespace and remappings of the twin beside which it records: -r __ns:=/front"
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=ros_args)
 
 
 def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
     require_rclpy()
     from ..io.bagwriter import BagWriter
-    from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
     from ..ros.context import ros
-    from ..ros.recorder import record
+    from ..ros.recorder import record, recorder_node
     from ..ros.stop import on_stop_signal
+    from ..ros.wanted import resolved, resolved_mapping
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
-    mapping = (args.mapping or DEFAULT_FILE).read_text(encoding="utf-8")
+    known, thresholds = load_mapping(args.mapping), load_thresholds(args.params or DEFAULT_PARAMETERS)
+    wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
-    bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
-    types = {each.name: each.type for each in wanted}
-    sheet = Sheet(__version__, scene, parameters, mapping, types, args.note, args.origin)
-    sheet.write(args.out)
-
-    def meet(twin: Mapping[str, object]) -> None:
-        nonlocal sheet
-        sheet = replace(sheet, twin=twin)
+    with ros(["--ros-args", *args.ros_args]), recorder_node() as node:
+        wanted = [resolved(each, node) for each in wanted]
+        sheet = replace(sheet, mapping=resolved_mapping(sheet.mapping or "", known, node))
+        sheet = replace(sheet, topics={each.name: each.type for each in wanted})
+        bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
         sheet.write(args.out)
-        _compare(str(twin.get("scene", "")), scene)
 
-    storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
-    with ros([]):
+        def meet(told: Mapping[str, Any]) -> None:
+            nonlocal sheet
+            more = _met(sheet, told)
+            try:
+                more.write(args.out)
+                sheet = more
+            except BagError as error:
+                _say(f"warning: what the running twin told is not kept: {error}")
+
+        storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
+        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
     _tell(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
+    if sheet.scene is None:
+        _say("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
         raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
     return 0
 
 
-def _compare(path: str, scene: str) -> None:
-    """Say if the twin's scene is not the one in session.yaml."""
-    try:
-        is_same = _scene_text(path or None) == scene
-    except BoomTwinError:
-        is_same = False
-    if not is_same:
-        _say(f"warning: the twin's scene is {path or 'the default one'}, session.yaml holds another. Give it with --scene.")
+def _sheet(args: Namespace) -> Sheet:
+    """What is known before anything is recorded; the files that are given must be valid."""
+    from ..health.baseline import load_baseline
+    from ..io.session_model import scene_from
+    from ..settings import load_settings
+
+    load_settings(args.params)
+    scene = None if args.scene is None else scene_from(args.scene)
+    tell(() if scene is None else scene.oddities)
+    if args.baseline:
+        load_baseline(args.baseline)
+    return Sheet(
+        __version__,
+        scene=None if scene is None else scene.text,
+        baseline=args.baseline and args.baseline.read_text(encoding="utf-8-sig"),
+        parameters=(args.params or DEFAULT_PARAMETERS).read_text(encoding="utf-8"),
+        mapping=(args.mapping or DEFAULT_FILE).read_text(encoding="utf-8-sig"),
+        note=args.note,
+        origin=args.origin,
+        started=datetime.now(UTC),
+    )
+
+
+def _met(sheet: Sheet, told: Mapping[str, Any]) -> Sheet:
+    """With what the running twin tells of itself; what was given instead stays, and the difference is told."""
+    from ..ros.recorder import TEXTS
+
+    changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
+    for name in TEXTS:
+        if name in told:
+            given, own = getattr(sheet, name), told[name]
+            if given is None:
+                changes[name] = own
+            elif given != own:
+                _say(f"warning: the running twin has another {name} than --{name} gives; session.yaml holds the one given")
+    return replace(sheet, **changes)
 
 
 def _say(text: str) -> None:
@@ -108,35 +149,16 @@ def _tell(counts: list[Count]) -> None:
         _say(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
 
 
-def _wanted(args: Namespace) -> list[Wanted]:
-    """The topics of the command line, or the chosen ones of ``topics.yaml``."""
+def _wanted(args: Namespace, known: Topics) -> list[Wanted]:
+    """The topics of the command line, or the chosen ones of the mapping."""
     from ..ros.wanted import Wanted, wanted_of
 
-    known = load_mapping(args.mapping)
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
     outputs = {topic.absolute: topic for topic in [*known.outputs.values(), known.events]}
     if args.topics:
         return wanted_of(args.topics, inputs | outputs)
     chosen = {**({} if args.only == "outputs" else inputs), **({} if args.only == "inputs" else outputs)}
     return [Wanted(name, topic.type, topic) for name, topic in chosen.items()]
-
-
-def _scene_text(source: str | None) -> str:
-    """Text of the scene file, which must be valid."""
-    from ..scene.load import default_text
-
-    open_scene(source)
-    return default_text() if source is None else Path(source).read_text(encoding="utf-8")
-
-
-def _parameters(path: Path | None) -> tuple[Thresholds, str]:
-    """The recorder's part of the parameter file, which must be valid, and all its text."""
-    from ..settings import DEFAULT_FILE, load_settings
-    from ..thresholds import load_thresholds
-
-    load_settings(path)
-    file = path or DEFAULT_FILE
-    return load_thresholds(file), file.read_text(encoding="utf-8")
 
 
 def size(text: str) -> int:

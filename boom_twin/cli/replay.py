@@ -8,19 +8,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_json, add_scene, open_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
+    from ..io.session_model import SessionScene
     from ..records import Array
     from ..replay import Replay
-    from ..scene import Scene
     from ..settings import Settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
-    add_scene(parser, option=True)
+    add_session_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for summary.json, bag/ and pictures")
     parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
     parser.add_argument(
@@ -29,7 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
-    usual = "what is known of this rig while all is well; by default the package's"
+    usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
     parser.add_argument("--baseline", metavar="FILE", help=usual)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     drawn = parser.add_mutually_exclusive_group()
@@ -46,8 +46,8 @@ def run(args: Namespace) -> int:
     from ..report.loads import section_heights
     from ..settings import load_settings
 
-    scene = open_scene(args.scene)
-    heights = section_heights(args.section_height, scene)
+    scene = open_session_scene(args.bag, args.scene)
+    heights = section_heights(args.section_height, scene.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     result = replay(
@@ -63,20 +63,19 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _write(args: Namespace, result: Replay, scene: Scene, settings: Settings, heights: Array | None) -> list[Path]:
+def _write(args: Namespace, result: Replay, scene: SessionScene, settings: Settings, heights: Array | None) -> list[Path]:
     """Figures, pictures and report, as they are wanted."""
     from ..pictures import draw
     from ..report.page import Subject, write_report
     from ..report.side import worked_out
-    from ..scene.load import DEFAULT_NAME
 
     out = Path(args.out)
-    history, still, path = worked_out(result, scene, settings, Path(args.baseline) if args.baseline else None, out)
+    history, still, path = worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, out)
     files = [path]
     if not args.no_pictures:
         files += draw(result, history, out)
     if args.report:
-        files.append(write_report(Subject(result, history, scene, args.scene or DEFAULT_NAME, still, heights), out))
+        files.append(write_report(Subject(result, history, scene.scene, scene.source, still, heights), out))
     return files
 
 
@@ -94,6 +93,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
         f"wall time          {summary['wall_s']:.2f} s, {summary['realtime_factor']:.1f} times real time",
         f"left out           {summary['dropped']}",
+        f"scene              {summary['scene']}",
         f"mapping            {summary['mapping']}",
         f"tip acceleration   {summary['tip_acceleration_max_m_s2']:.2f} m/s^2 at most",
     ]

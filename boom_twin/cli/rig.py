@@ -6,7 +6,8 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from .common import add_scene, open_scene
+from .. import __version__
+from .common import add_scene, tell
 
 ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 
@@ -29,6 +30,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
     from ..io.session import write_session
+    from ..io.session_model import scene_from
+    from ..io.sheet import Sheet
     from ..rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
     from ..rig.faults import check, parse
     from ..rig.faulty_scene import with_faults
@@ -36,7 +39,9 @@ def run(args: Namespace) -> int:
     from ..rig.wrong import wrong_by
     from ..truth import FILE_NAME
 
-    scene, out = open_scene(args.scene), Path(args.out)
+    assumed, out = scene_from(args.scene), Path(args.out)
+    tell(assumed.oddities)
+    scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     faults = [parse(text) for text in args.fault]
     check(faults, scene, duration)
@@ -51,6 +56,7 @@ def run(args: Namespace) -> int:
     if faults:
         notes["faults"] = ", ".join(map(str, faults))
     write_session(out, session.stamps, session.strokes, session.joints, session.imu, notes, session.angle_stamps)
+    Sheet(__version__, assumed.text, origin=ORIGIN).write(out)  # not the boom that was simulated: what a twin is to assume
     session.save_truth(out / FILE_NAME)
     print(out)
     return 0

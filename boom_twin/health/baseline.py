@@ -16,6 +16,7 @@ from ..records import Array
 from .parameters import Parameter, variances
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "baseline.yaml"))
+REMEDY = "Give a file written by `boom_twin calibrate --baseline`."
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -83,7 +84,11 @@ class Baseline(BaseModel):
 def load_baseline(path: Path | None = None) -> Baseline:
     """A baseline from its file (YAML), the package's own if no path is given; UsageError names every value that cannot be."""
     path = DEFAULT_FILE if path is None else path
-    content = read_plain(path, UsageError, "Give a file written by `boom_twin calibrate --baseline`.")
+    return baseline_from(read_plain(path, UsageError, REMEDY), str(path))
+
+
+def baseline_from(content: object, source: str) -> Baseline:
+    """A baseline from the plain values of its file; UsageError, with the name of the source, as `load_baseline`."""
     if not isinstance(content, dict):
-        raise UsageError(f"{path}: not a baseline. Give a file written by `boom_twin calibrate --baseline`.")
-    return checked(Baseline, {str(key): value for key, value in content.items()}, str(path))
+        raise UsageError(f"{source}: not a baseline. {REMEDY}")
+    return checked(Baseline, {str(key): value for key, value in content.items()}, source)

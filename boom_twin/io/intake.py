@@ -42,14 +42,17 @@ class _Channels:
         sensors = topics.sensors_of(stream, joints)
         self.names = [sensor.name for sensor in sensors.values()]
         self._scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
+        self._topics, self._stream = topics, stream
         self._seen: Sequence[str] = ()
         self._places = [-1] * len(self.names)
+        self.beyond: list[str] = []  # names of the newest message, see `Topics.beyond`
 
     def places(self, names: Sequence[str]) -> list[int]:
         """Where the channels stand among `names`, the first of equal ones; -1 for those that are not there."""
         if names != self._seen:
             self._seen, first = names[:], {name: place for place, name in reversed(list(enumerate(names)))}
             self._places = [first.get(name, -1) for name in self.names]
+            self.beyond = self._topics.beyond(self._stream, len(self.names), first)
         return self._places
 
     def quantities(self, readings: list[float]) -> list[float]:
@@ -80,6 +83,8 @@ class Intake:
         ``unknown names only``
             None of the scene's channels is in the message; no sample. A message of a topic that strokes and angles share
             may have only one kind of them, which is nothing odd.
+        ``names of another boom``
+            Cylinders or joints are named that the scene does not have; no sample.
         ``too many names``
             More than `LONGEST`; no sample.
         ``not finite``
@@ -94,6 +99,8 @@ class Intake:
             Zero, which a driver leaves that does not set it; no sample.
         ``impossible stamp``
             Before 1970, or more seconds than a message can hold; no sample.
+    strangers : dict of Stream to list of str
+        The names that the newest of these messages had, of another boom.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -102,6 +109,7 @@ class Intake:
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._beside = pair if topics.is_shared else {}
         self.oddities: Counter[str] = Counter()
+        self.strangers: dict[Stream, list[str]] = {}
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
         """The sample that `msg` holds.
@@ -139,7 +147,12 @@ class Intake:
         if len(names) > LONGEST:
             self.oddities["too many names"] += 1
             return None
-        places = self._channels[stream].places(names)
+        channels = self._channels[stream]
+        places = channels.places(names)
+        if channels.beyond:
+            self.oddities["names of another boom"] += 1
+            self.strangers[stream] = channels.beyond
+            return None
         if max(places) < 0:
             beside = self._beside.get(stream)
             if beside is None or max(self._channels[beside].places(names)) < 0:

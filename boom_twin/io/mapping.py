@@ -13,9 +13,8 @@ from pydantic_core import ErrorDetails
 
 from ..errors import BagError, Fault, UsageError
 from ..plain import plain, read_plain
-from ..received import holds_file
 from .sensors import Sensor, kind_faults, set_faults, stream_of, usual
-from .sheet import FILE_NAME
+from .sheet import kept
 from .topics import TYPES, Qos, Topic, Topics, default_document, load_topics
 
 DEFAULT_NAME = "default mapping"
@@ -71,16 +70,12 @@ def mapping_of(session: Path, path: Path | None = None, joints: int | None = Non
     """
     if path is not None:
         return Mapped(load_mapping(path, joints), str(path))
-    sheet = (session if session.is_dir() else session.parent) / FILE_NAME
-    if holds_file(sheet):
-        document = read_plain(sheet, BagError, "Move it away, and give the mapping by --mapping.", received=True)
-        text = document.get("mapping") if isinstance(document, dict) else None
-        if text is not None:
-            source = f"{sheet}, mapping"
-            try:
-                return Mapped(_topics(plain(str(text)), source, joints), source)
-            except ValueError as error:
-                raise BagError(f"{source}: not YAML ({error}). Give the mapping by --mapping.") from None
+    own = kept(session, "mapping", "--mapping")
+    if own is not None:
+        try:
+            return Mapped(_topics(plain(own.text), own.source, joints), own.source)
+        except ValueError as error:
+            raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None
     return Mapped(load_topics(), DEFAULT_NAME)
 
 

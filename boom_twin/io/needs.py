@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from ..errors import BagError
 from ..records import Stream
+from .boom_names import other_names
 from .definitions import check_encoding
 from .info import BagInfo
 from .mapping import mapping_of
@@ -64,10 +65,20 @@ def names_extra(info: BagInfo, joints: int | None = None) -> list[str]:
     ]
 
 
-def missing(info: BagInfo, joints: int | None = None) -> list[str]:
-    """What is missing for a replay, one sentence for each, the worst first; empty when all is there."""
-    found: list[str] = []
-    for stream, topic in mapping_of(info.session.path).topics.inputs.items():
+def missing(info: BagInfo, joints: int | None = None, scene: str = "") -> list[str]:
+    """What is missing for a replay, one sentence for each, the worst first; empty when all is there.
+
+    Parameters
+    ----------
+    info : BagInfo
+    joints : int, optional
+        Of the scene, and where that was taken from; without them nothing tells whether the session is of another boom.
+    scene : str
+    """
+    topics = mapping_of(info.session.path).topics
+    names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
+    found = list(other_names(topics, names, joints, scene)) if joints else []
+    for stream, topic in topics.inputs.items():
         try:
             name = check_topic(info.session, topic.name, topic.type).name
             for file in info.session.files:

@@ -22,7 +22,7 @@ from .outcome import Outcome
 from .reader import scan
 from .recorded import Recorded
 from .salvage import Fault, walk
-from .sheet import FILE_NAME as SHEET
+from .sheet import sheet_path
 
 
 def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
@@ -116,10 +116,10 @@ def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorde
 
 def _copy_sheet(path: Path, out: Path) -> None:
     """Keep what the session was recorded with, for a replay: scene and mapping."""
-    sheet = (path if path.is_dir() else path.parent) / SHEET
+    sheet = sheet_path(path)
     if holds_file(sheet) and sheet.stat().st_size <= LARGEST:
         with open_received(sheet) as file:
-            (out / SHEET).write_bytes(file.read(LARGEST))
+            (out / sheet.name).write_bytes(file.read(LARGEST))
 
 
 def _count(out: Path) -> Counter[str]:

@@ -46,6 +46,11 @@ def stream_of(channel: str) -> Stream | None:
     return None if match is None else KINDS.get(match["kind"] or "", Stream.IMU)
 
 
+def number_of(channel: str) -> int:
+    """Of a channel ``cylinder_i`` or ``joint_i``: i."""
+    return int(channel.rpartition("_")[2])
+
+
 def channels(stream: Stream, joints: int) -> list[str]:
     """The channels of a stream in the order of its samples, for a boom of so many joints."""
     return list(channels_of(joints)[stream])

@@ -1,4 +1,4 @@
-"""``session.yaml``: what a recording was made with, beside its bag."""
+"""``session.yaml``: what a session was made with, beside its bag; written and read here alone."""
 
 from __future__ import annotations
 
@@ -8,43 +8,48 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ruamel.yaml.scalarstring import LiteralScalarString
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
 from ..errors import BagError
+from ..plain import LARGEST, plain, read_plain
+from ..received import holds_file
 from .bagmeta import dump
 
 FILE_NAME = "session.yaml"
-_HEAD = "# What this session was recorded with. scene_sha256 is of the text under scene (UTF-8).\n"
+_HEAD = "# What this session was made with. scene_sha256 is of the text under scene (UTF-8).\n"
 
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What a recording was made with.
+    """What a session was made with. What is None or empty is left out of the file.
 
     Attributes
     ----------
     version : str
         Of this package.
-    scene, parameters, mapping : str
-        Text of the scene file, of the ROS parameter file, and of the file that names topics and sensors.
+    scene, baseline, parameters, mapping : str or None
+        Text of the scene file, of what is known of the rig while all is well, of the ROS parameter file, and of the file that
+        names topics and sensors.
     topics : dict of str to str or None
         Type by topic that is to be recorded; None where it was not known at the start.
     note, origin : str or None
         Of the operator.
     twin : dict of str to object
         The parameters of the running twin; empty as long as there is none.
-    started : datetime
+    started : datetime or None
+        None where nothing was recorded: a synthetic session.
     """
 
     version: str
-    scene: str
-    parameters: str
-    mapping: str
-    topics: Mapping[str, str | None]
+    scene: str | None = None
+    parameters: str | None = None
+    mapping: str | None = None
+    topics: Mapping[str, str | None] = field(default_factory=dict)
     note: str | None = None
     origin: str | None = None
     twin: Mapping[str, object] = field(default_factory=dict)
-    started: datetime = field(default_factory=lambda: datetime.now(UTC))
+    started: datetime | None = None
+    baseline: str | None = None
 
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
         """Write ``session.yaml`` beside the bag, all of it or nothing.
@@ -58,28 +63,93 @@ class Sheet:
         Raises
         ------
         BagError
-            The disk is full or fails.
+            The disk is full or fails, or the file would be larger than what is read again.
         """
         end = {} if counts is None else {"ended": _time(datetime.now(UTC)), "counts": [dict(each) for each in counts]}
         document = {
             "boom_twin": self.version,
-            "started": _time(self.started),
+            "started": self.started and _time(self.started),
             **end,
             "origin": self.origin,
             "note": self.note,
             "topics": dict(self.topics),
             "twin": dict(self.twin),
-            "scene_sha256": hashlib.sha256(self.scene.encode()).hexdigest(),
-            "scene": LiteralScalarString(self.scene),
-            "parameters": LiteralScalarString(self.parameters),
-            "mapping": LiteralScalarString(self.mapping),
+            "scene_sha256": sha256(self.scene) if self.scene else None,
+            "scene": _block(self.scene),
+            "baseline": _block(self.baseline),
+            "parameters": _block(self.parameters),
+            "mapping": _block(self.mapping),
         }
+        text = _HEAD + dump({key: value for key, value in document.items() if value not in (None, "", {})})
+        path = directory / FILE_NAME
+        if len(text.encode()) > LARGEST:
+            raise BagError(f"{path}: {len(text.encode())} bytes, of which {LARGEST} are read again. Shorten scene and mapping.")
         draft = directory / f".{FILE_NAME}.draft"
         try:
-            draft.write_text(_HEAD + dump(document), encoding="utf-8")
-            draft.replace(directory / FILE_NAME)
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(path)
         except OSError as error:
-            raise BagError(f"{directory / FILE_NAME}: cannot be written ({error.strerror}). Make room on the disk.") from error
+            raise BagError(f"{path}: cannot be written ({error.strerror}). Make room on the disk.") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A text of a ``session.yaml``, and its place in words."""
+
+    text: str
+    source: str
+
+
+def sheet_path(session: Path) -> Path:
+    """Where the ``session.yaml`` of a session is, if it has one: in its directory, or beside its single file."""
+    return (session if session.is_dir() else session.parent) / FILE_NAME
+
+
+def kept(session: Path, key: str, option: str) -> Kept | None:
+    """The text that a session keeps under `key`; None if it keeps none. Whoever made the session chose it: trust nothing in it.
+
+    Parameters
+    ----------
+    session : Path
+    key : str
+        Of ``session.yaml``: scene, baseline, parameters, mapping.
+    option : str
+        By which a user gives something else.
+
+    Raises
+    ------
+    BagError
+        ``session.yaml`` cannot be read, or holds something else there.
+    """
+    path, remedy = sheet_path(session), f"Move it away, or give the {key} by {option}."
+    if not holds_file(path):
+        return None
+    document = read_plain(path, BagError, remedy, received=True)
+    if not isinstance(document, dict | None):
+        raise BagError(f"{path}: a list or a value, not what `boom_twin record` writes. {remedy}")
+    text = (document or {}).get(key)
+    if not isinstance(text, str | None):
+        raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
+    return Kept(text, f"{path}, {key}") if text else None
+
+
+def sha256(text: str) -> str:
+    """Digest of a text in UTF-8."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _block(text: str | None) -> str | None:
+    """A text to be written line by line, if YAML gives it again so; quoted if not."""
+    if not text:
+        return None
+    block: str = LiteralScalarString(text)
+    try:
+        if plain(dump({"": block})) == {"": text}:
+            return block
+    except ValueError:
+        pass
+    quoted: str = DoubleQuotedScalarString(text)
+    return quoted
 
 
 def _time(moment: datetime) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -12,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..errors import UsageError
 from ..plain import read_plain
 from ..records import Mount, Stream
-from .sensors import Sensor, channels, usual
+from .sensors import Sensor, channels, number_of, stream_of, usual
 
 NODE = "boom_twin"
 DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
@@ -111,6 +112,17 @@ class Topics(_Entry):
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """The sensors of a stream by channel, in the order of its samples."""
         return {name: self.sensors.get(name) or Sensor(**usual(name)) for name in channels(stream, joints)}
+
+    def beyond(self, stream: Stream, joints: int, names: Iterable[str]) -> list[str]:
+        """Those of `names` by which a message tells of cylinders or joints that a boom with so many joints does not have.
+
+        ``cylinder_5`` of four; not if a channel reads that name, nor if `sensors` has every channel of the stream: then
+        whoever wrote the mapping has said which of the names are the boom's.
+        """
+        if stream is Stream.IMU or all(channel in self.sensors for channel in channels(stream, joints)):
+            return []
+        used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
+        return [name for name in names if stream_of(name) is stream and number_of(name) > joints and name not in used]
 
     def mounts(self, joints: int) -> list[Mount | None]:
         """Where the inclinometers of a boom sit, one entry for each joint; None is an encoder."""

@@ -3,33 +3,64 @@
 ros2 launch boom_twin replay.launch.py bag:=bags/arch_session rate:=2.0
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, Shutdown
+import atexit
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, OpaqueFunction, Shutdown
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
+from launch_ros.substitutions import FindPackageShare
 
 from boom_twin.child_process import python_command
+from boom_twin.io.sheet import kept
 
 ARGUMENTS = [
     DeclareLaunchArgument("bag", description="session to play: rosbag2 directory or .mcap file"),
     DeclareLaunchArgument("rate", default_value="1.0", description="session time over real time"),
     DeclareLaunchArgument("start", default_value="0.0", description="begin so many seconds into the session"),
     DeclareLaunchArgument("wait", default_value="120.0", description="seconds to wait for the node; the first start compiles"),
-    DeclareLaunchArgument("scene", default_value="", description="scene file of the boom; empty: the default scene"),
+    DeclareLaunchArgument("scene", default_value="", description="scene file of the boom; empty: that of the session"),
+    DeclareLaunchArgument(
+        "params_file",
+        default_value=PathJoinSubstitution([FindPackageShare("boom_twin"), "msg_config", "twin.yaml"]),
+        description="parameters of the node; `scene` above wins",
+    ),
+    DeclareLaunchArgument("mapping", default_value="", description="names and units of sensors; empty: those of the session"),
+    DeclareLaunchArgument("namespace", default_value="", description="of the node; the session's topics must be in it"),
     DeclareLaunchArgument("rviz", default_value="true", description="start RViz"),
+    DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
+KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
+"""What the session keeps, and how something else is given."""
 
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments above, the twin on simulated time, and the player; all ends with the session."""
-    return LaunchDescription([*ARGUMENTS, twin(), player()])
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), player()])
 
 
-def twin() -> IncludeLaunchDescription:
-    """``twin.launch.py`` on the session's clock."""
-    passed = [(name, LaunchConfiguration(name)) for name in ("scene", "rviz")]
+def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """``twin.launch.py`` on the session's clock, with the session's scene and mapping where no others are given."""
+    names = ("scene", "params_file", "mapping", "namespace", "rviz", "record")
+    given = {name: LaunchConfiguration(name).perform(context) for name in names}
+    files = kept_files(Path(LaunchConfiguration("bag").perform(context)), [name for name in KEPT if not given[name]])
     source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/twin.launch.py"])
-    return IncludeLaunchDescription(source, launch_arguments=[*passed, ("use_sim_time", "true")])
+    arguments = {**given, **files, "use_sim_time": "true"}
+    return [IncludeLaunchDescription(source, launch_arguments=list(arguments.items()))]
+
+
+def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
+    """What the session keeps of these, as paths of files that last as long as this process."""
+    texts = {name: own.text for name in names if (own := kept(bag, name, KEPT[name])) is not None}
+    if not texts:
+        return {}
+    folder = TemporaryDirectory(prefix="boom_twin_")
+    atexit.register(folder.cleanup)
+    for name, text in texts.items():
+        (Path(folder.name) / f"{name}.yaml").write_text(text, encoding="utf-8")
+    return {name: f"{folder.name}/{name}.yaml" for name in texts}
 
 
 def player() -> ExecuteProcess:

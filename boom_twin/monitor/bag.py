@@ -9,18 +9,22 @@ from types import SimpleNamespace
 from typing import Any
 
 from ..errors import BagError, BoomTwinError
-from ..health.baseline import Baseline, load_baseline
+from ..health.baseline import Baseline
 from ..io.ahead import Ahead
+from ..io.boom_names import refuse_other_names
 from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
 from ..io.reader import Session, read, scan
+from ..io.session_model import SessionScene, baseline_of
 from ..io.topics import NODE, TYPES, Output, Topic, Topics
 from ..io.typestore import jazzy
 from ..records import Change, Sample, Stream
+from ..replay import scene_for
 from ..scene.parts import Scene
 from ..settings import Settings
 from ..thresholds import Thresholds
 from ..twin import Twin
+from ..watch.other_boom import OtherBoom
 from ..watch.peers import Peers
 from ..watch.sensors import sensors_of
 from ..watch.status import Status
@@ -82,7 +86,11 @@ class BagFeed(Feed):
 
 
 def bag_feed(
-    path: Path, scene: Scene, settings: Settings, mapping: Path | None = None, baseline: Path | None = None
+    path: Path,
+    scene: Scene | SessionScene | None,
+    settings: Settings,
+    mapping: Path | None = None,
+    baseline: Path | None = None,
 ) -> BagFeed:
     """Open a session.
 
@@ -90,8 +98,8 @@ def bag_feed(
     ----------
     path : Path
         A recording, or the result bag of a replay.
-    scene : Scene
-        Of the rig.
+    scene : Scene or SessionScene, optional
+        Of the rig; None: the one that the session was made with, else the package's own.
     settings : Settings
         For the twin, where the session has no outputs.
     mapping : Path, optional
@@ -102,12 +110,14 @@ def bag_feed(
     Raises
     ------
     BagError
-        It cannot be read, or has nothing that can be shown.
+        It cannot be read, is of another boom, or has nothing that can be shown.
     UsageError
         The mapping or the baseline cannot be used.
     """
-    session, usual = scan(path), load_baseline(baseline)
+    session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
+    scene = taken.scene
     topics = mapping_of(path, mapping, len(scene.joints)).topics
+    refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
     store = Store(max(counts.values(), default=1), keeps_boards=True)
@@ -153,6 +163,7 @@ def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], jo
             if sample is not None:
                 twin.take(sample)
             yield
+        twin.finish()
         if not twin.has_predicted:
             raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
     finally:
@@ -171,6 +182,7 @@ class _Twin:
         sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
+        self._other_boom = OtherBoom()
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
         self._twin.warm_up()
@@ -194,11 +206,20 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
+        self._refuse(self._other_boom.took(sample, report))
         for key, encoded in self._outlet.fill(report):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():
             self._look()
+
+    def finish(self) -> None:
+        """The session has ended."""
+        self._refuse(self._other_boom.judge())
+
+    def _refuse(self, reason: str) -> None:
+        if reason:
+            raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
         found = self._watch.look(self._twin.counts, True, self._peers, (), self._time)

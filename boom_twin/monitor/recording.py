@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,10 +21,12 @@ class Recording:
     ----------
     folder : Path
         Every recording gets a directory in it, named by its time (UTC).
+    options : sequence of str
+        Further arguments of ``boom_twin record``.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
+        self._folder, self._options = folder, options
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -36,7 +39,8 @@ class Recording:
         if self.is_running:
             return "recording already"
         out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
-        command = python_command("boom_twin.cli.main", "record", "--out", str(out), "--note", "started from the monitor")
+        note = ("--note", "started from the monitor")
+        command = python_command("boom_twin.cli.main", "record", "--out", str(out), *note, *self._options)
         self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
         return f"recording into {out}"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BagError
-from ..health.baseline import load_baseline
+from ..io.session_model import baseline_of
 from ..pictures import history_of
 from ..received import holds_file, open_received
 from ..replay import Replay
@@ -36,7 +36,8 @@ def worked_out(
     """History and stretches of standing still of a replay; its figures are written into `folder`, as the path says."""
     history = history_of(result.recording, scene)
     still = holds(history, scene)
-    found = quantities(result.recording, history, still, scene, settings, load_baseline(baseline))
+    usual = baseline_of(result.session.path, baseline).baseline
+    found = quantities(result.recording, history, still, scene, settings, usual)
     return history, still, write(folder, scene, found)
 
 

@@ -74,6 +74,8 @@ class Company:
     ----------
     out : Path
         Folder of the logs and of the recording.
+    scene : str
+        Text of the scene that the node is given.
 
     Attributes
     ----------
@@ -81,15 +83,17 @@ class Company:
         The recording.
     """
 
-    def __init__(self, out: Path) -> None:
-        self._out, self.recorded = out, out / "recorded"
+    def __init__(self, out: Path, scene: str) -> None:
+        self._out, self._scene, self.recorded = out, scene, out / "recorded"
         self._children: list[Child] = []
         self._is_asked_to_end = False
 
     def begin(self, origin: str) -> None:
         """Start node and recorder; `origin` is kept in the recording."""
-        self.start("node", ["boom_twin.ros.main"], signal.SIGTERM)
-        record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin]
+        scene = self._out / "scene.yaml"
+        scene.write_text(self._scene, encoding="utf-8")
+        self.start("node", ["boom_twin.ros.main", "--ros-args", "-p", f"scene:={scene}"], signal.SIGTERM)
+        record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin, "--scene", str(scene)]
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
     def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
@@ -136,7 +140,7 @@ class Company:
 
 
 @contextmanager
-def company(out: Path, origin: str) -> Iterator[Company]:
+def company(out: Path, origin: str, scene: str) -> Iterator[Company]:
     """Node and recorder in a domain of their own, as long as this lasts; the recording of an earlier run is removed."""
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -146,7 +150,7 @@ def company(out: Path, origin: str) -> Iterator[Company]:
             shutil.rmtree(out / "recorded")
     except OSError as error:
         raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
-    running = Company(out)
+    running = Company(out, scene)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     on_stop_signal(running.ask_to_end)
     try:

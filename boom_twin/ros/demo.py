@@ -15,11 +15,11 @@ from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
+from ..io.session_model import scene_of
 from ..pictures import draw, history_of
 from ..received import holds_file, open_received
 from ..records import Stream
 from ..replay import Replay, replay
-from ..scene import load_scene
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
 from .require import require_rclpy
@@ -37,15 +37,15 @@ def main() -> int:
         require_rclpy()
         session = scan(args.bag)
         about = session.notes.get("origin", "origin not noted")
-        with company(args.out, f"live run of: {about}") as running:
+        taken = scene_of(args.bag)
+        with company(args.out, f"live run of: {about}", taken.text) as running:
             sent, recorded = _play(session, args.duration, running), running.recorded
         if holds_file(args.bag / TRUTH):
             with open_received(args.bag / TRUTH) as truth:
                 (recorded / TRUTH).write_bytes(truth.read())
-        card, scene = score(recorded), load_scene()
-        again = replay(recorded, scene, args.out / "replay")
+        card, again = score(recorded), replay(recorded, None, args.out / "replay")
         print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
-        for path in [recorded, *draw(again, history_of(again.recording, scene), args.out)]:
+        for path in [recorded, *draw(again, history_of(again.recording, taken.scene), args.out)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
         return 0

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from ..errors import BoomTwinError
 from ..io.reader import scan
+from ..io.session_model import scene_of
 from .company import LOOK, Company, company
 from .require import require_rclpy
 
@@ -23,7 +24,7 @@ def main() -> int:
     args = _arguments()
     try:
         require_rclpy()
-        with company(args.out, f"demo-live of {args.bag}") as running:
+        with company(args.out, f"demo-live of {args.bag}", scene_of(args.bag).text) as running:
             _play(args, running)
     except BoomTwinError as error:
         print(f"demo-live: {error}", file=sys.stderr)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from ..io.boom_names import told_beyond
 from ..io.intake import Intake
 from ..io.topics import Output, Topics
 from ..records import Report, Sample, Stream
@@ -41,7 +42,8 @@ class Diagnostics:
         self._ticks, self._active = 0, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
-        self._scene = ""
+        self._scene, self._joints = "", 0
+        self._strangers: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
 
     def watch(self, twin: Twin, intake: Intake, scene: str) -> None:
@@ -49,7 +51,7 @@ class Diagnostics:
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
         self._counts = {"samples": twin.counts, "messages": intake.oddities}
-        self._scene = scene
+        self._scene, self._joints, self._strangers = scene, twin.plan.joints, intake.strangers
         self._told.clear()
 
     def tune(self, thresholds: Thresholds) -> None:
@@ -95,9 +97,19 @@ class Diagnostics:
         told: dict[str, str | int] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
         peers = self._peers
-        self._board.show(self._watch.look(told, self._active, peers.publishers, peers.subscribers.values(), clock))
+        others = self._other_booms()
+        self._board.show(self._watch.look(told, self._active, peers.publishers, peers.subscribers.values(), clock, others))
         self._tell_oddities()
         self._tell_clock(clock)
+
+    def _other_booms(self) -> dict[Stream, str]:
+        """The inputs that named cylinders or joints of another boom since the last look, in words."""
+        found = {
+            stream: told_beyond(self._inputs[stream], names, stream, self._joints, self._scene)
+            for stream, names in self._strangers.items()
+        }
+        self._strangers.clear()
+        return found
 
     def _tell_oddities(self) -> None:
         """Log the first sample of every kind that is out of the ordinary; all of them are counted."""

@@ -16,15 +16,15 @@ from ..errors import BoomTwinError
 from ..io.intake import Intake
 from ..io.mapping import load_mapping
 from ..io.outlet import Outlet
+from ..io.session_model import scene_from
 from ..io.topics import NODE, Output
 from ..io.wire import Wire
 from ..records import Stream
-from ..scene.load import DEFAULT_NAME, examine
 from ..settings import Settings
 from ..twin import Twin
 from .diagnostics import Diagnostics
 from .page import Page
-from .parameters import baseline_of, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
+from .parameters import baseline_of, baseline_text, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
 from .services import Services
 from .started import Started
@@ -135,19 +135,19 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _build(self) -> None:
         """Scene and settings to a compiled twin."""
-        path = scene_path(self)
-        scene, oddities = examine(path)
-        for oddity in oddities:
+        found = scene_from(scene_path(self))
+        scene, name = found.scene, found.source
+        for oddity in found.oddities:
             self.get_logger().warning(str(oddity))
         settings, joints = settings_of(self), len(scene.joints)
         topics = load_mapping(mapping_path(self), joints)
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
-        name = str(path or DEFAULT_NAME)
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
-        self._asked = Services(self, twin, self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in))
+        texts = {"scene": found.text} | baseline_text(self)
+        self._asked = Services(self, twin, self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in), texts)
         self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")

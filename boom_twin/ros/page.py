@@ -9,7 +9,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..child_process import python_command
-from ..io.topics import Topics
+from ..io.topics import NODE, Topics
+from .recorder import TEXTS
 
 LOOK = 1.0
 """Seconds of steady time between looks at whether it still runs."""
@@ -36,6 +37,7 @@ class Page:
         self._node = node
         known = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
         names = {topic.absolute: node.resolve_topic_name(topic.name) for topic in known}
+        names |= {f"/{NODE}/{name}": node.resolve_service_name(f"~/{name}") for name in ("get_parameters", *TEXTS)}
         arguments = ["--until-stdin-ends", *(["--mapping", mapping] if mapping else []), "--ros-args"]
         for name, resolved in names.items():
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []

@@ -115,10 +115,18 @@ def mapping_path(node: Node) -> Path | None:
 
 def baseline_of(node: Node) -> Baseline | None:
     """What the rig's health is judged by; None if it is not to be judged. UsageError if the file cannot be used."""
-    if not node.get_parameter("health").value:
-        return None
+    return load_baseline(_baseline_path(node)) if node.get_parameter("health").value else None
+
+
+def baseline_text(node: Node) -> dict[str, str]:
+    """The text of that file under ``baseline``; nothing if it is the package's own, or none is used."""
+    path = _baseline_path(node)
+    return {"baseline": path.read_text(encoding="utf-8-sig")} if path and node.get_parameter("health").value else {}
+
+
+def _baseline_path(node: Node) -> Path | None:
     text: str = node.get_parameter("baseline").value
-    return load_baseline(Path(text) if text else None)
+    return Path(text) if text else None
 
 
 def settings_of(node: Node) -> Settings:

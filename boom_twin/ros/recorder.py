@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..io.topics import Output, load_topics
 from ..thresholds import Thresholds
 from ..watch.recording import RecordingJudge, TopicState
 from .board import Board
-from .remote import RemoteParameters
+from .remote import RemoteParameters, RemoteText
 from .wanted import Wanted, subscription_of
 
 NAME = "boom_twin_recorder"
@@ -25,6 +26,8 @@ LOOK = 0.5
 """Seconds between looks for new topics, publishers and the disk."""
 LOOKS = 2
 """Looks from one state on ``/diagnostics`` to the next."""
+TEXTS = ("scene", "baseline")
+"""Services of the twin that tell what its model was built from."""
 COMPLETE = "every required topic has a publisher"
 
 
@@ -101,7 +104,8 @@ class _Recording:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage) for each in wanted]
         self._board, self._judge = Board(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
-        self.twin = RemoteParameters(node)
+        self._parameters = RemoteParameters(node)
+        self._texts = {name: RemoteText(node, name) for name in TEXTS}
 
     def look(self) -> bool:
         """Subscribe to what has come up; whether every required topic has a publisher. BagError if the disk fails."""
@@ -110,6 +114,12 @@ class _Recording:
             channel.open(self.node)
         numbers = [channel.look() for channel in self.channels]
         return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
+
+    def twin(self) -> dict[str, object]:
+        """What the twin has said of itself since the last look: `TEXTS` by name, its parameters as ``parameters``."""
+        found: dict[str, object] = {"parameters": self._parameters.look()}
+        found |= {name: text.look() for name, text in self._texts.items()}
+        return {name: value for name, value in found.items() if value}
 
     def tell(self, end: str | None = None) -> None:
         """Publish the state; `end` as for `boom_twin.watch.recording.RecordingJudge`."""
@@ -121,7 +131,18 @@ class _Recording:
             self._board.settle()
 
 
+@contextmanager
+def recorder_node() -> Iterator[Any]:
+    """The recorder's node, as long as this lasts; needs an initialised rclpy."""
+    node = rclpy.create_node(NAME)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+
+
 def record(
+    node: Any,
     storage: Storage,
     wanted: Sequence[Wanted],
     thresholds: Thresholds,
@@ -129,10 +150,12 @@ def record(
     tell: Callable[[str], None],
     meet: Callable[[Mapping[str, object]], None],
 ) -> list[Count]:
-    """Record until `stopped`; needs an initialised rclpy. Log times are those of the reception.
+    """Record until `stopped`. Log times are those of the reception.
 
     Parameters
     ----------
+    node : Node
+        See `recorder_node`.
     storage : Storage
         Completed at the end.
     wanted : sequence of Wanted
@@ -143,7 +166,7 @@ def record(
     tell : callable
         Told in words when recording begins, and once every required topic has a publisher (`COMPLETE`).
     meet : callable
-        Told the parameters of the twin, if there is one.
+        Told what the twin says of itself, if there is one: its ``parameters``, and `TEXTS` by name.
 
     Returns
     -------
@@ -157,7 +180,6 @@ def record(
     UsageError
         The type of a topic is not installed.
     """
-    node = rclpy.create_node(NAME)
     recording = _Recording(node, storage, wanted, thresholds)
     try:
         try:
@@ -172,8 +194,6 @@ def record(
     except BoomTwinError as error:
         recording.tell(end=str(error))
         raise
-    finally:
-        node.destroy_node()
     return counts
 
 
@@ -195,8 +215,8 @@ def _spin(
             if recording.look() and not is_complete:
                 is_complete = True
                 tell(COMPLETE)
-            if parameters := recording.twin.look():
-                meet(parameters)
+            if told := recording.twin():
+                meet(told)
             if looks % LOOKS == 0:
                 recording.tell()
         executor.spin_once(timeout_sec=WAKE)

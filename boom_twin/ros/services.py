@@ -1,8 +1,8 @@
-"""The node's services: start again from rest, set the zero of a sensor, acknowledge alarms."""
+"""The node's services: start again from rest, set the zero of a sensor, acknowledge alarms, tell scene and baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -19,7 +19,7 @@ INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 class Services:
     """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``~/rezero/cylinder_i``, ``~/rezero/tip_imu``.
 
-    All are std_srvs/Trigger.
+    Besides, ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from. All are std_srvs/Trigger.
 
     Parameters
     ----------
@@ -30,9 +30,18 @@ class Services:
         Lets go of alarms that ended; says which.
     is_active : callable
         Whether the node is.
+    texts : dict of str to str
+        Of what the model was built from: scene and, unless it is the package's own, baseline.
     """
 
-    def __init__(self, node: Node, twin: Twin, acknowledge: Callable[[], str], is_active: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        twin: Twin,
+        acknowledge: Callable[[], str],
+        is_active: Callable[[], bool],
+        texts: Mapping[str, str],
+    ) -> None:
         self._node, self._twin, self._is_active = node, twin, is_active
         numbers = range(1, twin.plan.joints + 1)
         sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
@@ -41,6 +50,7 @@ class Services:
         self._services: list[Service] = [
             node.create_service(Trigger, f"~/{name}", partial(self._answer, act)) for name, act in acts.items()
         ]
+        self._services += [node.create_service(Trigger, f"~/{name}", partial(_tell, text)) for name, text in texts.items()]
 
     def close(self) -> None:
         """Offer them no more."""
@@ -64,3 +74,8 @@ class Services:
         found = self._twin.rezero(sensor)
         told = ", ".join(f"zero of {name}: {value:g}" for name, value in found.items())
         return f"{told}; holds from the next full stroke sample on"
+
+
+def _tell(text: str, request: Any, response: Any) -> Any:
+    response.success, response.message = True, text
+    return response

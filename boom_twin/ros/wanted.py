@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -11,9 +11,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ..errors import UsageError
 from ..io.bagmeta import dump, offered_qos
 from ..io.recorded import Recorded
-from ..io.topics import Qos, Topic
+from ..io.topics import NODE, Qos, Topic, Topics
 from ..io.typestore import jazzy
 from ..io.writer import recorded
+from ..plain import plain
+from ..retouch import with_value
 from .definition import definition_of, full_name, installed_class
 from .qos import qos_profile
 
@@ -80,6 +82,33 @@ def wanted_of(names: Sequence[str], known: Mapping[str, Topic]) -> list[Wanted]:
             topic = topic if topic is not None and topic.type == type_name else None
         found[name] = Wanted(name, type_name or (topic.type if topic else None), topic)
     return list(found.values())
+
+
+def resolved(wanted: Wanted, node: Any) -> Wanted:
+    """The topic by the name that it has in the namespace of `node`, with its remappings.
+
+    A name private to the twin is taken to be that of the node ``boom_twin`` there.
+    """
+    if wanted.topic is None:
+        return replace(wanted, name=node.resolve_topic_name(wanted.name))
+    topic = resolved_topic(wanted.topic, node)
+    return replace(wanted, name=topic.absolute, topic=topic)
+
+
+def resolved_topic(topic: Topic, node: Any) -> Topic:
+    """Likewise of a topic of a mapping."""
+    return topic.model_copy(update={"name": node.resolve_topic_name(topic.name.replace("~", NODE, 1))})
+
+
+def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
+    """Text of a mapping that says what `text` does, with all names of `topics` as `resolved` has them."""
+    places: dict[tuple[str, ...], Topic] = {("inputs", stream.value): topic for stream, topic in topics.inputs.items()}
+    places |= {("outputs", key.value): topic for key, topic in topics.outputs.items()} | {("events",): topics.events}
+    for place, topic in places.items():
+        name = resolved_topic(topic, node).absolute
+        if name != topic.absolute:
+            text = with_value(text if plain(text) else "{}", (*place, "name"), name)
+    return text
 
 
 def subscription_of(node: Any, wanted: Wanted) -> Found | None:

@@ -61,8 +61,13 @@ def load_scene(source: str | Path | None = None) -> Scene:
 
 def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
     """Like `load_scene`, with the oddities returned instead of issued as warnings."""
-    name = DEFAULT_NAME if source is None else str(source)
-    text = default_text() if source is None else read_text(Path(source))
+    if source is None:
+        return examine_text(default_text(), DEFAULT_NAME)
+    return examine_text(read_text(Path(source)), str(source))
+
+
+def examine_text(text: str, name: str) -> tuple[Scene, list[Fault]]:
+    """Like `examine`, of a scene's text; `name` is what it is called in errors."""
     document = parse(text, name)
     scene, draft, faults = structure(document)
     findings = [finding for check in CHECKS for finding in check(draft)]

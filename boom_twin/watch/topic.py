@@ -29,7 +29,14 @@ class TopicJudge:
         self._counted = (nan, 0)
 
     def status(
-        self, stream: StreamWatch, publishers: Peers, offset: float, thresholds: Thresholds, now: float, clock: float
+        self,
+        stream: StreamWatch,
+        publishers: Peers,
+        offset: float,
+        thresholds: Thresholds,
+        now: float,
+        clock: float,
+        other_boom: str = "",
     ) -> Status:
         """State of the topic.
 
@@ -43,11 +50,15 @@ class TopicJudge:
         thresholds : Thresholds
         now, clock : float
             As for `boom_twin.watch.sensor.SensorJudge`.
+        other_boom : str
+            That its messages are of another boom, in words; empty if they are not.
         """
         judge, age = self._judge, stream.age(now)
         judge.begin(now, thresholds)
         judge.note("topic", publishers.address)
         self._count(stream, now)
+        if other_boom:
+            judge.fault(Level.ERROR, other_boom)
         names = ", ".join(publishers.names)
         judge.note("publisher_names", names)
         told = f"{len(publishers.names)} publishers of the same readings: {names}"

@@ -102,6 +102,7 @@ class TwinWatch:
         publishers: Mapping[Stream, Peers],
         subscribers: Iterable[Peers],
         clock: float,
+        other_booms: Mapping[Stream, str] | None = None,
     ) -> list[Status]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
@@ -117,14 +118,16 @@ class TwinWatch:
             Of all outputs.
         clock : float
             Time that people know, s.
+        other_booms : dict of Stream to str, optional
+            Of inputs whose messages are of another boom: that in words.
         """
-        now = self._monotonic()
+        now, others = self._monotonic(), other_booms or {}
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], now)
         found = [self._model.status(counts, is_active, is_fed, self.thresholds, now, clock)]
         if not is_active:
             return found
         sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
-        found += [self._topic(stream, publishers[stream], now, clock) for stream in self._streams]
+        found += [self._topic(stream, publishers[stream], now, clock, others.get(stream, "")) for stream in self._streams]
         found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
         if self.health is not None:
             found.append(self.health.status(self.thresholds, now, clock))
@@ -133,10 +136,10 @@ class TwinWatch:
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
-    def _topic(self, stream: Stream, peers: Peers, now: float, clock: float) -> Status:
+    def _topic(self, stream: Stream, peers: Peers, now: float, clock: float, other_boom: str) -> Status:
         watch = self._streams[stream]
         offset = watch.lag - self._streams[Stream.STROKES].lag
-        return self._topics[stream].status(watch, peers, offset, self.thresholds, now, clock)
+        return self._topics[stream].status(watch, peers, offset, self.thresholds, now, clock, other_boom)
 
     def _look_at(self, stream: Stream, now: float, clock: float) -> list[Status]:
         """The sensors of one stream."""

@@ -14,7 +14,7 @@ from mcap.writer import CompressionType
 from boom_twin.cli.main import main
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.info import inspect
-from boom_twin.io.needs import missing, names_extra, remarks
+from boom_twin.io.needs import missing, names_extra, names_missing, remarks
 from boom_twin.io.places import fill_header
 from boom_twin.io.topics import load_topics
 from boom_twin.io.writer import FILE_NAME, SessionWriter
@@ -110,7 +110,11 @@ def test_names_missing_and_extra(tmp_path: Path, capsys: pytest.CaptureFixture[s
     names = [["cylinder_1", "cylinder_3", "swivel"], ["cylinder_3", "cylinder_2", "cylinder_1"]]
     bag = write_strokes(tmp_path / "bag", [(10**18 + row, 10**18 + row, names[row % 2]) for row in range(10)])
     values = told(capsys, str(bag))
-    assert values["names_missing"] == ["cylinder_2 is not in 5 of 10 messages of /cylinder_strokes"]
+    assert names_missing(inspect(bag)) == ["cylinder_2 is not in 5 of 10 messages of /cylinder_strokes"]
+    assert values["names_missing"] == [  # by the default scene
+        "cylinder_2 is not in 5 of 10 messages of /cylinder_strokes",
+        "cylinder_4 is not in 10 of 10 messages of /cylinder_strokes",
+    ]
     assert values["names_extra"] == ["swivel of /cylinder_strokes is not used"]
     assert names_extra(inspect(bag), 2)[0] == "cylinder_3 of /cylinder_strokes is not used"
     default = Path(__file__).parents[2] / "msg_config" / "scene.yaml"

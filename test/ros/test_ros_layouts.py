@@ -84,13 +84,17 @@ def test_imports_exist(path: Path) -> None:
 def test_an_included_file_knows_what_it_is_given() -> None:
     (call,) = calls(parsed(ROOT / "launch" / "replay.launch.py"), "IncludeLaunchDescription")
     source = (ROOT / "launch" / "replay.launch.py").read_text(encoding="utf-8")
-    passed = {"scene", "rviz", "use_sim_time"}
+    passed = {"scene", "params_file", "mapping", "namespace", "rviz", "record", "use_sim_time"}
     assert all(f'"{name}"' in source for name in passed) and call.keywords[0].arg == "launch_arguments"
     assert passed <= declared(parsed(ROOT / "launch" / "twin.launch.py")).keys()
 
 
 @pytest.mark.parametrize(
-    "arguments", [["play", "BAG", "--clock", "--rate", "2.0", "--start", "0.0", "--wait", "120.0"], ["record", "--out", "DIR"]]
+    "arguments",
+    [
+        ["play", "BAG", "--clock", "--rate", "2.0", "--start", "0.0", "--wait", "120.0"],
+        ["record", "--out", "DIR", "--scene", "A", "--params", "B", "--mapping", "C", "--ros-args", "-r", "__ns:=/front"],
+    ],
 )
 def test_the_commands_take_what_the_launch_files_give(arguments: list[str]) -> None:
     assert arguments[0] in COMMANDS

@@ -67,7 +67,7 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
     time.sleep(1.0)
     player.close()
     assert recorder.stop(signal.SIGINT) == 0, recorder.said()
-    assert f"warning: the twin's scene is {scene}, session.yaml holds another" in recorder.said()
+    assert "no scene is kept" not in recorder.said()
     assert node.stop(signal.SIGINT) == 0, node.said()
     return out
 
@@ -108,6 +108,8 @@ def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
         TOPICS.events.absolute: 0,
     }
     assert len(list(recorded.glob("*.mcap"))) >= 3
+    assert sheet["scene"] == default_text() + "# a copy\n"  # as the node told it
+    assert "baseline" not in sheet  # the package's own
     assert sheet["twin"] == {"scene": str(recorded.parent / "scene.yaml"), **Settings().model_dump()}
 
 

@@ -1,0 +1,92 @@
+"""Whether the cylinders and joints that a session names are those of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+
+from ..errors import BagError
+from ..records import Stream
+from .intake import LONGEST
+from .reader import Session, read
+from .topics import Topics
+
+WINDOW = 5_000_000_000
+"""Log time (ns) from the first message of strokes or angles on, in which all names are looked at."""
+
+KINDS = {Stream.STROKES: "cylinder", Stream.ANGLES: "joint"}
+MOST = 12
+"""Names that a sentence lists."""
+
+
+def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
+    """BagError if a session names other cylinders or joints than a scene has.
+
+    Parameters
+    ----------
+    session : Session
+    topics : Topics
+        How its topics and sensors are named.
+    joints : int
+        Of the scene.
+    scene : str
+        Where that was taken from, if it is known.
+    """
+    for sentence in other_names(topics, _names(session, topics, joints), joints, scene):
+        raise BagError(f"{session.path}: {sentence}")
+
+
+def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints: int, scene: str) -> Iterator[str]:
+    """How the names in a session's messages, by stream, are not those of a scene with so many joints; a sentence for each.
+
+    No cylinder or joint beyond them may be named, and every cylinder must be named sometime: a boom may lack an encoder, but
+    without a stroke nothing is predicted. Other names do not matter.
+    """
+    for stream, found in names.items():
+        if beyond := topics.beyond(stream, joints, found):
+            yield told_beyond(topics.inputs[stream].absolute, beyond, stream, joints, scene)
+    found = names.get(Stream.STROKES, ())
+    lacking = [sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values() if sensor.name not in found]
+    if found and lacking:
+        yield (
+            f"{topics.inputs[Stream.STROKES].absolute} never names {_listed(lacking)}, but {_listed(found)}; "
+            f"{_scene(scene)} has {_counted(joints, 'cylinder')}. Give that of this boom by --scene, or its names by --mapping."
+        )
+
+
+def told_beyond(topic: str, names: Collection[str], stream: Stream, joints: int, scene: str) -> str:
+    """That a topic names cylinders or joints beyond those of the scene, and what to do about it."""
+    kind = KINDS[stream]
+    return (
+        f"{topic} names {_listed(names)}; {_scene(scene)} has {_counted(joints, kind)}, so this is another boom. "
+        f"Give its scene by --scene (the node: parameter scene), or a mapping whose sensors list every {kind} of this one."
+    )
+
+
+def _scene(source: str) -> str:
+    return f"the scene ({source})" if source else "the scene"
+
+
+def _listed(names: Iterable[str]) -> str:
+    first = list(dict.fromkeys(names))
+    return ", ".join(first[:MOST]) + (f" and {len(first) - MOST} more" if len(first) > MOST else "")
+
+
+def _counted(number: int, kind: str) -> str:
+    return f"{number} {kind}{'s' if number > 1 else ''}"
+
+
+def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
+    """The names in the messages of strokes and angles, in order: within the window, and on until every cylinder was named."""
+    heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
+    present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
+    found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
+    needed = {sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values()}
+    first: int | None = None
+    for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
+        first = log if first is None else first
+        for stream in present[name]:
+            if len(found[stream]) < LONGEST:
+                found[stream].update(dict.fromkeys(message.name[:LONGEST]))
+        if log - first > WINDOW and needed <= found.get(Stream.STROKES, {}).keys():
+            break
+    return found

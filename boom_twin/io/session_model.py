@@ -1,0 +1,112 @@
+"""The scene and the baseline that a session is read with: as given, else as the session keeps them, else the package's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import BagError, Fault, SceneError, UsageError
+from ..health.baseline import Baseline, baseline_from, load_baseline
+from ..plain import plain
+from ..scene.load import DEFAULT_NAME, default_text, examine_text
+from ..scene.parts import Scene
+from ..scene.read import read_text
+from .sheet import Kept, kept, sha256
+
+DEFAULT_BASELINE = "default baseline"
+
+
+@dataclass(frozen=True)
+class SessionScene:
+    """A scene, the text that describes it, and where that was taken from.
+
+    Attributes
+    ----------
+    scene : Scene
+    text : str
+    source : str
+        A path, a place in a ``session.yaml``, or `DEFAULT_NAME`.
+    oddities : tuple of Fault
+        What can be computed but looks odd.
+    """
+
+    scene: Scene
+    text: str
+    source: str
+    oddities: tuple[Fault, ...] = ()
+
+    @property
+    def sha256(self) -> str:
+        """Of the text."""
+        return sha256(self.text)
+
+
+@dataclass(frozen=True)
+class SessionBaseline:
+    """A baseline, and where it was taken from."""
+
+    baseline: Baseline
+    source: str
+
+
+def scene_from(source: str | Path | None) -> SessionScene:
+    """The scene of a file; the package's own if there is none.
+
+    Raises
+    ------
+    SceneError
+        As `boom_twin.load_scene`.
+    """
+    name = DEFAULT_NAME if source is None else str(source)
+    text = default_text() if source is None else read_text(Path(source))
+    scene, oddities = examine_text(text, name)
+    return SessionScene(scene, text, name, tuple(oddities))
+
+
+def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
+    """The scene of a session: that of the file `given`; else that in its ``session.yaml``; else the package's own.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be used.
+    BagError
+        What the session keeps cannot be used.
+    """
+    own = kept(session, "scene", "--scene") if given is None else None
+    if own is None:
+        return scene_from(given)
+    try:
+        scene, oddities = examine_text(own.text, own.source)
+    except SceneError as error:
+        more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
+        raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None
+    return SessionScene(scene, own.text, own.source, (*_changed(session, own), *oddities))
+
+
+def _changed(session: Path, own: Kept) -> list[Fault]:
+    """That the text is not the one that was recorded."""
+    digest = kept(session, "scene_sha256", "--scene")
+    if digest is None or digest.text == sha256(own.text):
+        return []
+    bound = f"{own.source} has {sha256(own.text)[:12]}..: it was changed since the session was made"
+    return [Fault("scene_sha256", digest.text, bound, "Give the scene that is right by --scene.")]
+
+
+def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
+    """What is known of a session's rig while all is well, found as its scene is by `scene_of`.
+
+    Raises
+    ------
+    UsageError
+        The file given cannot be used.
+    BagError
+        What the session keeps cannot be used.
+    """
+    own = kept(session, "baseline", "--baseline") if given is None else None
+    if own is not None:
+        try:
+            return SessionBaseline(baseline_from(plain(own.text), own.source), own.source)
+        except (UsageError, ValueError) as error:
+            raise BagError(f"{own.source}: {error} Give the baseline by --baseline.") from None
+    return SessionBaseline(load_baseline(given), str(given or DEFAULT_BASELINE))

@@ -1,0 +1,61 @@
+"""Whether strokes and angles fit one another on the scene: if not, they are of another boom."""
+
+from __future__ import annotations
+
+from math import degrees, radians
+
+import numpy as np
+
+from ..records import Array, Report, Sample, Stream
+
+WINDOW = 5_000_000_000
+"""Time (ns) over which angles are judged together."""
+FEWEST = 10
+"""Residuals of a joint within it that are judged."""
+FAR = radians(10.0)
+"""Difference of an angle from what the strokes say that no sag, load or wrong stiffness makes, and few encoders' zeros."""
+
+
+class OtherBoom:
+    """Judges the medians of the angles' residuals, from the first window on in which most encoders tell something.
+
+    An encoder that stands still to the last bit may be dead, and tells nothing about the boom. One that is far off may be
+    wrong; when more than half of them are, it is the scene. Once that is judged, it is not asked again: what comes later is a
+    fault of the rig.
+    """
+
+    def __init__(self) -> None:
+        self._is_judged = False
+        self._begin = 0
+        self._values: list[Array] = []
+        self._residuals: list[Array] = []
+
+    def took(self, sample: Sample, report: Report) -> str:
+        """The twin made `report` of `sample`; gives why the session is of another boom, empty as long as nothing says so."""
+        if self._is_judged:
+            return ""
+        if sample.stream is Stream.ANGLES:
+            self._values.append(sample.values)
+        self._residuals += [found.values for found in report.residuals if found.stream is Stream.ANGLES]
+        self._begin = self._begin or sample.stamp
+        return self.judge() if sample.stamp - self._begin > WINDOW else ""
+
+    def judge(self) -> str:
+        """Why the session up to now is of another boom; what was judged is forgotten."""
+        values, residuals = self._values, self._residuals
+        self._begin, self._values, self._residuals = 0, [], []
+        if self._is_judged or len(values) < FEWEST or len(residuals) < FEWEST:
+            return ""
+        table, off = np.array(values), np.array(residuals)
+        counts = np.isfinite(off).sum(axis=0)
+        heard = [i for i in range(len(counts)) if counts[i] >= FEWEST]
+        live = [i for i in heard if np.nanmax(table[:, i]) > np.nanmin(table[:, i])]
+        if 2 * len(live) <= len(heard):
+            return ""
+        self._is_judged = True
+        medians = {i: float(np.nanmedian(off[:, i])) for i in live}
+        far = {i: value for i, value in medians.items() if abs(value) > FAR}
+        if 2 * len(far) <= len(live):
+            return ""
+        told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
+        return f"{told} off what the strokes say, and at most {degrees(FAR):g} deg can be a fault of the rig"

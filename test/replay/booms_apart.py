@@ -1,0 +1,50 @@
+"""Booms unlike the default one, and sessions of them at rest; all made up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from oracle import booms
+from ruamel.yaml import YAML
+
+from boom_twin import statics
+from boom_twin.io.session import write_session
+from boom_twin.io.sheet import Sheet
+from boom_twin.scene.load import load_scene
+from boom_twin.study.rewrite import anew
+
+ORDERS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 1, 1, 2, 3)}
+POSTURES = {3: (60, 20, -30), 4: (60, 20, -30, -80), 5: (75, 50, 10, -5, -40)}
+START, STEP = 1_700_000_000_000_000_000, 5_000_000
+
+
+def scene_text(sections: int, closed_longer: float = 0.0) -> str:
+    """The default boom with a section more or less; all cylinders longer by so much (m) at the same stroke."""
+    spec = booms.document()
+    for key in ("sections", "joints"):
+        spec[key] = [spec[key][i] for i in ORDERS[sections]]
+    spec["postures"] = {"arch": list(POSTURES[sections])}
+    for joint in spec["joints"]:
+        joint["cylinder"] = joint["cylinder"] | {"closed_length": joint["cylinder"]["closed_length"] + closed_longer}
+    return anew(booms.scene_of(spec))
+
+
+def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float = 0.0) -> Path:
+    """A session at rest of the boom of a scene's text, which it keeps or not; joint_1 reads `bias` (rad) too much."""
+    file = path.with_suffix(".scene.yaml")
+    file.write_text(text)
+    scene, noise = load_scene(file), np.random.default_rng(1)
+    rest = statics(scene, posture="arch")
+    strokes, joints = (np.tile(values, (rows, 1)) for values in (rest.strokes, rest.joints))
+    joints[:, 0] += bias
+    joints += noise.normal(0.0, 2e-4, joints.shape)
+    write_session(path, START + np.arange(rows) * STEP, strokes, joints, None, {"origin": "synthetic, a test"})
+    if keep:
+        Sheet("0", text).write(path)
+    return path
+
+
+def as_document(path: Path) -> dict[str, object]:
+    """What a ``session.yaml`` holds."""
+    return dict(YAML(typ="safe").load((path / "session.yaml").read_text()))

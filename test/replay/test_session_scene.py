@@ -1,0 +1,246 @@
+"""A session carries its scene: which one is taken, and that one of another boom is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from replay.booms_apart import as_document, scene_text, session
+
+from boom_twin import load_scene, replay
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.io.factory import RosbagsTypes
+from boom_twin.io.intake import Intake
+from boom_twin.io.places import fill_header
+from boom_twin.io.session_model import baseline_of, scene_of
+from boom_twin.io.sheet import FILE_NAME, Sheet, kept, sha256
+from boom_twin.io.topics import load_topics
+from boom_twin.io.writer import SessionWriter
+from boom_twin.monitor.bag import bag_feed
+from boom_twin.records import Report, Residuals, Sample, Stream
+from boom_twin.scene.load import DEFAULT_NAME, default_text
+from boom_twin.settings import Settings
+from boom_twin.watch.other_boom import FAR, WINDOW, OtherBoom
+
+BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
+FAULTY = "sections: []\n"
+
+
+@pytest.fixture(scope="module")
+def five(tmp_path_factory):
+    """A session of five cylinders that keeps its scene."""
+    return session(tmp_path_factory.mktemp("five") / "bag", scene_text(5), keep=True)
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory):
+    """One of the default boom, that keeps none."""
+    return session(tmp_path_factory.mktemp("four") / "bag", scene_text(4), keep=False)
+
+
+def arguments(bag, out, *more):
+    return ["replay", str(bag), "--out", str(out), "--no-pictures", *more]
+
+
+def without_scene(bag, path):
+    """The session as a bare file in a folder of its own, so without what it was made with."""
+    path.mkdir()
+    (path / "session_0.mcap").write_bytes((bag / "session_0.mcap").read_bytes())
+    return path
+
+
+def test_a_session_of_five_is_replayed_by_its_own_scene(five, tmp_path, capsys):
+    assert main(arguments(five, tmp_path / "out", "--json")) == 0
+    told = capsys.readouterr()
+    summary = json.loads(told.out)
+    assert summary == {**summary, "scene": f"{five / FILE_NAME}, scene", "scene_sha256": sha256(scene_text(5))}
+    assert f"scene: {five / FILE_NAME}, scene" in told.err
+    assert len(summary["joint_residual_rms_rad"]) == 5 and max(summary["joint_residual_rms_rad"]) < 1e-3
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["alarms"] == []
+    feed = bag_feed(tmp_path / "out" / "bag", None, Settings())  # a result bag carries it, too
+    feed.close()
+    assert len(feed.scene().sections) == 5
+
+
+def test_without_its_scene_it_is_refused(five, tmp_path, capsys):
+    bag = without_scene(five, tmp_path / "bare")
+    assert main(arguments(bag, tmp_path / "out")) == 1
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if line.startswith("boom_twin replay:"))
+    assert "/cylinder_strokes names cylinder_5; the scene (default scene) has 4 cylinders" in line and "--scene" in line
+    assert not (tmp_path / "out").exists()
+    assert main(["info", str(bag)]) == 0
+    told = capsys.readouterr().out
+    assert "scene      default scene" in told and "missing    /cylinder_strokes names cylinder_5" in told
+    with pytest.raises(BagError, match="names cylinder_5"):
+        bag_feed(bag, None, Settings())
+    assert main(["calibrate", str(bag), "--out", str(tmp_path / "scene.yaml")]) == 1
+    assert "names cylinder_5; the scene has 4 cylinders" in capsys.readouterr().err
+    scene = tmp_path / "five.yaml"
+    scene.write_text(scene_text(5))
+    assert main(["info", str(bag), "--scene", str(scene)]) == 0
+    assert f"scene      {scene}" in capsys.readouterr().out
+
+
+def test_three_cylinders_on_four_sections(tmp_path):
+    bag = session(tmp_path / "bag", scene_text(3), keep=False)
+    with pytest.raises(BagError, match=r"never names cylinder_4, but cylinder_1, cylinder_2, cylinder_3; the scene.*has 4"):
+        replay(bag, load_scene(), tmp_path / "out")
+
+
+def write_names(path, names, rows=20):
+    """Strokes of the names given, at rest."""
+    topic, types = load_topics().inputs[Stream.STROKES], RosbagsTypes()
+    with SessionWriter(path, {"strokes": topic}) as bag:
+        for row in range(rows):
+            msg = types.make(topic.type)
+            fill_header(msg.header, 10**18 + row * 5_000_000)
+            msg.name, msg.position = names, types.doubles(np.zeros(len(names)))
+            bag.write("strokes", 10**18 + row * 5_000_000, msg)
+    return path
+
+
+def test_names_that_do_not_match(tmp_path):
+    bag = write_names(tmp_path / "bag", ["boom_a", "boom_b", "boom_c", "boom_d"])
+    with pytest.raises(BagError, match=r"never names cylinder_1, .*but boom_a, boom_b, boom_c, boom_d;.*--mapping"):
+        replay(bag, None, tmp_path / "out")
+
+
+def test_other_names_do_not_matter_and_a_mapping_can_say_which_are_the_booms():
+    own = [f"cylinder_{i}" for i in range(1, 5)]
+    assert load_topics().beyond(Stream.STROKES, 4, [*own, "slew", "outrigger_7", "joint_5", "cylinder_05"]) == []
+    assert load_topics().beyond(Stream.STROKES, 4, [*own, "cylinder_5"]) == ["cylinder_5"]
+    assert load_topics().beyond(Stream.ANGLES, 4, ["joint_9", "cylinder_5"]) == ["joint_9"]
+    listed = load_topics().sensors_of(Stream.STROKES, 4)
+    assert load_topics().model_copy(update={"sensors": listed}).beyond(Stream.STROKES, 4, [*own, "cylinder_5"]) == []
+    third = {"cylinder_3": listed["cylinder_3"].model_copy(update={"name": "cylinder_5"})}
+    assert load_topics().model_copy(update={"sensors": third}).beyond(Stream.STROKES, 4, [*own, "cylinder_5"]) == []
+
+
+def test_the_intake_takes_nothing_of_another_boom():
+    """So the node publishes nothing by it, and its diagnostics have the names."""
+    names = [f"cylinder_{i}" for i in range(1, 6)]
+    intake, msg = Intake(4), SimpleNamespace(name=names, position=[0.1] * 5)
+    assert intake.put(Stream.STROKES, 10**18, msg) is None
+    assert intake.oddities == {"names of another boom": 1} and intake.strangers == {Stream.STROKES: ["cylinder_5"]}
+    assert intake.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
+
+
+def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, capsys):
+    other = tmp_path / "other.yaml"
+    other.write_text(scene_text(4, closed_longer=0.05))
+    assert main(arguments(four, tmp_path / "out", "--scene", str(other))) == 1
+    told = capsys.readouterr().err
+    assert "joint_2 by +19.9 deg" in told and f"The scene ({other}) is of another boom" in told and "--scene" in told
+    assert not (tmp_path / "out" / "summary.json").exists()
+    feed = bag_feed(four, scene_of(four, other), Settings())
+    while feed.is_reading:
+        feed.poll()
+    assert "joint_2 by +19.9 deg" in feed.trouble and "of another boom" in feed.trouble
+
+
+def test_an_encoder_five_degrees_off_is_a_fault_to_be_found(tmp_path):
+    bag = session(tmp_path / "bag", scene_text(4), keep=False, bias=np.radians(5.0))
+    alarms = replay(bag, load_scene(), tmp_path / "out").summary["alarms"]
+    assert {alarm["channel"] for alarm in alarms} == {"joint_1"}
+
+
+def judged(off, still=(), seconds=6.0):
+    """What is said of angles that are off by so much (rad), for a time; those in `still` do not change at all."""
+    judge, noise, found = OtherBoom(), np.random.default_rng(2), []
+    for stamp in range(0, int(seconds * 1e9), 50_000_000):
+        values = np.array(off) + noise.normal(0.0, 1e-4, len(off))
+        values[list(still)] = 0.25
+        residuals = (Residuals(Stream.ANGLES, stamp, ("",) * len(off), np.array(off), np.ones(len(off))),)
+        report = Report(10**18 + stamp, True, residuals=residuals)
+        found.append(judge.took(Sample(Stream.ANGLES, 10**18 + stamp, values), report))
+    return "".join(found) + judge.judge()
+
+
+def test_most_encoders_must_be_off():
+    far = 1.1 * FAR
+    assert "joint_1 by +11.0 deg, joint_2 by -11.0 deg, joint_3" in judged([far, -far, far, 0.0])
+    assert judged([far, far, 0.0, 0.0]) == "" and judged([np.radians(5.0)]) == ""
+    assert judged([far, far, far, 0.0], seconds=0.3) == ""  # too few samples
+    assert judged([far] * 4, still=(0, 1, 2)) == ""  # most of them may be dead
+    assert judged([far] * 4, still=(0,)) and judged([far] * 4, still=(0,), seconds=1.0)  # a short session, at its end
+    assert WINDOW == 5e9
+
+
+def test_the_given_scene_comes_first_then_the_sessions_then_the_default(four, five, tmp_path):
+    given = tmp_path / "given.yaml"
+    given.write_text(default_text() + "# given\n")
+    assert scene_of(five, given).source == str(given) and scene_of(five, given).text.endswith("# given\n")
+    assert (scene_of(five).source, len(scene_of(five).scene.joints)) == (f"{five / FILE_NAME}, scene", 5)
+    assert scene_of(five / "session_0.mcap").scene == scene_of(five).scene
+    assert scene_of(four).source == DEFAULT_NAME
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (FAULTY, "session.yaml, scene: "),
+        ("a: &a [1]\nb: " + "[*a]" * 3, "not valid YAML"),
+        ("/etc/passwd", "session.yaml, scene: "),
+        ("sections: !!python/object/apply:os.system ['true']", "session.yaml, scene: "),
+        ("a: &a " + "[" * 40 + "1" + "]" * 40, "session.yaml, scene: "),
+        ("x: [" + "0," * 60_000 + "0]", "more than 50000 values"),
+    ],
+)
+def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tmp_path, capsys):
+    write_names(tmp_path / "bag", ["cylinder_1"])
+    Sheet("0", text).write(tmp_path / "bag")
+    for command in (["info", str(tmp_path / "bag")], arguments(tmp_path / "bag", tmp_path / "out")):
+        assert main(command) == 1
+        told = capsys.readouterr().err
+        assert words in told and "Give the scene by --scene." in told and told.count("\n") == 1
+
+
+NO_SHEETS = ["- 1\n", "scene: {sections: []}\n", "scene: [1]\n", "scene: 3\n", "a: [\n", "scene: !x y\n"]
+TEXTS = ["a: 1", "\n a: 1\n\n\n", "a:\r\n  b\r\n", "\ta \n", "x\x85y", "\ufeffa", "#\x1b[31m", "'", "---\n...\n"]
+
+
+@pytest.mark.parametrize("document", NO_SHEETS)
+def test_what_is_no_sheet_is_one_line_with_the_remedy(document, tmp_path):
+    (tmp_path / FILE_NAME).write_text(document)
+    with pytest.raises(BagError, match=r"session\.yaml.*by --scene"):
+        scene_of(tmp_path)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_texts_are_kept_as_they_are(text, tmp_path):
+    Sheet("0", text).write(tmp_path)
+    assert kept(tmp_path, "scene", "--scene").text == text
+    assert kept(tmp_path, "scene_sha256", "--scene").text == sha256(text)
+
+
+def test_a_sheet_that_could_not_be_read_again_is_not_written(tmp_path):
+    with pytest.raises(BagError, match="bytes, of which"):
+        Sheet("0", "#" * 5_000_000).write(tmp_path)
+    assert not (tmp_path / FILE_NAME).exists()
+
+
+def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
+    bag = without_scene(five, tmp_path / "bag")
+    sheet = (five / FILE_NAME).read_text()
+    (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1))
+    assert main(["info", str(bag)]) == 0
+    assert "was changed since the session was made" in capsys.readouterr().err
+
+
+def test_the_baseline_is_that_of_the_recording(four, tmp_path):
+    assert baseline_of(four).source == "default baseline"
+    Sheet("0", baseline="description: learnt\nangle_error: 0.001\n").write(tmp_path)
+    found = baseline_of(tmp_path)
+    assert (found.baseline.angle_error, found.source) == (0.001, f"{tmp_path / FILE_NAME}, baseline")
+    Sheet("0", baseline="angle_error: -1\n").write(tmp_path)
+    with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
+        baseline_of(tmp_path)
+
+
+def test_the_bundled_session_keeps_the_default_scene():
+    assert scene_of(BUNDLED).text == default_text()
+    assert "synthetic" in str(as_document(BUNDLED)["origin"])
