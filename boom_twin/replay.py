@@ -8,7 +8,6 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,9 +22,11 @@ from .alarms import Alarms
 from .errors import BagError
 from .health.baseline import Baseline, load_baseline
 from .io.ahead import Ahead
+from .io.atomic import write_atomic
 from .io.behind import Behind
 from .io.mapping import mapping_of
 from .io.reader import Session, scan
+from .io.results import REPLAY, Building, result_folder
 from .io.topics import Topics
 from .io.writer import FILE_NAME
 from .records import Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
@@ -112,7 +113,7 @@ def replay(
     bag : path
         A rosbag2 directory, a directory of .mcap files, or one .mcap.
     out : path
-        Made if needed; a result bag of an earlier replay in it is replaced.
+        New, empty, or an earlier result of a replay, which is replaced once the new one is whole.
     settings : Settings, optional
         Sensors' noise and tuning; the package's own by default.
     progress : callable, optional
@@ -133,15 +134,31 @@ def replay(
     UsageError
         The mapping, a setting or the baseline cannot be used.
     BagError
-        The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written.
+        The session cannot be read, has no strokes, or gave no prediction; or `out` cannot be written, or holds anything
+        else than an earlier result.
     """
-    session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
+    with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
+        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline)
+
+
+def replay_into(
+    building: Building,
+    bag: str | Path,
+    scene: Scene,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    mapping: str | Path | None = None,
+    changes: bool = True,
+    health: bool = True,
+    baseline: str | Path | None = None,
+) -> Replay:
+    """As `replay`, into a folder that is being built, for more to be added to it."""
+    session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
     mapped = mapping_of(session.path, Path(mapping) if mapping else None, len(scene.joints))
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     usual = load_baseline(Path(baseline) if baseline else None) if health else None
-    _clear(out)
     recording = Recording()
-    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, out / "bag") as (ahead, behind):
+    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, usual)
         ahead.wait_ready()
         behind.wait_ready()
@@ -171,9 +188,11 @@ def replay(
         )
     truth = load_truth(session.path)
     summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {"mapping": mapped.source}
+    if session.incomplete:
+        summary["session_incomplete"] = session.incomplete
     if truth is not None:
         summary |= truth.errors(recording.predictions)
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
 
 
@@ -183,23 +202,13 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
     return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
 
 
-def _clear(out: Path) -> None:
-    """Make room for the results; only a bag that a replay wrote is removed."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BagError(f"{out}: {error.strerror}. Give a folder that can be written.") from None
-    if (out / "bag" / FILE_NAME).is_file():
-        shutil.rmtree(out / "bag")
-
-
 @contextmanager
 def _ends(
-    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, bag: Path
+    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, building: Building
 ) -> Iterator[tuple[Ahead, Behind]]:
     """The processes that read and write, as they start."""
     ahead = Ahead(session.path, topics, wanted, len(scene.joints))
-    behind = Behind(bag, session.notes, topics, scene, settings)
+    behind = Behind(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
     try:
         yield ahead, behind
     finally:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import Fault
 
 if TYPE_CHECKING:
+    from ..io.reader import Session
     from ..scene import Scene
 
 
@@ -39,6 +40,12 @@ def tell(oddities: list[Fault]) -> None:
     """Print warnings on stderr."""
     for oddity in oddities:
         print(f"warning: {oddity}", file=sys.stderr)
+
+
+def warn_incomplete(session: Session) -> None:
+    """Say on stderr if a session is not whole."""
+    if session.incomplete:
+        print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
 
 
 def print_json(values: Mapping[str, Any]) -> None:

@@ -53,6 +53,7 @@ def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
     require_rclpy()
     from ..io.bagwriter import BagWriter
+    from ..io.incomplete import incompleteness
     from ..io.sheet import Sheet
     from ..io.storage import Split, Storage
     from ..ros.context import ros
@@ -64,6 +65,8 @@ def run(args: Namespace) -> int:
     wanted, scene, thresholds, parameters = _wanted(args), _scene_text(args.scene), *_parameters(args.params)
     mapping = (args.mapping or DEFAULT_FILE).read_text(encoding="utf-8")
     given = {"origin": args.origin, "note": args.note}
+    if (told := incompleteness(args.out)) and args.out.is_dir():
+        raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
     bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
     types = {each.name: each.type for each in wanted}
     sheet = Sheet(__version__, scene, parameters, mapping, types, args.note, args.origin)

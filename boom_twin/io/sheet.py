@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ruamel.yaml.scalarstring import LiteralScalarString
 
-from ..errors import BagError
+from .atomic import write_atomic
 from .bagmeta import dump
 
 FILE_NAME = "session.yaml"
@@ -74,12 +74,7 @@ class Sheet:
             "parameters": LiteralScalarString(self.parameters),
             "mapping": LiteralScalarString(self.mapping),
         }
-        draft = directory / f".{FILE_NAME}.draft"
-        try:
-            draft.write_text(_HEAD + dump(document), encoding="utf-8")
-            draft.replace(directory / FILE_NAME)
-        except OSError as error:
-            raise BagError(f"{directory / FILE_NAME}: cannot be written ({error.strerror}). Make room on the disk.") from error
+        write_atomic(directory / FILE_NAME, _HEAD + dump(document))
 
 
 def _time(moment: datetime) -> str:

@@ -16,9 +16,10 @@ from tqdm import tqdm
 
 from ..errors import BoomTwinError
 from ..io.reader import Session, scan
+from ..io.results import REPLAY, result_folder
 from ..pictures import draw, history_of
 from ..records import Stream
-from ..replay import Replay, replay
+from ..replay import Replay, replay_into
 from ..scene import load_scene
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
@@ -42,9 +43,11 @@ def main() -> int:
         if (args.bag / TRUTH).is_file():
             shutil.copy(args.bag / TRUTH, recorded)
         card, scene = score(recorded), load_scene()
-        again = replay(recorded, scene, args.out / "replay")
+        with result_folder(args.out / "replay", REPLAY, [recorded]) as building:
+            again = replay_into(building, recorded, scene)
+            pictures = [path.name for path in draw(again, history_of(again.recording, scene), building.folder)]
         print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
-        for path in [recorded, *draw(again, history_of(again.recording, scene), args.out)]:
+        for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -m boom_twin.cli.main monitor --bag {recorded}")
         return 0
