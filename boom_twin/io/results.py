@@ -178,13 +178,14 @@ def _entries(folder: Path) -> list[str]:
 
 
 def _manifest(folder: Path) -> tuple[str, dict[str, str]]:
-    """Command, and SHA-256 by file, of a complete result; empty where there is none that can be read."""
-    try:
-        with (folder / MANIFEST).open("rb") as stream:
-            content = json.loads(stream.read(_LARGEST))
-        return str(content["command"]), {str(name): str(digest) for name, digest in content["files"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return "", {}
+    """Command, and SHA-256 by file, of a result that is complete or was being removed; empty where nothing tells."""
+    for name in (MANIFEST, UNFINISHED):
+        try:
+            content = json.loads((folder / name).read_bytes()[:_LARGEST])
+            return str(content["command"]), {str(name): str(digest) for name, digest in content["files"].items()}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            continue
+    return "", {}
 
 
 def _sha256(path: Path) -> str:
@@ -303,9 +304,12 @@ def _settle(place: Path, replaced: Path, kind: Kind) -> None:
 
 
 def _discard(folder: Path) -> None:
-    """Remove an earlier result: what its manifest lists, and the manifest last."""
+    """Remove an earlier result: its manifest becomes the mark of something unfinished, which goes last."""
+    with suppress(FileNotFoundError):
+        (folder / MANIFEST).rename(folder / UNFINISHED)
     _, listed = _manifest(folder)
-    _remove(folder, [*(name for name in _entries(folder) if name in listed), UNFINISHED, MANIFEST])
+    _remove(folder, [name for name in _entries(folder) if name in listed])
+    (folder / UNFINISHED).unlink(missing_ok=True)
     _remove_empty(folder)
 
 
