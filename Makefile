@@ -18,7 +18,7 @@ help:
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
-	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact"
+	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
 	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
 	@echo "make figures     make the pictures of the documentation anew"
 
@@ -62,6 +62,7 @@ soak: warm
 	$(BIN)/python test/bench/monitor.py --seconds 600
 	$(BIN)/boom_twin study stability --soak --out out/soak
 	$(BIN)/python test/bench/contact_energy.py
+	$(BIN)/python test/bench/kills.py
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
 $(COLCON_READY): setup.py

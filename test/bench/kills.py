@@ -26,6 +26,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from tqdm import tqdm
 
 from boom_twin.cli.main import main as command_line
 from boom_twin.errors import BagError
@@ -382,11 +383,12 @@ def strokes() -> Iterator[None]:
 def kills(command: str, count: int, place: Path, seed: int) -> Counter[tuple[str, str]]:
     """Kill a command so many times; what was hit and what it left, counted. Broken says what must not be."""
     found: Counter[tuple[str, str]] = Counter()
-    with strokes() if command == "record" else contextlib.nullcontext():
+    with tqdm(total=count, desc=command, disable=None) as bar, strokes() if command == "record" else contextlib.nullcontext():
         target = KINDS[command](place / command, random.Random(seed))
         for number in range(count):
             try:
                 found[target.once()] += 1
+                bar.update()
             except Broken as error:
                 raise Broken(f"{command}, seed {seed}, kill {number}: {error} (see {target.place})") from None
     return found
@@ -400,6 +402,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()), help="(the time)")
     args = parser.parse_args()
     names = args.commands.split(",")
+    os.environ |= {"ROS_DOMAIN_ID": str(150 + os.getpid() % 10), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     place = Path(tempfile.mkdtemp(prefix="boom_twin_kills_"))
     began = time.monotonic()
     for number, name in enumerate(names):
