@@ -18,8 +18,8 @@ help:
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
-	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact"
-	@echo "make session     make the bundled session anew on the virtual rig"
+	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
+	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
 	@echo "make figures     make the pictures of the documentation anew"
 
 setup: $(READY)
@@ -62,6 +62,7 @@ soak: warm
 	$(BIN)/python test/bench/monitor.py --seconds 600
 	$(BIN)/boom_twin study stability --soak --out out/soak
 	$(BIN)/python test/bench/contact_energy.py
+	$(BIN)/python test/bench/kills.py
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
 $(COLCON_READY): setup.py
@@ -85,12 +86,14 @@ client:
 	@PATH="$(CURDIR)/$(NODE)/venv/bin:$$PATH" npm install --prefix $(NODE) --no-package-lock --no-audit --no-fund --loglevel error --fetch-retries 1 --fetch-timeout 30000 \
 		|| echo "skipped: the independent client, because its packages cannot be installed"
 
+# Never over the one that is there: compare the two, then exchange them by hand.
 session: $(READY)
-	rm -rf bags/arch_session
-	$(BIN)/boom_twin rig --out bags/arch_session
+	$(BIN)/boom_twin rig --out out/arch_session
+	@cmp out/arch_session/session_0.mcap bags/arch_session/session_0.mcap && echo "the bundled session is the same"
 
 figures: $(READY)
 	$(BIN)/python docs/figures.py
 
 clean:
-	rm -rf $(VENV) $(COLCON) $(NODE) out build *.egg-info
+	rm -rf $(VENV) $(COLCON) $(NODE) build *.egg-info
+	@echo "kept: out, which may hold recordings"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,10 +23,12 @@ from .alarms import Alarms
 from .errors import BagError
 from .health.baseline import Baseline
 from .io.ahead import Ahead
+from .io.atomic import write_atomic
 from .io.behind import Behind
 from .io.boom_names import refuse_other_names
 from .io.mapping import mapping_of
 from .io.reader import Session, scan
+from .io.results import REPLAY, Building, result_folder
 from .io.session_model import SessionScene, baseline_of, scene_of
 from .io.sheet import Sheet
 from .io.topics import Topics
@@ -122,7 +123,7 @@ def replay(
     scene : Scene or SessionScene, optional
         None: the one that the session was made with, else the package's own.
     out : path
-        Made if needed; a result bag of an earlier replay in it is replaced.
+        New, empty, or an earlier result of a replay, which is replaced once the new one is whole.
     settings : Settings, optional
         Sensors' noise and tuning; the package's own by default.
     progress : callable, optional
@@ -144,18 +145,33 @@ def replay(
         The mapping, a setting or the baseline cannot be used.
     BagError
         The session cannot be read, has no strokes, is of another boom than the scene, or gave no prediction; what it was
-        recorded with cannot be used; or `out` cannot be written.
+        recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
-    session, out, settings = scan(Path(bag)), Path(out), settings or Settings()
+    with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
+        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline)
+
+
+def replay_into(
+    building: Building,
+    bag: str | Path,
+    scene: Scene | SessionScene | None,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    mapping: str | Path | None = None,
+    changes: bool = True,
+    health: bool = True,
+    baseline: str | Path | None = None,
+) -> Replay:
+    """As `replay`, into a folder that is being built, for more to be added to it."""
+    session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
     taken = scene_for(session.path, scene)
     scene, joints = taken.scene, len(taken.scene.joints)
     mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints)
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    _clear(out)
     recording, other_boom = Recording(), OtherBoom()
-    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, out / "bag") as (ahead, behind):
+    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
         behind.wait_ready()
@@ -193,9 +209,11 @@ def replay(
         "baseline": None if usual is None else usual.source,
         "mapping": mapped.source,
     }
+    if session.incomplete:
+        summary["session_incomplete"] = session.incomplete
     if truth is not None:
         summary |= truth.errors(recording.predictions)
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
 
 
@@ -221,23 +239,13 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
     return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
 
 
-def _clear(out: Path) -> None:
-    """Make room for the results; only a bag that a replay wrote is removed."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BagError(f"{out}: {error.strerror}. Give a folder that can be written.") from None
-    if (out / "bag" / FILE_NAME).is_file():
-        shutil.rmtree(out / "bag")
-
-
 @contextmanager
 def _ends(
-    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, bag: Path
+    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, building: Building
 ) -> Iterator[tuple[Ahead, Behind]]:
     """The processes that read and write, as they start."""
     ahead = Ahead(session.path, topics, wanted, len(scene.joints))
-    behind = Behind(bag, session.notes, topics, scene, settings)
+    behind = Behind(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
     try:
         yield ahead, behind
     finally:

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 
 from ..errors import UsageError
 from ..health.baseline import Baseline
+from ..io.atomic import write_atomic
 from ..learn import learn_baseline
 from ..records import Sample, Stream
 from ..scene.parts import Scene
@@ -83,4 +84,4 @@ def write_baseline(baseline: Baseline, path: Path, credit: str, force: bool) -> 
     yaml.dump({key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}, text)
     path.parent.mkdir(parents=True, exist_ok=True)
     head = "# What boom_twin takes for healthy on one rig; SI units. Do not edit mean and covariance.\n"
-    path.write_text(head + text.getvalue())
+    write_atomic(path, head + text.getvalue())

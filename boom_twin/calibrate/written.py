@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml.error import YAMLError
 
 from ..errors import SceneError, UsageError
+from ..io.atomic import check_target, write_atomic
 from ..io.mapping import load_mapping
 from ..io.sensors import factor
 from ..io.sheet import kept
@@ -30,11 +31,15 @@ def mapping_path(out: Path) -> Path:
     return out.with_suffix(".mapping.yaml")
 
 
-def refuse_overwriting(out: Path, source: str | None, force: bool) -> None:
-    """UsageError if a file of the result is there already, or would replace the scene that is read."""
-    if source is not None and out.resolve() == Path(source).resolve():
-        raise UsageError(f"--out {out}: this is the scene that is read. Name another file.")
-    for path in (out, mapping_path(out)):
+def picture_paths(out: Path) -> list[Path]:
+    """Where the pictures that go with a scene are drawn: of residuals, and of parameters."""
+    return [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
+
+
+def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
+    """UsageError if a file of the result is there already, or would replace one of `sources` or a file of a recording."""
+    for path in (out, mapping_path(out), *picture_paths(out)):
+        check_target(path, sources)
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already. Name another file, or add --force to replace it.")
     if not out.parent.is_dir():
@@ -65,7 +70,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
         read, faults = None, []
     if read is None or faults or not _same(read.model_dump(), wanted.model_dump()):
         text = anew(wanted)  # blocks share their text, so that an edit of one changes another
-    out.write_text(text, encoding="utf-8")
+    write_atomic(out, text)
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:
@@ -89,7 +94,7 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
         text = "\n".join([*([text.rstrip()] if text.strip() else []), "sensors:", *rows]) + "\n"
     head = f"# Zeros of {', '.join(zeros)}: calibrated {credit}.\n"
     path = mapping_path(out)
-    path.write_text(head + text, encoding="utf-8")
+    write_atomic(path, head + text)
     load_mapping(path, joints)
     return path
 

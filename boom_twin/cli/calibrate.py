@@ -48,9 +48,11 @@ def run(args: Namespace) -> int:
 
 def _learn(args: Namespace) -> int:
     from ..calibrate.baseline import baseline_of, write_baseline
+    from ..io.atomic import check_target
     from ..settings import load_settings
 
     scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
+    check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
     with _bar() as progress:
@@ -77,6 +79,11 @@ def _scene(args: Namespace) -> SessionScene:
     return found
 
 
+def _sources(args: Namespace) -> list[Path]:
+    """All that is read."""
+    return [Path(path) for path in (*args.bags, args.scene, args.params, args.mapping) if path is not None]
+
+
 def _credit(args: Namespace) -> str:
     return f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
 
@@ -87,7 +94,7 @@ def _calibrate(args: Namespace) -> int:
     from ..calibrate.written import refuse_overwriting, write_mapping, write_scene
     from ..settings import load_settings
 
-    refuse_overwriting(args.out, args.scene, args.force)
+    refuse_overwriting(args.out, _sources(args), args.force)
     scene = _scene(args)
     settings = load_settings(Path(args.params) if args.params else None)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
@@ -124,11 +131,12 @@ def _bar() -> Iterator[Progress]:
 def _draw(found: Calibration, out: Path) -> list[Path]:
     """Pictures beside the scene."""
     from ..calibrate.words import shown
+    from ..calibrate.written import picture_paths
     from ..view.calibration import Interval, parameters_picture, residuals_picture
 
     note = f"held out: {found.held_out}"
     judged = (found.before, found.after)
-    paths = [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
+    paths = picture_paths(out)
     times = (found.before.times, found.after.times)
     normalised = (found.before.values / found.before.sigmas, found.after.values / found.after.sigmas)
     residuals_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)

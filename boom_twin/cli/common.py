@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import Fault
 
 if TYPE_CHECKING:
+    from ..io.reader import Session
     from ..io.session_model import SessionScene
     from ..scene import Scene
 
@@ -55,6 +56,12 @@ def tell(oddities: Iterable[Fault]) -> None:
     """Print warnings on stderr."""
     for oddity in oddities:
         print(f"warning: {oddity}", file=sys.stderr)
+
+
+def warn_incomplete(session: Session) -> None:
+    """Say on stderr if a session is not whole."""
+    if session.incomplete:
+        print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
 
 
 def print_json(values: Mapping[str, Any]) -> None:

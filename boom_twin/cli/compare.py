@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .common import add_json, add_session_scene, open_session_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..report.compare import Row
@@ -47,15 +47,18 @@ def run(args: Namespace) -> int:
 
 
 def _side(args: Namespace, path: Path, folder: Path) -> Side:
-    from ..replay import replay
+    from ..io.results import REPLAY, result_folder
+    from ..replay import replay_into
     from ..report.side import side_of, worked_out
     from ..settings import load_settings
 
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
         scene, settings = open_session_scene(session, args.scene), load_settings(Path(args.params) if args.params else None)
-        result = replay(session, scene, folder, settings, baseline=args.baseline)
-        worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, folder)
+        with result_folder(folder, REPLAY, [session]) as building:
+            result = replay_into(building, session, scene, settings, baseline=args.baseline)
+            worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, building.folder)
+        warn_incomplete(result.session)
         return folder
 
     return side_of(path, replayed)

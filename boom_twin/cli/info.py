@@ -56,6 +56,7 @@ def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
         "checksums": session.checked,
         "origin": session.notes.get("origin"),
         "synthetic": info.synthetic,
+        "incomplete": session.incomplete or None,
         "notes": [f"{key}: {value}" for key, value in session.notes.items()],
         "topics": [tally.name for tally in tallies],
         "types": [tally.type for tally in tallies],
@@ -108,6 +109,7 @@ def as_text(info: BagInfo, scene: SessionScene) -> list[str]:
         *_table(info),
         "",
     ]
+    lines += [f"state      {told['incomplete']}"] if told["incomplete"] else []
     lines += [f"note       {note}" for note in told["notes"] if not note.startswith("origin: ")]
     lines += [f"name       {sentence}" for sentence in told["names_extra"]]
     lines += [f"remark     {remark}" for remark in told["remarks"]]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
+from ..io.atomic import check_target, write_atomic
 from ..scene import Scene
 from ..scene.load import default_text
 from ..scene.read import read_text
@@ -49,8 +50,8 @@ def refuse_misuse(args: Namespace) -> None:
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
     for source in filter(None, (args.scene, args.against)):
-        if args.out is not None and args.out.resolve() == Path(source).resolve():
-            raise UsageError(f"--out {args.out}: this is the scene that is read. Name another file.")
+        if args.out is not None:
+            check_target(args.out, [Path(source)])
 
 
 def tip_error(text: str) -> float:
@@ -137,7 +138,7 @@ def write(source: str | None, scene: Scene, found: Proposal, most: float, out: P
         f"# ({found.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    out.write_text("\n".join(head) + "\n\n" + rewritten(text, scene, found.edits), encoding="utf-8")
+    write_atomic(out, "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits))
 
 
 def _meaning(scene: Scene, edit: Edit) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_json, add_session_scene, open_session_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..io.session_model import SessionScene
@@ -21,7 +21,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
     add_session_scene(parser)
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder for summary.json, bag/ and pictures")
+    place = "folder for summary.json, bag/ and pictures: new, empty, or of an earlier replay, which is replaced"
+    parser.add_argument("--out", required=True, metavar="DIR", help=place)
     parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
     parser.add_argument(
         "--mapping", metavar="FILE", help="topics and sensors; by default as the session was recorded, else topics.yaml"
@@ -42,7 +43,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
-    from ..replay import replay
+    from ..io.results import REPLAY, result_folder
+    from ..replay import replay_into
     from ..report.loads import section_heights
     from ..settings import load_settings
 
@@ -50,26 +52,29 @@ def run(args: Namespace) -> int:
     heights = section_heights(args.section_height, scene.scene)
     settings = load_settings(Path(args.params) if args.params else None)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    result = replay(
-        args.bag, scene, args.out, settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
-    )
-    files = _write(args, result, scene, settings, heights)
+    out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
+    with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
+        options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
+        result = replay_into(building, args.bag, scene, *options)
+        files = [path.name for path in _write(args, result, scene, settings, heights, building.folder)]
+    warn_incomplete(result.session)
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
         return 0
     print("\n".join(as_text(result.summary)))
-    for path in [Path(args.out) / "summary.json", Path(args.out) / "bag", *files]:
-        print(path)
+    for name in ["summary.json", "bag", *files]:
+        print(out / name)
     return 0
 
 
-def _write(args: Namespace, result: Replay, scene: SessionScene, settings: Settings, heights: Array | None) -> list[Path]:
+def _write(
+    args: Namespace, result: Replay, scene: SessionScene, settings: Settings, heights: Array | None, out: Path
+) -> list[Path]:
     """Figures, pictures and report, as they are wanted."""
     from ..pictures import draw
     from ..report.page import Subject, write_report
     from ..report.side import worked_out
 
-    out = Path(args.out)
     history, still, path = worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, out)
     files = [path]
     if not args.no_pictures:

@@ -15,7 +15,7 @@ ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
     parser.add_argument("--duration", type=float, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
@@ -29,6 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
+    from ..io.results import RIG, result_folder
     from ..io.session import write_session
     from ..io.session_model import scene_from
     from ..io.sheet import Sheet
@@ -48,15 +49,18 @@ def run(args: Namespace) -> int:
     boom = with_faults(wrong_by(scene, args.wrong, args.rig_seed), faults)
     programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     sensors = noise_free() if args.clean else Sensors()
-    print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
-    session = spoil(record(boom, programme, duration, sensors, args.seed), faults, args.seed)
     notes = {"origin": ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
     if args.wrong:
         notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
     if faults:
         notes["faults"] = ", ".join(map(str, faults))
-    write_session(out, session.stamps, session.strokes, session.joints, session.imu, notes, session.angle_stamps)
-    Sheet(__version__, assumed.text, origin=ORIGIN).write(out)  # not the boom that was simulated: what a twin is to assume
-    session.save_truth(out / FILE_NAME)
+    with result_folder(out, RIG, [Path(args.scene)] if args.scene else []) as building:
+        print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
+        session = spoil(record(boom, programme, duration, sensors, args.seed), faults, args.seed)
+        arrays = session.stamps, session.strokes, session.joints, session.imu
+        write_session(building.folder, *arrays, notes, session.angle_stamps)
+        # not the boom that was simulated: what a twin is to assume
+        Sheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
+        session.save_truth(building.folder / FILE_NAME)
     print(out)
     return 0

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import sys
 from argparse import ArgumentParser, Namespace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import UsageError
+from ..io.atomic import check_target, write_atomic
 from ..records import Array
 from ..scene import Scene
 from .common import add_scene, open_scene
@@ -35,6 +37,8 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
+    for target in filter(None, (args.out, args.orbits)):
+        check_target(Path(target), [Path(path) for path in (args.drive, args.scene) if path is not None])
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles)
@@ -42,9 +46,9 @@ def run(args: Namespace) -> int:
         print(f"boom_twin simulate: warning: {result.doubt} (--dt is {args.dt:g} s).", file=sys.stderr)
     columns = result.columns()
     table = np.column_stack(list(columns.values()))
-    with Path(args.out).open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(columns) + "\n")
-        np.savetxt(file, table, fmt="%.12g", delimiter=",")
+    text = StringIO(newline="")
+    np.savetxt(text, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
+    write_atomic(Path(args.out), text.getvalue())
     for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
         print(f"{name}: contact lost {lost} times")
     if args.orbits:

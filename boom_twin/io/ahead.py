@@ -14,7 +14,7 @@ from ..errors import BoomTwinError
 from ..records import Change, Sample, Stream
 from .changes import recorded_changes
 from .intake import Intake, stamp_of
-from .pipe import Pipe, post, say_ready
+from .pipe import END, Pipe, post, say_ready
 from .reader import read, scan
 from .topics import Topics
 
@@ -94,7 +94,7 @@ def main() -> int:
     except BoomTwinError as error:
         print(error, file=sys.stderr)
         return 1
-    post([batch, intake.oddities])
+    post([batch, intake.oddities, END])
     return 0
 
 

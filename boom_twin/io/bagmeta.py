@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from ruamel.yaml import YAML
 
 from ..errors import BagError
 from ..plain import read_plain
+from .atomic import write_atomic
 from .topics import Qos
 
 FILE_NAME = "metadata.yaml"
@@ -106,11 +109,9 @@ def read_metadata(path: Path) -> BagMetadata:
     return metadata
 
 
-def write_metadata(path: Path, metadata: BagMetadata) -> None:
-    """Write `metadata` as Jazzy does, all of it or nothing; the same values give the same bytes."""
-    draft = path.with_name(f".{path.name}.draft")
-    draft.write_text(dump({_ROOT: metadata.model_dump()}), encoding="utf-8")
-    draft.replace(path)
+def write_metadata(path: Path, metadata: BagMetadata, sync: Callable[[int], None] = os.fsync) -> None:
+    """Write `metadata` as Jazzy does, all of it or nothing; the same values give the same bytes. `sync`: see `write_atomic`."""
+    write_atomic(path, dump({_ROOT: metadata.model_dump()}), sync)
 
 
 def offered_qos(qos: Qos) -> list[dict[str, Any]]:

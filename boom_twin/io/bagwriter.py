@@ -127,7 +127,7 @@ class BagWriter:
         with self._told():
             self._finish()
             metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
-            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
 
     def abandon(self) -> None:
         """Let go of the open file; what waits in memory is given up."""
@@ -173,10 +173,7 @@ class BagWriter:
 
     def fault(self, error: OSError) -> BagError:
         """What is told of a disk that is full or fails."""
-        return BagError(
-            f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk; "
-            f"`boom_twin recover {self.directory} --out DIR` saves what was written before."
-        )
+        return BagError(f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk.")
 
 
 def file_name(number: int) -> str:

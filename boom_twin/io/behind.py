@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..records import Array, Change, Health, Prediction, Report, Residuals, Stre
 from ..scene.parts import Scene
 from ..settings import Settings
 from .outlet import Outlet
-from .pipe import Pipe, say_ready
+from .pipe import END, Pipe, received, say_ready
 from .topics import Output, Topic, Topics
 from .writer import SessionWriter
 
@@ -91,6 +90,8 @@ class Behind:
         What the reports are about.
     settings : Settings
         How it is drawn.
+    lock : int
+        Descriptor that the process keeps open, see `boom_twin.io.results.Building`.
 
     Raises
     ------
@@ -99,10 +100,10 @@ class Behind:
     """
 
     def __init__(
-        self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings
+        self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings, lock: int
     ) -> None:
         self._batch: list[Packed] = []
-        self._pipe = Pipe(__name__, str(directory))
+        self._pipe = Pipe(__name__, str(directory), inherited=[lock])
         self._pipe.send((dict(notes), topics.outputs, scene, settings))
 
     def wait_ready(self) -> None:
@@ -121,6 +122,7 @@ class Behind:
     def close(self) -> None:
         """Send the rest; returns when the bag is complete."""
         self._pipe.send(self._batch)
+        self._pipe.send(END)
         self._pipe.finish()
 
     def stop(self) -> None:
@@ -129,23 +131,23 @@ class Behind:
 
 
 def main(directory: Path) -> int:
-    """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails."""
-    stream = sys.stdin.buffer
+    """Write everything that comes down the pipe; exit code 1 with the reason on stderr if that fails.
+
+    A bag gets its end and its metadata only after the end of the pipe was sent.
+    """
+    items = received(sys.stdin.buffer)
     try:
-        notes, topics, scene, settings = pickle.load(stream)
+        notes, topics, scene, settings = next(items)
         outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
         outlet = Outlet(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
-            while True:
-                try:
-                    batch = pickle.load(stream)
-                except EOFError:
-                    return 0
+            for batch in items:
                 for packed in batch:
                     report = unpack(packed)
                     for key, data in outlet.fill(report):
                         writer.write_encoded(key, report.stamp, data)
+        return 0
     except BoomTwinError as error:
         print(error, file=sys.stderr)
     except OSError as error:

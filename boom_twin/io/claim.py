@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import BagError
+from .results import UNFINISHED
 
 
 def claim(directory: Path) -> None:
-    """Make the directory; refuse one that holds anything.
+    """Make the directory; refuse one that holds anything but the mark of a result that is being built.
 
     Raises
     ------
@@ -17,7 +18,7 @@ def claim(directory: Path) -> None:
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        taken = sorted(entry.name for entry in directory.iterdir())
+        taken = sorted(entry.name for entry in directory.iterdir() if entry.name != UNFINISHED)
     except OSError as error:
         raise BagError(f"{directory}: cannot be made ({error.strerror}). Choose another place.") from error
     if taken:

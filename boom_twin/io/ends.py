@@ -23,13 +23,15 @@ _FOOTER = struct.Struct("<BQQQI8s")
 def check_ends(path: Path, file: BinaryIO) -> None:
     """Magic at both ends, footer, checksum of the summary."""
     size = path.stat().st_size
-    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+    if (start := file.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
+        if MCAP0_MAGIC.startswith(start):
+            raise BagError(f"{path}: incomplete: {size} bytes, of which nothing can be saved. Its recorder was ended at once.")
         raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
     if (ends := _footer(file, size)) is None:
-        raise BagError(f"{path}: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
-    start, is_sound = ends
+        raise BagError(f"{path}: incomplete: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
+    summary, is_sound = ends
     if not is_sound:
-        raise BagError(f"{path}: the checksum of the summary, from byte {start}, does not fit. {RESCUE}")
+        raise BagError(f"{path}: the checksum of the summary, from byte {summary}, does not fit. {RESCUE}")
 
 
 def summary_start(path: Path) -> int | None:

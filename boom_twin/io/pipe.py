@@ -9,18 +9,27 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import IO, Any
 
 from ..child_process import python_command
 from ..errors import BagError
 
 READY = "ready"
 """First thing a process sends: its imports are done."""
+END = "end"
+"""Last thing that is sent, either way: without it, what came is not all, because its sender was killed."""
 
 
 class Pipe:
     """The replay's end: start a module with its arguments, send to it, receive from it.
+
+    Parameters
+    ----------
+    module : str
+    arguments : str
+    inherited : sequence of int, optional
+        Descriptors that stay open in the process; a lock so lasts until both ends have gone.
 
     Raises
     ------
@@ -28,16 +37,15 @@ class Pipe:
         From any method, when the process ended with an error; its text is what the process said.
     """
 
-    def __init__(self, module: str, *arguments: str) -> None:
+    def __init__(self, module: str, *arguments: str, inherited: Sequence[int] = ()) -> None:
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(python_command(module, *arguments), stdin=pipe, stdout=pipe, stderr=pipe)
+        command = python_command(module, *arguments)
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=inherited)
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
 
     def wait_ready(self) -> None:
         """Until the process has its imports done."""
-        if next(self.receive(), None) != READY:
-            self.finish()
-            raise BagError("a process of the replay ended before it began. Run it again.")
+        next(self.receive())
 
     def send(self, item: Any) -> None:
         """One object down the pipe."""
@@ -50,13 +58,13 @@ class Pipe:
             raise
 
     def receive(self) -> Iterator[Any]:
-        """Everything that comes up the pipe until it ends."""
+        """Everything that comes up the pipe until its end is sent."""
         assert self._stdout is not None
-        while True:
-            try:
-                yield pickle.load(self._stdout)
-            except EOFError:
-                return
+        try:
+            yield from received(self._stdout)
+        except BagError:
+            self.finish()  # which has the reason, if the process told one
+            raise
 
     def finish(self) -> None:
         """Close the pipe, wait for the process to end, and raise what it had to say if that was an error."""
@@ -71,6 +79,24 @@ class Pipe:
         """End the process at once, whatever it is doing."""
         self._process.kill()
         self._process.communicate()
+
+
+def received(stream: IO[bytes]) -> Iterator[Any]:
+    """The objects that come through a pipe, up to its end.
+
+    Raises
+    ------
+    BagError
+        The pipe broke off before: the process at its other end was ended by force.
+    """
+    while True:
+        try:
+            item = pickle.load(stream)
+        except (EOFError, pickle.UnpicklingError):
+            raise BagError("incomplete: a process of the replay was ended from outside. Run it again.") from None
+        if isinstance(item, str) and item == END:
+            return
+        yield item
 
 
 def say_ready() -> None:

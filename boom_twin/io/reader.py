@@ -21,8 +21,12 @@ from .blocks import messages
 from .damage import RESCUE, STUMBLES, blame, compare_counts
 from .definitions import check_encoding
 from .files import check_listed, mcap_files
+from .incomplete import incompleteness
 from .survey import McapFile, survey
 from .typestore import jazzy
+
+RECOVERED = "recovered from"
+"""The note of a session that was saved from a damaged one, which may have been ended by force."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,8 @@ class Session:
         What the writer noted, for instance that the session is synthetic.
     metadata : BagMetadata or None
         What ``metadata.yaml`` says; None without one.
+    incomplete : str
+        Why it is not whole, in words, where its folder says so; else empty.
     """
 
     path: Path
@@ -64,6 +70,7 @@ class Session:
     checked: bool
     notes: dict[str, str]
     metadata: BagMetadata | None
+    incomplete: str
 
     def find(self, name: str) -> TopicInfo | None:
         """The topic of that name, with or without its leading slash."""
@@ -78,6 +85,16 @@ def scan(path: Path) -> Session:
     BagError
         If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
+    told = incompleteness(path)
+    try:
+        return _scan(path, told)
+    except BagError as error:
+        if not told:
+            raise
+        raise BagError(f"{error} It is {told}") from None
+
+
+def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
     files = tuple(survey(file) for file in named)
@@ -101,6 +118,7 @@ def scan(path: Path) -> Session:
         checked=all(file.checked for file in filled),
         notes=notes,
         metadata=metadata,
+        incomplete="" if RECOVERED in notes else incomplete,
     )
 
 

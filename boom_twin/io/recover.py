@@ -11,22 +11,24 @@ from mcap.opcode import Opcode
 from ..errors import BagError
 from ..plain import LARGEST
 from ..received import holds_file, open_received
-from .bagmeta import FILE_NAME, BagMetadata
-from .bagwriter import BagWriter, file_name
+from .atomic import write_atomic
+from .bagmeta import BagMetadata
+from .bagwriter import BagWriter
 from .blocks import heads
 from .content import message_of, parts
 from .damage import blame
 from .files import sources
 from .legend import Legend, legend_of
 from .outcome import Outcome
-from .reader import scan
+from .reader import RECOVERED, scan
 from .recorded import Recorded
+from .results import RECOVER, result_folder
 from .salvage import Fault, walk
 from .sheet import sheet_path
 
 
 def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
-    """Write what can be saved of the session at `path` into the new directory `out`; `path` is only read.
+    """Write what can be saved of the session at `path` into the new directory `out`, or nothing; `path` is only read.
 
     Parameters
     ----------
@@ -39,8 +41,12 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
     BagError
         There is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
     """
+    with result_folder(out, RECOVER, [path]) as building:
+        return _recover(path, building.folder, unverified)
+
+
+def _recover(path: Path, out: Path, unverified: bool) -> Outcome:
     files, metadata = sources(path)
-    _check_place(path, out)
     legends = []
     for file in files:
         with blame(file):
@@ -48,7 +54,7 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
     outcome = Outcome()
     notes = {key: value for legend in legends for key, value in legend.notes.items()}
     notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
-    bag = BagWriter(out, {**notes, "recovered from": path.name}, distro=metadata.ros_distro if metadata else "")
+    bag = BagWriter(out, {**notes, RECOVERED: path.name}, distro=metadata.ros_distro if metadata else "")
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
         for number, (file, legend) in enumerate(zip(files, legends, strict=True)):
@@ -61,18 +67,11 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
         bag.abandon()
         raise
     if not bag.counts.total():
-        _remove(out)
-        raise BagError(f"{path}: nothing can be saved: {_first(outcome)}. {out} was not kept.")
+        raise BagError(f"{path}: nothing can be saved: {_first(outcome)}.")
     _copy_sheet(path, out)
     outcome.saved = _count(out)
     outcome.lost = _lost(outcome.saved, legends, metadata, files)
     return outcome
-
-
-def _check_place(path: Path, out: Path) -> None:
-    source = path.resolve()
-    if source == out.resolve() or (source.is_dir() and source in out.resolve().parents):
-        raise BagError(f"{out}: lies in the source, which is never touched. Choose a directory outside {path}.")
 
 
 def _copy(
@@ -119,7 +118,7 @@ def _copy_sheet(path: Path, out: Path) -> None:
     sheet = sheet_path(path)
     if holds_file(sheet) and sheet.stat().st_size <= LARGEST:
         with open_received(sheet) as file:
-            (out / sheet.name).write_bytes(file.read(LARGEST))
+            write_atomic(out / sheet.name, file.read(LARGEST))
 
 
 def _count(out: Path) -> Counter[str]:
@@ -151,13 +150,6 @@ def _counts_told(legends: list[Legend], metadata: BagMetadata | None, files: lis
         for entry in metadata.topics_with_message_count:
             told[entry.topic_metadata.name] += entry.message_count
         yield told
-
-
-def _remove(out: Path) -> None:
-    """Take away the empty bag that was begun."""
-    for name in (file_name(0), FILE_NAME):
-        (out / name).unlink(missing_ok=True)
-    out.rmdir()
 
 
 def _first(outcome: Outcome) -> str:

@@ -13,6 +13,7 @@ from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarStri
 from ..errors import BagError
 from ..plain import LARGEST, plain, read_plain
 from ..received import holds_file
+from .atomic import write_atomic
 from .bagmeta import dump
 
 FILE_NAME = "session.yaml"
@@ -84,12 +85,7 @@ class Sheet:
         path = directory / FILE_NAME
         if len(text.encode()) > LARGEST:
             raise BagError(f"{path}: {len(text.encode())} bytes, of which {LARGEST} are read again. Shorten scene and mapping.")
-        draft = directory / f".{FILE_NAME}.draft"
-        try:
-            draft.write_text(text, encoding="utf-8")
-            draft.replace(path)
-        except OSError as error:
-            raise BagError(f"{path}: cannot be written ({error.strerror}). Make room on the disk.") from error
+        write_atomic(path, text)
 
 
 @dataclass(frozen=True, slots=True)

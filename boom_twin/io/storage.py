@@ -129,10 +129,8 @@ class Storage:
         return [self._bag.counts[key] for key in range(self._topics)]
 
     def _stalled(self, how: str) -> BagError:
-        place = self._bag.directory
         return BagError(
-            f"{place}: the disk does not keep up: {how}. Record less or on a faster disk; "
-            f"`boom_twin recover {place} --out DIR` saves what was written before."
+            f"{self._bag.directory}: the disk does not keep up: {how}. Record less or on a faster disk. {self._rescue}"
         )
 
     def _run(self) -> None:
@@ -141,9 +139,16 @@ class Storage:
             self._bag.close()
             self._syncer.drain()
             self._check_disk()
+        except BagError as error:
+            self._error = BagError(f"{error} {self._rescue}")
+            self._bag.abandon()
         except Exception as error:  # told where it can be told: by `check` and `close`
             self._error = error
             self._bag.abandon()
+
+    @property
+    def _rescue(self) -> str:
+        return f"`boom_twin recover {self._bag.directory} --out DIR` saves what was written before."
 
     def _serve(self) -> None:
         """Write until the end, flushing now and then."""

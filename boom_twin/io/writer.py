@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from mcap.writer import CompressionType
 
+from ..errors import BagError
 from . import bagmeta
 from .bagwriter import BagWriter, file_name
 from .recorded import Recorded
@@ -31,7 +33,8 @@ def recorded(topic: Topic) -> Recorded:
 class SessionWriter:
     """Writes a session of one file; use it as a context.
 
-    Leaving the context completes the bag, after an error too: what was written so far can be read.
+    Leaving the context completes the bag. After an exception it stays without its end, so that nobody takes it for whole;
+    `boom_twin.io.recover` saves what was written.
 
     Parameters
     ----------
@@ -82,4 +85,9 @@ class SessionWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None:
+            self.close()
+            return
+        with suppress(BagError):
+            self._bag.flush()
+        self._bag.abandon()

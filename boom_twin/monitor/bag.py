@@ -141,7 +141,8 @@ def _names(topics: Topics) -> dict[str, Topic]:
 def _title(session: Session, is_published: bool) -> str:
     kind = "as published" if is_published else "through the twin"
     origin = session.notes.get("origin")
-    return f"{session.path.name}, {kind}" + (f" ({origin})" if origin else "")
+    state = ", INCOMPLETE" if session.incomplete else ""
+    return f"{session.path.name}, {kind}{state}" + (f" ({origin})" if origin else "")
 
 
 def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int]) -> Generator[None]:

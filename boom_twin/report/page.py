@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..io.atomic import write_atomic
 from ..records import Alarm, Array
 from ..replay import NANO, Recording, Replay
 from ..scene.parts import Scene
@@ -77,7 +78,7 @@ def write_report(subject: Subject, folder: Path) -> Path:
         *_provenance(subject),
     ]
     path = folder / FILE_NAME
-    path.write_text(page(f"Session {subject.name}", parts), encoding="utf-8")
+    write_atomic(path, page(f"Session {subject.name}", parts))
     return path
 
 

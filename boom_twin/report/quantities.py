@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import BagError
 from ..health.baseline import Baseline
+from ..io.atomic import write_atomic
 from ..moments import stations
 from ..received import open_received
 from ..records import Array, Stream, channels_of
@@ -142,7 +143,7 @@ def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
     """Keep them beside ``summary.json``; returns the file."""
     path = folder / FILE_NAME
     rows = ",\n".join(f"  {json.dumps(asdict(each))}" for each in found)
-    path.write_text(f'{{\n "scene_sha256": "{digest(scene)}",\n "quantities": [\n{rows}\n ]\n}}\n', encoding="utf-8")
+    write_atomic(path, f'{{\n "scene_sha256": "{digest(scene)}",\n "quantities": [\n{rows}\n ]\n}}\n')
     return path
 
 

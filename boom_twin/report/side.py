@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BagError
+from ..io.incomplete import incompleteness
 from ..io.session_model import baseline_of
+from ..io.writer import FILE_NAME as RESULT
 from ..pictures import history_of
 from ..received import holds_file, open_received
 from ..replay import Replay
@@ -47,14 +50,19 @@ def side_of(path: Path, replayed: Callable[[Path], Path]) -> Side:
     Raises
     ------
     BagError
-        The session cannot be replayed, or the folder lacks figures or has none that can be read.
+        The session cannot be replayed, or the folder is incomplete, lacks figures or has none that can be read.
     """
+    if holds_file(path / "summary.json") and (told := incompleteness(path)):
+        raise BagError(f"{path}: {told}")
     folder = path if holds_file(path / "summary.json") else replayed(path)
     scene, found = read(folder)
     try:
         with open_received(folder / "summary.json") as file:
             summary = json.load(file)
-        alarms = list(summary["alarms"])
+        alarms, told = list(summary["alarms"]), summary["output_sha256"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
+    bag = folder / "bag" / RESULT
+    if bag.is_file() and hashlib.sha256(bag.read_bytes()).hexdigest() != told:
+        raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")
     return Side(path.resolve().name, scene, found, alarms)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import gzip
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ..io.atomic import write_atomic
 from ..records import Array
 from ..scene.parts import Scene
 from .assembly import gravity_in_base
@@ -55,8 +57,10 @@ class Session:
             [f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0] for _, digits, values in self._columns()
         ]
         text += [",".join(row) for row in zip(*columns, strict=True)]
-        with path.open("wb") as file, gzip.GzipFile("", "wb", 9, file, mtime=0) as packed:
+        content = BytesIO()
+        with gzip.GzipFile("", "wb", 9, content, mtime=0) as packed:
             packed.write(("\n".join(text) + "\n").encode())
+        write_atomic(path, content.getvalue())
 
     def _columns(self) -> list[tuple[str, int, Array]]:
         """Name with unit, decimals and values of every column of the truth."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,7 +84,7 @@ class Company:
     """
 
     def __init__(self, out: Path, scene: str) -> None:
-        self._out, self._scene, self.recorded = out, scene, out / "recorded"
+        self._out, self._scene, self.recorded = out, scene, _free(out / "recorded")
         self._children: list[Child] = []
         self._is_asked_to_end = False
 
@@ -139,15 +139,19 @@ class Company:
                 stack.callback(child.end)
 
 
+def _free(folder: Path) -> Path:
+    """The folder, or with a number behind its name if it is there already."""
+    numbered = (folder.with_name(f"{folder.name}_{number}") for number in count(2))
+    return next(path for path in chain([folder], numbered) if not path.exists())
+
+
 @contextmanager
 def company(out: Path, origin: str, scene: str) -> Iterator[Company]:
-    """Node and recorder in a domain of their own, as long as this lasts; the recording of an earlier run is removed."""
+    """Node and recorder in a domain of their own, as long as this lasts; recordings of earlier runs stay."""
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     try:
         out.mkdir(parents=True, exist_ok=True)
-        if (out / "recorded").is_dir():
-            shutil.rmtree(out / "recorded")
     except OSError as error:
         raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
     running = Company(out, scene)

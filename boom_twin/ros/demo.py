@@ -14,12 +14,14 @@ from pathlib import Path
 from tqdm import tqdm
 
 from ..errors import BoomTwinError
+from ..io.atomic import write_atomic
 from ..io.reader import Session, scan
+from ..io.results import REPLAY, result_folder
 from ..io.session_model import scene_of
 from ..pictures import draw, history_of
 from ..received import holds_file, open_received
 from ..records import Stream
-from ..replay import Replay, replay
+from ..replay import Replay, replay_into
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
 from .require import require_rclpy
@@ -42,10 +44,13 @@ def main() -> int:
             sent, recorded = _play(session, args.duration, running), running.recorded
         if holds_file(args.bag / TRUTH):
             with open_received(args.bag / TRUTH) as truth:
-                (recorded / TRUTH).write_bytes(truth.read())
-        card, again = score(recorded), replay(recorded, None, args.out / "replay")
+                write_atomic(recorded / TRUTH, truth.read())
+        card = score(recorded)
+        with result_folder(args.out / "replay", REPLAY, [recorded]) as building:
+            again = replay_into(building, recorded, None)
+            pictures = [path.name for path in draw(again, history_of(again.recording, taken.scene), building.folder)]
         print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
-        for path in [recorded, *draw(again, history_of(again.recording, taken.scene), args.out)]:
+        for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
         return 0

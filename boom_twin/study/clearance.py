@@ -10,6 +10,7 @@ import numpy as np
 
 from ..analysis.march import march
 from ..errors import UsageError
+from ..io.atomic import write_atomic
 from ..plan.compile import compile_scene
 from ..scene.parts import IDEAL_BELOW, Scene
 from ..view.clearance import Sinking, Trace, sinking_picture, swing_picture
@@ -67,7 +68,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png", "_orbits.png")]
     write_json(paths[0], {"machine": machine(), **as_json(found)})
     text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
-    paths[1].write_text(text, encoding="utf-8")
+    write_atomic(paths[1], text)
     traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]
     swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
     sinking = [Sinking(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]

@@ -9,6 +9,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from ..io.atomic import write_atomic
 from ..scene.parts import Scene
 from ..view.work_precision import methods_picture, work_precision_picture
 from .error_cases import Case, Own, Peer, Stiff, own_cases, peer_cases, stiff_cases
@@ -42,7 +43,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     duel = _duel(problem, rows, QUICK_TURNS if quick else TURNS)
     paths = [out / name for name in ("error.json", "error.md", "error.png", "error_methods.png")]
     write_json(paths[0], _content(problem, rows, duel))
-    paths[1].write_text(report(problem, rows, duel), encoding="utf-8")
+    write_atomic(paths[1], report(problem, rows, duel))
     work_precision_picture(paths[2], "Error against run time", NOTE, main_panels(problem, rows))
     methods_picture(paths[3], "Methods of boom_twin: error against run time", NOTE, method_panels(scene, rows))
     return paths

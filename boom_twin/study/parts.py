@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SolverError
+from ..io.atomic import write_atomic
 from ..records import Array
 from ..scene.parts import Scene
 from ..view.parts import Bars, parts_picture
@@ -105,7 +106,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
     write_json(paths[0], {"machine": machine(), **as_json(found)})
-    paths[1].write_text(as_markdown(found), encoding="utf-8")
+    write_atomic(paths[1], as_markdown(found))
     parts_picture(paths[2], bars(found), NOTE)
     return paths
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..io.atomic import write_atomic
 from .machine import machine
 
 __all__ = ["machine", "provenance", "table", "write_json"]
@@ -31,7 +32,7 @@ def provenance(**more: object) -> str:
 def write_json(path: Path, content: Any) -> None:
     """Write a mapping or list as JSON, one line per innermost block; numbers that are not finite become null."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(_lines(_plain(content), "") + "\n", encoding="utf-8")
+    write_atomic(path, _lines(_plain(content), "") + "\n")
 
 
 def _text(value: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..io.atomic import write_atomic
 from ..scene.kinematics import posture_angles
 from ..scene.parts import Scene
 from ..view.stability_matrix import Line, matrix_picture
@@ -86,7 +87,7 @@ def write_files(
     """Write all files from what was found; `long_rows` are holds of a day, `move` tells of the scene's motion."""
     names = ("stability.json", "stability.md", "stability.png", "stability_roundoff.png")
     numbers, report, matrix, roundoff = (out / name for name in names)
-    report.write_text(text(rows, long_rows, limits, lost, turned, move), encoding="utf-8")
+    write_atomic(report, text(rows, long_rows, limits, lost, turned, move))
     write_json(numbers, _as_json(rows + long_rows, limits, lost, turned))
     lines = [Line(row.case.group, row.case.name, [mark(cell) for cell in row.cells.values()]) for row in rows]
     matrix_picture(matrix, "Where each method holds", list(rows[0].cells), lines)

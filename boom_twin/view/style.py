@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..io.atomic import write_atomic
 from ..records import Array
 
 if TYPE_CHECKING:
@@ -69,7 +71,9 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
             small: dict[str, Any] = {"fontsize": 13, "color": GREY, "style": "italic", "va": "top", "ha": "right"}
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(note, NOTE, placeholder=" .."), **small)
         yield figure
-        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+        content = BytesIO()
+        figure.savefig(content, dpi=DPI, metadata={"Software": None}, format=path.suffix[1:] or "png")
+    write_atomic(path, content.getvalue())
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:

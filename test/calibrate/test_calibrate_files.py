@@ -80,7 +80,7 @@ def test_it_overwrites_only_when_told(ran, source, capsys):
     assert main([*arguments, "--out", str(folder / "new.yaml")]) == 1
     assert "is there already. Name another file, or add --force" in capsys.readouterr().err
     assert main([*arguments, "--out", str(source), "--force"]) == 1
-    assert "this is the scene that is read" in capsys.readouterr().err
+    assert "this file is read. Name another one" in capsys.readouterr().err
 
 
 def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_path):

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+import resource
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -70,3 +74,40 @@ def test_a_bad_fault_is_told_before_anything_is_simulated(
     assert main(["rig", str(scene), "--out", str(tmp_path / "none"), "--fault", "joint_2.sensor:stuck"]) == 1
     assert "fault joint_2.sensor:stuck: the boom has joints, cylinders and sections 1 to 1." in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+def test_a_full_disk_leaves_nothing(scene: Path, tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    command = [sys.executable, "-m", "boom_twin.cli.main", "rig", str(scene), "--random", "up", "--duration", "3"]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path / "out")], capture_output=True, text=True, timeout=300, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000)),
+    )  # fmt: skip
+    fault = done.stderr.splitlines()[-1]
+    assert done.returncode == 1 and "cannot be written (File too large). Make room" in fault and "Traceback" not in done.stderr
+    assert not any(tmp_path.iterdir())
+
+
+def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for name in ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"):
+        (bag / name).write_bytes(b"recorded")
+    commands = [
+        ["rig", str(scene), "--random", "up", "--out", str(bag)],
+        ["recover", str(bag), "--out", str(bag)],
+        ["replay", str(scene), "--out", str(bag)],
+        ["calibrate", str(bag), "--out", str(bag / "metadata.yaml"), "--force"],
+        ["calibrate", str(bag), "--baseline", str(bag / "session.yaml"), "--force"],
+        ["simulate", str(scene), "--posture", "up", "--drive", "x.csv", "--out", str(bag / "session_0.mcap")],
+        ["simulate", str(scene), "--posture", "up", "--drive", str(scene), "--out", str(scene)],
+    ]
+    before = scene.read_bytes()
+    for command in commands:
+        assert main(command) == 1
+        words = capsys.readouterr().err
+        assert re.search("holds metadata.yaml|source|file of a recording|this file is read", words), (command, words)
+    assert {path.name: path.read_bytes() for path in bag.iterdir()} == dict.fromkeys(
+        ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), b"recorded"
+    )
+    assert scene.read_bytes() == before and [path.name for path in tmp_path.iterdir()] == ["bag"]

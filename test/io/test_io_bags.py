@@ -20,6 +20,7 @@ from boom_twin.errors import BagError, UsageError
 from boom_twin.io.bagmeta import read_metadata, write_metadata
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.reader import Session, read, scan
+from boom_twin.io.recover import recover
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import Qos, Topic, load_topics
 from boom_twin.io.typestore import jazzy
@@ -151,11 +152,16 @@ def test_little_waits_in_memory(tmp_path: Path) -> None:
     assert written > 0.7 * (tmp_path / "bag" / FILE_NAME).stat().st_size
 
 
-def test_a_run_that_fails_leaves_a_whole_bag(tmp_path: Path) -> None:
+def test_a_run_that_fails_leaves_no_bag_that_looks_whole(tmp_path: Path) -> None:
+    """What was written can be saved."""
     with pytest.raises(ZeroDivisionError), SessionWriter(tmp_path / "bag", {"point": POINT}) as bag:
         bag.write("point", 1, RosbagsTypes().make(POINT.type))
         raise ZeroDivisionError
-    assert scan(tmp_path / "bag").find("/boom_twin/tip/position").count == 1
+    assert not (tmp_path / "bag" / "metadata.yaml").exists()
+    with pytest.raises(BagError, match="incomplete: the end is missing"):
+        scan(tmp_path / "bag")
+    recover(tmp_path / "bag", tmp_path / "saved")
+    assert scan(tmp_path / "saved").find("/boom_twin/tip/position").count == 1
 
 
 def test_nothing_is_overwritten(bag: Path, arrays: dict[str, Any]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -79,8 +81,63 @@ def test_stray_stamps_are_dropped_and_told(tmp_path):
 
 
 def test_an_earlier_result_is_replaced_but_nothing_else(tmp_path):
+    """A folder that holds anything else than an earlier result stays as it is; without the other thing it is replaced."""
+    bag, out = session(tmp_path / "bag"), tmp_path / "out"
+    first = replay(bag, load_scene(), out).summary
+    (out / "notes.txt").write_text("keep me")
+    before = content_of(out)
+    with pytest.raises(BagError, match=r"holds notes\.txt, which replay did not write"):
+        replay(bag, load_scene(), out)
+    assert content_of(out) == before
+    (out / "notes.txt").unlink()
+    again = replay(bag, load_scene(), out, health=False).summary
+    assert again["output_sha256"] != first["output_sha256"]
+    assert {entry.name for entry in tmp_path.iterdir()} == {"bag", "out"}
+
+
+def content_of(folder):
+    """Bytes by path of all files."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("out", ["today", "today/bag", "today/bag/out"])
+def test_a_replay_never_touches_its_source(tmp_path, out):
+    today = tmp_path / "today"
+    bag = session(today / "bag")
+    (tmp_path / "link").symlink_to(tmp_path)
+    before = content_of(today)
+    for spelling in (tmp_path / out, tmp_path / "link" / out, tmp_path / "today" / ".." / out):
+        with pytest.raises(BagError, match="source"):
+            replay(bag, load_scene(), spelling)
+    assert content_of(today) == before and {entry.name for entry in tmp_path.iterdir()} == {"today", "link"}
+
+
+def test_a_recording_in_the_folder_is_kept(tmp_path):
+    """Also one that is named as the bag of a replay is."""
+    session(tmp_path / "out" / "bag")
+    before = content_of(tmp_path / "out")
+    with pytest.raises(BagError, match=r"out: holds bag/\. Choose a new folder"):
+        replay(session(tmp_path / "bag"), load_scene(), tmp_path / "out")
+    assert content_of(tmp_path / "out") == before
+
+
+def test_a_result_that_is_the_source_by_a_hard_link_is_kept(tmp_path):
     bag, out = session(tmp_path / "bag"), tmp_path / "out"
     replay(bag, load_scene(), out)
-    (out / "notes.txt").write_text("keep me")
-    replay(bag, load_scene(), out)
-    assert (out / "notes.txt").read_text() == "keep me"
+    (tmp_path / "other").mkdir()
+    os.link(out / "bag" / "session_0.mcap", tmp_path / "other" / "session_0.mcap")
+    with pytest.raises(BagError, match=r"its bag/session_0\.mcap is .*other.*never touched"):
+        replay(tmp_path / "other", load_scene(), out)
+
+
+def test_a_replay_that_fails_leaves_nothing_that_is_believed(tmp_path):
+    """An earlier result stays as it was; without one, nothing is there."""
+    good, bad, out = session(tmp_path / "good"), session(tmp_path / "bad", strokes=[5.0, 5.0, 5.0, 5.0]), tmp_path / "out"
+    with pytest.raises(BagError):
+        replay(bad, load_scene(), out)
+    assert not out.exists()
+    replay(good, load_scene(), out)
+    before = content_of(out)
+    with pytest.raises(BagError):
+        replay(bad, load_scene(), out)
+    assert content_of(out) == before and {entry.name for entry in tmp_path.iterdir()} == {"good", "bad", "out"}

@@ -17,6 +17,7 @@ pytest.importorskip("rclpy")
 
 from boom_twin.io.reader import scan
 from boom_twin.io.session import write_session
+from boom_twin.ros.company import company
 
 
 def test_a_short_demonstration(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
@@ -27,7 +28,7 @@ def test_a_short_demonstration(spawn: Callable[..., Any], bag: Path, tmp_path: P
     )
     sent, arrived = int(rows["stroke samples sent"]), int(rows["predictions received"])
     assert 0.98 * sent < arrived <= sent == pytest.approx(400, abs=1)
-    assert (tmp_path / "out" / "tip.png").stat().st_size > 10_000
+    assert (tmp_path / "out" / "replay" / "tip.png").stat().st_size > 10_000
     assert (tmp_path / "out" / "recorded" / "metadata.yaml").is_file()
 
 
@@ -69,3 +70,15 @@ def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[.
     began = time.monotonic()
     assert demo.end(60.0) == 1 and time.monotonic() - began < 15.0  # the recorder completes its files
     assert "monitor ended with -9" in demo.said()
+
+
+def test_recordings_of_earlier_demonstrations_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that somebody else put there."""
+    for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"):
+        monkeypatch.setenv(name, os.environ.get(name, ""))  # set anew by it, and put back after the test
+    (tmp_path / "recorded").mkdir()
+    (tmp_path / "recorded" / "session_0.mcap").write_bytes(b"a recording")
+    (tmp_path / "recorded_2").mkdir()
+    with company(tmp_path, "a test") as running:
+        assert running.recorded == tmp_path / "recorded_3"
+    assert (tmp_path / "recorded" / "session_0.mcap").read_bytes() == b"a recording"

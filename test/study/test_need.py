@@ -148,7 +148,7 @@ def test_options_of_need_alone_are_refused(option: str, capsys: pytest.CaptureFi
 def test_the_scene_that_is_read_is_not_written_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = str(tmp_path / "boom.yaml")
     assert main(["check", path, "--need", "tip=1mm", "--out", path]) == 1
-    assert "this is the scene that is read. Name another file." in capsys.readouterr().err
+    assert "this file is read. Name another one" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

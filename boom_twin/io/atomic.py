@@ -1,0 +1,101 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from tempfile import mkstemp
+
+from ..errors import BagError, UsageError
+
+DRAFT = ".draft"
+"""How the name of a file ends that is being written; it begins with a dot. A kill may leave one."""
+
+_RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
+_BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
+
+_umask = os.umask(0)
+os.umask(_umask)
+
+
+def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] = os.fsync) -> None:
+    """Write a file by way of a temporary one beside it, which is put on the disk and then renamed.
+
+    Whoever opens `path`, also after a kill or the loss of power, finds the old content or the new one. What is no
+    regular file (``/dev/stdout``, a pipe) is written to as it is; of a symbolic link, its target is replaced.
+
+    Parameters
+    ----------
+    path : Path
+    content : str or bytes
+        Text is encoded as UTF-8.
+    sync : callable, optional
+        Puts on the disk what has the descriptor that it is given.
+
+    Raises
+    ------
+    BagError
+        It cannot be written; `path` is then as it was.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        if path.exists() and not path.is_file():
+            with path.open("wb") as stream:
+                stream.write(data)
+            return
+        _replace(path.resolve(), data, sync)
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror}). Make room on the disk, or choose another place."
+        raise BagError(f"{path}: {reason}") from error
+
+
+def check_target(path: Path, sources: Sequence[Path]) -> None:
+    """Refuse to replace a file that is read, or one of a recording; to be asked before the work begins.
+
+    Raises
+    ------
+    UsageError
+        Names the file.
+    """
+    for source in sources:
+        if path.resolve() == source.resolve() or (path.exists() and source.exists() and path.samefile(source)):
+            raise UsageError(f"{path}: this file is read. Name another one to be written.")
+    if not path.is_file():
+        return
+    is_beside = any(entry.suffix in _RECORDINGS for entry in path.resolve().parent.iterdir())
+    if path.suffix in _RECORDINGS or (is_beside and path.name in _BESIDE_THEM):
+        raise UsageError(f"{path}: this is a file of a recording, and none is written over. Name another file.")
+
+
+def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
+    """Put the names in a folder on the disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        sync(handle)
+    finally:
+        os.close(handle)
+
+
+def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
+    handle, name = mkstemp(prefix=f".{path.name}.", suffix=DRAFT, dir=path.parent)
+    draft = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fchmod(stream.fileno(), _mode(path))
+            sync(stream.fileno())
+        draft.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            draft.unlink()
+        raise
+    sync_folder(path.parent, sync)
+
+
+def _mode(path: Path) -> int:
+    """The permissions of the file that is replaced, or those of a new one."""
+    return stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask

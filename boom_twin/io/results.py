@@ -1,0 +1,335 @@
+"""Folders of results: built beside their place, renamed when they are whole, replaced only by their own command.
+
+Beside ``OUT`` a command builds ``OUT.unfinished``. In it ``unfinished.json`` names the command; as long as one of the
+command's processes lives, that file is locked, so a second command is refused and what a killed one left is told from work
+in progress. When all is there, ``manifest.json`` lists every file with its SHA-256, and the folder is renamed to ``OUT``.
+An earlier result, which is what its manifest says and nothing else, is moved to ``OUT.replaced`` first and removed last:
+whenever a kill comes, one of the two is there whole, and the next run of the command puts its name right.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from hashlib import file_digest
+from pathlib import Path
+
+from ..errors import BagError
+from .atomic import DRAFT, sync_folder, write_atomic
+
+MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
+BUILDING, REPLACED = ".unfinished", ".replaced"
+"""What the names of the folders beside the result end with."""
+OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+"""Files that a file manager leaves where somebody looks."""
+_LARGEST = 2**20  # bytes of a manifest that is read
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a command writes.
+
+    Attributes
+    ----------
+    command : str
+    files : tuple of str
+        Patterns of the paths of its files in the folder.
+    is_replaced : bool
+        Whether a later run replaces it. If not, it is a recording: it keeps no manifest, and nothing replaces it.
+    """
+
+    command: str
+    files: tuple[str, ...]
+    is_replaced: bool
+
+    def has(self, name: str) -> bool:
+        """Whether a path is one of its files, or of its drafts of them."""
+        place, _, last = name.rpartition("/")
+        is_draft = last.startswith(".") and last.endswith(DRAFT) and place in ("", "bag")
+        return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
+
+
+_SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
+_RESULT_BAG = ("bag/session_0.mcap", "bag/metadata.yaml", "bag/session.yaml")
+_FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.*")
+REPLAY = Kind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
+RIG = Kind("rig", _SESSION, is_replaced=False)
+RECOVER = Kind("recover", _SESSION, is_replaced=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Building:
+    """A result that is being built: its folder, and the descriptor that holds the lock, for child processes to inherit."""
+
+    folder: Path
+    lock: int
+
+
+@contextmanager
+def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Building]:
+    """Build a folder of results; it becomes `out` when the block is left without an exception.
+
+    After an exception nothing of it is kept, and `out` is as it was.
+
+    Parameters
+    ----------
+    out : Path
+        Not there, empty, or an earlier result of the same command.
+    kind : Kind
+    sources : sequence of Path
+        What the command reads: none of it may lie in `out`, nor `out` in a session.
+
+    Raises
+    ------
+    BagError
+        `out` holds anything else, another command is at work on it, or it cannot be written.
+    """
+    place = out.resolve()
+    if not place.name or os.path.ismount(place):
+        raise BagError(f"{out}: results are built beside it, and it cannot be renamed. Name a folder inside it.")
+    if place.exists() and place.samefile(Path.cwd()):
+        raise BagError(f"{out}: is the current folder, which would be renamed. Name another, or go up by one.")
+    building, replaced = (place.with_name(place.name + end) for end in (BUILDING, REPLACED))
+    for folder in (place, building, replaced):
+        _check_apart(out, folder, sources)
+    with _locked(building, kind) as lock:
+        try:
+            _settle(place, replaced, kind)
+            _check_links(out, place, sources)
+            _clear(building, kind)
+            yield Building(building, lock)
+            _complete(building, kind)
+        except BaseException:
+            with suppress(OSError, BagError):
+                _clear(building, kind)
+                (building / UNFINISHED).unlink()
+                _remove_empty(building)
+            raise
+        _put_in_place(out, place, building, replaced, kind)
+
+
+def is_unfinished(folder: Path) -> bool:
+    """Whether a folder says that its results are not whole."""
+    return (folder / UNFINISHED).is_file() and not (folder / MANIFEST).is_file()
+
+
+# -- what may not be touched ------------------------------------------------------------------------------------------
+
+
+def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
+    """Refuse a folder that is, holds, or lies in what is read; by identity, whatever the spelling."""
+    for source in sources:
+        real = source.resolve()
+        session = real if real.is_dir() else real.parent
+        is_session = real.is_dir() or (session / "metadata.yaml").is_file()
+        if is_session and any(session.samefile(each) for each in (folder, *folder.parents) if each.exists()):
+            raise BagError(f"{out}: lies in the source, which is never touched. Choose a folder outside {session}.")
+        if folder.exists() and any(folder.samefile(each) for each in (real, *real.parents) if each.exists()):
+            raise BagError(f"{out}: {source} lies in {folder}, and a source is never touched. Choose another folder.")
+
+
+def _check_links(out: Path, place: Path, sources: Sequence[Path]) -> None:
+    """Refuse to remove a file that a source is a link to; `place` is an earlier result."""
+    own = {_identity(place / name): name for name in _entries(place)}
+    for source in sources:
+        for file in [source, *(source.iterdir() if source.is_dir() else ())]:
+            if file.exists() and (name := own.get(_identity(file))) is not None:
+                raise BagError(f"{out}: its {name} is {file}, and a source is never touched. Choose another folder.")
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    found = path.stat() if path.exists() else path.lstat()
+    return found.st_dev, found.st_ino
+
+
+def _check_earlier(folder: Path, kind: Kind) -> None:
+    """Refuse a folder that is neither empty nor a result of the same command, as it was written."""
+    if folder.exists() and not folder.is_dir():
+        raise BagError(f"{folder}: is no folder. Choose another name.")
+    entries = _entries(folder)
+    if not entries:
+        return
+    remedy = "Choose a new folder, or move it away: nothing else than an earlier result of the same command is replaced"
+    command, listed = _manifest(folder)
+    if not kind.is_replaced or command != kind.command:
+        raise BagError(f"{folder}: holds {entries[0]}. {remedy}; a result of version 0.1.0 does not say that it is one.")
+    folders = {str(parent) + "/" for name in listed for parent in Path(name).parents}
+    for name in entries:
+        if name not in listed and name not in folders and name not in (MANIFEST, UNFINISHED):
+            raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
+        if name in listed and _sha256(folder / name) != listed[name]:
+            raise BagError(f"{folder}: {name} was changed since {command} wrote it. {remedy}.")
+
+
+def _entries(folder: Path) -> list[str]:
+    """Paths of all files in a folder, and of its folders with a slash behind, without files of the system."""
+    found: list[str] = []
+    for place, folders, files in os.walk(folder):
+        inside = Path(place).relative_to(folder)
+        links = [name for name in folders if (Path(place) / name).is_symlink()]
+        found += [(inside / name).as_posix() for name in (*files, *links) if name not in OF_THE_SYSTEM]
+        found += [f"{(inside / name).as_posix()}/" for name in folders if name not in links]
+    return sorted(found)
+
+
+def _manifest(folder: Path) -> tuple[str, dict[str, str]]:
+    """Command, and SHA-256 by file, of a result that is complete or was being removed; empty where nothing tells."""
+    for name in (MANIFEST, UNFINISHED):
+        try:
+            content = json.loads((folder / name).read_bytes()[:_LARGEST])
+            return str(content["command"]), {str(name): str(digest) for name, digest in content["files"].items()}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            continue
+    return "", {}
+
+
+def _sha256(path: Path) -> str:
+    if path.is_symlink() or not path.is_file():
+        return ""
+    with path.open("rb") as stream:
+        return file_digest(stream, "sha256").hexdigest()
+
+
+# -- building ---------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _locked(building: Path, kind: Kind) -> Iterator[int]:
+    """The folder to build in, which is made, locked and marked as unfinished."""
+    marker = building / UNFINISHED
+    try:
+        building.parent.mkdir(parents=True, exist_ok=True)
+        if building.is_symlink():
+            raise BagError(f"{building}: is a link, and results are built there. Move it away.")
+        building.mkdir(exist_ok=True)
+        _check_left(building, kind)
+        lock = os.open(marker, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise BagError(f"{building}: cannot be made ({error.strerror}). Choose a folder that can be written.") from None
+    try:
+        if not _is_taken(lock, marker):
+            busy = f"another `boom_twin {kind.command}` is at work there. Wait for its end, or choose another folder."
+            raise BagError(f"{building}: {busy}")
+        _check_left(building, kind)
+        note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
+        os.truncate(lock, 0)
+        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
+        os.fsync(lock)
+        yield lock
+    finally:
+        os.close(lock)
+
+
+def _is_taken(lock: int, marker: Path) -> bool:
+    """Lock the open marker; False if another process has it, or it was renamed or removed meanwhile."""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return os.path.samestat(marker.stat(), os.fstat(lock))
+    except (BlockingIOError, FileNotFoundError):
+        return False
+    except OSError as error:
+        raise BagError(f"{marker}: cannot be locked ({error.strerror}). Choose another disk.") from None
+
+
+def _check_left(building: Path, kind: Kind) -> None:
+    """Refuse what no killed run of the same command can have left."""
+    entries = _entries(building)
+    remedy = "Move it away, or choose another folder: results are built there"
+    if entries and entries != [UNFINISHED] and _command(building) != kind.command:
+        raise BagError(f"{building}: holds {entries[0]}, and no unfinished {kind.command} left it. {remedy}.")
+    for name in entries:
+        if not (kind.has(name) or name in (MANIFEST, UNFINISHED, "bag/")):
+            raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
+
+
+def _command(building: Path) -> str:
+    """The command that left an unfinished result; empty if it does not say."""
+    try:
+        return str(json.loads((building / UNFINISHED).read_bytes()[:_LARGEST])["command"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return ""
+
+
+def _clear(building: Path, kind: Kind) -> None:
+    """Take away what a run has written, the manifest first, but not the marker."""
+    _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
+
+
+def _remove(folder: Path, names: Sequence[str]) -> None:
+    """Remove files by name, then the folders inside that are empty."""
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+    for inner in reversed([name for name in _entries(folder) if name.endswith("/")]):
+        _remove_empty(folder / inner)
+
+
+def _remove_empty(folder: Path) -> None:
+    """Remove a folder that holds nothing but files of the system; another is left as it is."""
+    with suppress(OSError):
+        if not _entries(folder):
+            for name in OF_THE_SYSTEM:
+                (folder / name).unlink(missing_ok=True)
+            folder.rmdir()
+
+
+# -- completing -------------------------------------------------------------------------------------------------------
+
+
+def _complete(building: Path, kind: Kind) -> None:
+    """Put all on the disk, then list it in the manifest."""
+    files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
+    for name in files:
+        if not kind.has(name):
+            raise BagError(f"{building}: holds {name}, which {kind.command} does not write. Move it away, and run it again.")
+        with (building / name).open("rb") as stream:
+            os.fsync(stream.fileno())
+    for folder in {(building / name).parent for name in files}:
+        sync_folder(folder)
+    content = {"command": kind.command, "files": {name: _sha256(building / name) for name in files}}
+    write_atomic(building / MANIFEST, json.dumps(content, indent=1) + "\n")
+
+
+def _settle(place: Path, replaced: Path, kind: Kind) -> None:
+    """Put right what a kill left between two renames; refuse a place that is not free."""
+    _check_earlier(replaced, kind)
+    if replaced.exists() and not place.exists():
+        replaced.rename(place)
+    _check_earlier(place, kind)
+    _discard(replaced)
+
+
+def _discard(folder: Path) -> None:
+    """Remove an earlier result: its manifest becomes the mark of something unfinished, which goes last."""
+    with suppress(FileNotFoundError):
+        (folder / MANIFEST).rename(folder / UNFINISHED)
+    _, listed = _manifest(folder)
+    _remove(folder, [name for name in _entries(folder) if name in listed])
+    (folder / UNFINISHED).unlink(missing_ok=True)
+    _remove_empty(folder)
+
+
+def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: Kind) -> None:
+    """Rename a whole result to its place."""
+    try:
+        _check_earlier(place, kind)  # again: somebody may have put something there meanwhile
+        if place.exists():
+            place.rename(replaced)
+        try:
+            building.rename(place)
+        except OSError:
+            if replaced.exists():
+                replaced.rename(place)
+            raise
+        sync_folder(place.parent)
+    except (OSError, BagError) as error:
+        reason = str(error) if isinstance(error, BagError) else f"{out}: cannot be replaced ({error.strerror})."
+        raise BagError(f"{reason} The result is whole, and is kept in {building}.") from None
+    _discard(replaced)
+    (place / UNFINISHED).unlink()
+    if not kind.is_replaced:
+        (place / MANIFEST).unlink()

@@ -1,0 +1,235 @@
+"""Folders of results: what a kill at every single step leaves, who may write where, and that files are whole or old."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from boom_twin.errors import BagError, UsageError
+from boom_twin.io.atomic import check_target, write_atomic
+from boom_twin.io.incomplete import incompleteness
+from boom_twin.io.results import REPLAY, RIG, Kind, result_folder
+
+FILES = ("summary.json", "quantities.json", "bag/session_0.mcap")
+CHANGING = ("open", "mkdir", "rename", "replace", "unlink", "rmdir", "fsync", "pwrite", "truncate")
+"""What a program calls to change a disk."""
+
+
+def run(out: Path, content: str, steps: int = -1) -> int:
+    """A process that writes a result, ended by SIGKILL before its step of that number; its exit code."""
+    if child := os.fork():
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    left = iter(range(steps, -2, -1) if steps >= 0 else count(1))
+
+    def counted(act: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            if next(left) == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return act(*arguments, **options)
+
+        return call
+
+    try:
+        for name in CHANGING:
+            setattr(os, name, counted(getattr(os, name)))
+        with result_folder(out, REPLAY, []) as building:
+            (building.folder / "bag").mkdir()
+            for name in FILES:
+                write_atomic(building.folder / name, name + content)
+        os._exit(0)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
+
+
+def content_of(folder: Path) -> str | None:
+    """The word that all files of a whole result have behind their names."""
+    if not folder.exists():
+        return None
+    assert set(json.loads((folder / "manifest.json").read_text())["files"]) == set(FILES)
+    (word,) = {(folder / name).read_text().removeprefix(name) for name in FILES}
+    return word
+
+
+def test_a_kill_at_any_step_leaves_a_whole_result_or_one_that_says_it_is_not(tmp_path: Path) -> None:
+    """Every step of replacing an earlier result, one after the other; the next run puts all in order."""
+    for steps in range(200):
+        out = tmp_path / str(steps) / "out"
+        beside = [out.with_name(f"out.{name}") for name in ("unfinished", "replaced")]
+        assert run(out, "old") == 0
+        code = run(out, "new", steps)
+        assert code in (0, -signal.SIGKILL)
+        found = [content_of(folder) for folder in (out, beside[1]) if (folder / "manifest.json").exists()]
+        whole = content_of(beside[0]) if (beside[0] / "manifest.json").exists() else None
+        assert content_of(out) in ("old", "new") or ("old" in found and whole == "new"), steps
+        for folder in beside:
+            if folder.exists() and not (folder / "manifest.json").exists() and any(folder.iterdir()):
+                assert incompleteness(folder).startswith("incomplete") and incompleteness(folder / "bag"), steps
+        assert not incompleteness(out)
+        assert run(out, "next") == 0 and content_of(out) == "next"
+        assert {path.name for path in out.parent.iterdir()} == {"out"}, steps
+        if code == 0:
+            assert steps > 40
+            return
+    pytest.fail("it took more steps than were tried")
+
+
+def build(out: Path, kind: Kind = REPLAY, sources: tuple[Path, ...] = (), name: str = "summary.json") -> None:
+    with result_folder(out, kind, sources) as building:
+        write_atomic(building.folder / name, "{}")
+
+
+def test_the_second_of_two_is_refused_at_once_and_a_killed_one_is_not_waited_for(tmp_path: Path) -> None:
+    with result_folder(tmp_path / "out", REPLAY, []):
+        before = sorted(tmp_path.rglob("*"))
+        with pytest.raises(BagError, match=r"out\.unfinished: another `boom_twin replay` is at work there"):
+            build(tmp_path / "out")
+        assert sorted(tmp_path.rglob("*")) == before
+    build(tmp_path / "out")
+
+
+def test_the_lock_lasts_as_long_as_a_child_that_inherits_it(tmp_path: Path) -> None:
+    """A writer that outlives its killed command must have ended before its folder is used again."""
+    with pytest.raises(KeyboardInterrupt), result_folder(tmp_path / "out", REPLAY, []) as building:
+        pipe = subprocess.PIPE
+        child = subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=pipe, pass_fds=[building.lock])
+        os.rename(building.folder, tmp_path / "kept")  # as if this process had no time to clean up
+        raise KeyboardInterrupt
+    os.rename(tmp_path / "kept", tmp_path / "out.unfinished")
+    with pytest.raises(BagError, match="at work there"):
+        build(tmp_path / "out")
+    child.communicate(b"\n", timeout=60)
+    build(tmp_path / "out")
+
+
+def recording(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "session_0.mcap").write_bytes(b"a recording")
+
+
+def old_result(folder: Path) -> None:
+    """As version 0.1.0 wrote it."""
+    recording(folder / "bag")
+    (folder / "summary.json").write_text("{}")
+
+
+def changed(folder: Path) -> None:
+    build(folder)
+    (folder / "summary.json").write_text("{} ")
+
+
+def listed_only(folder: Path) -> None:
+    """A manifest that speaks of files elsewhere, and not of the one that is there."""
+    recording(folder)
+    listed = {"../precious": "", "session_0.mcap": "00"}
+    (folder / "manifest.json").write_text(json.dumps({"command": "replay", "files": listed}))
+
+
+FOREIGN: dict[str, Callable[[Path], Any]] = {
+    "a recording": recording,
+    "a recording in bag": lambda folder: recording(folder / "bag"),
+    "a result of 0.1.0": old_result,
+    "an empty folder inside": lambda folder: (folder / "notes").mkdir(parents=True),
+    "a hidden file": lambda folder: (build(folder), (folder / ".hidden").write_text("")),
+    "a link": lambda folder: (build(folder), (folder / "link").symlink_to("/")),
+    "a result that was edited": changed,
+    "another command's": lambda folder: build(folder, RIG, name="session_0.mcap"),
+    "a manifest that lies": listed_only,
+    "a manifest of another shape": lambda folder: (folder.mkdir(), (folder / "manifest.json").write_text("[[]]")),
+}
+
+
+@pytest.mark.parametrize("place", ["out", "out.unfinished", "out.replaced"])
+@pytest.mark.parametrize("make", FOREIGN.values(), ids=FOREIGN)
+def test_nothing_but_an_earlier_result_is_replaced(tmp_path: Path, make: Callable[[Path], Any], place: str) -> None:
+    (tmp_path / "precious").write_text("never touched")
+    make(tmp_path / place)
+
+    def state() -> dict[Path, bytes | None]:
+        return {path: path.read_bytes() if path.is_file() else None for path in tmp_path.rglob("*")}
+
+    before = state()
+    with pytest.raises(BagError, match=rf"{place}: "):
+        build(tmp_path / "out")
+    assert state() == before
+
+
+def test_a_recording_in_what_a_killed_run_left_is_kept(tmp_path: Path) -> None:
+    assert run(tmp_path / "out", "old", 12) == -signal.SIGKILL
+    recording(tmp_path / "out.unfinished" / "mine")
+    with pytest.raises(BagError, match=r"out\.unfinished: holds mine/, which replay does not write"):
+        build(tmp_path / "out")
+    assert (tmp_path / "out.unfinished" / "mine" / "session_0.mcap").read_bytes() == b"a recording"
+
+
+def test_no_source_is_built_over(tmp_path: Path) -> None:
+    """Nor what the name of the result leads to beside it."""
+    recording(tmp_path / "out.unfinished")
+    (tmp_path / "out.unfinished" / "unfinished.json").write_text('{"command": "rig"}')
+    with pytest.raises(BagError, match="source"):
+        build(tmp_path / "out", RIG, (tmp_path / "out.unfinished",), "session_0.mcap")
+    with pytest.raises(BagError, match="source"):
+        build(tmp_path, RIG, (tmp_path / "out.unfinished" / "session_0.mcap",), "session_0.mcap")
+
+
+def test_a_result_that_cannot_be_put_in_place_is_kept_and_told(tmp_path: Path) -> None:
+    with (
+        pytest.raises(BagError, match=r"holds notes\.txt.*The result is whole, and is kept in .*out\.unfinished"),
+        result_folder(tmp_path / "out", REPLAY, []) as building,
+    ):
+        write_atomic(building.folder / "summary.json", "{}")
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out" / "notes.txt").write_text("mine")
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "out.unfinished" / "manifest.json").is_file()
+
+
+def test_a_session_keeps_no_manifest_and_is_not_replaced(tmp_path: Path) -> None:
+    build(tmp_path / "out", RIG, name="session_0.mcap")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["session_0.mcap"]
+    with pytest.raises(BagError, match=r"out: holds session_0\.mcap"):
+        build(tmp_path / "out", RIG, name="session_0.mcap")
+
+
+def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text("old")
+    path.chmod(0o640)
+    (tmp_path / "link").symlink_to(path)
+
+    def fail(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(BagError, match=r"scene\.yaml: cannot be written \(No space left on device\)\. Make room"):
+        write_atomic(path, "new", sync=fail)
+    assert path.read_text() == "old"
+    write_atomic(tmp_path / "link", "new")
+    assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o640 and (tmp_path / "link").is_symlink()
+    write_atomic(Path("/dev/null"), "anything")
+    assert not Path("/dev/null").is_file() and {each.name for each in tmp_path.iterdir()} == {"scene.yaml", "link"}
+
+
+def test_files_that_are_read_and_files_of_recordings_are_no_targets(tmp_path: Path) -> None:
+    recording(tmp_path / "bag")
+    for name in ("metadata.yaml", "session.yaml"):
+        (tmp_path / "bag" / name).write_text("")
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("")
+    os.link(scene, tmp_path / "same.yaml")
+    for path in (scene, tmp_path / "same.yaml"):
+        with pytest.raises(UsageError, match="this file is read"):
+            check_target(path, [scene])
+    for path in (tmp_path / "bag").iterdir():
+        with pytest.raises(UsageError, match="file of a recording"):
+            check_target(path, [])
+    check_target(tmp_path / "metadata.yaml", [scene])

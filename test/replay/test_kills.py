@@ -1,0 +1,25 @@
+"""Twenty SIGKILLs at random moments over the commands that write; `test/bench/kills.py` does as many as are wanted."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from bench.kills import kills
+
+
+@pytest.mark.parametrize(("command", "count", "needs"), [("replay", 8, "numpy"), ("rig", 5, "exudyn"), ("record", 7, "rclpy")])
+def test_kills(command: str, count: int, needs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip(needs)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "158")
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    seed = time.time_ns() % 10**6
+    print(f"seed {seed}")
+    assert kills(command, count, tmp_path, seed).total() == count
+
+
+@pytest.mark.slow
+def test_kills_of_calibrate(tmp_path: Path) -> None:
+    pytest.importorskip("exudyn")
+    assert kills("calibrate", 5, tmp_path, time.time_ns() % 10**6).total() == 5

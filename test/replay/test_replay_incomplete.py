@@ -1,0 +1,212 @@
+"""Replays whose processes are killed, and what is made of sessions and results that are not whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.io import behind
+from boom_twin.io.pipe import END, Pipe
+from boom_twin.io.reader import scan
+from boom_twin.io.results import REPLAY, result_folder
+from boom_twin.io.session import write_session
+from boom_twin.monitor.bag import bag_feed
+from boom_twin.replay import replay_into
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.settings import Settings
+
+START, STEP = 1_700_000_000_000_000_000, 5_000_000
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """15 s of a boom at rest: long enough to be killed in the midst of them."""
+    still = np.tile(strokes_of_posture(load_scene(), "arch"), (3000, 1))
+    folder = tmp_path_factory.mktemp("session") / "bag"
+    write_session(folder, START + STEP * np.arange(3000), still, np.zeros_like(still), None, {"origin": "synthetic, a test"})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def killed(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder beside its result that a replay leaves when it is killed while its writer writes."""
+    out = tmp_path_factory.mktemp("killed") / "out"
+    command = [sys.executable, "-m", "boom_twin.cli.main", "replay", str(session), "--out", str(out)]
+    with (out.parent / "log").open("w") as log:
+        child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+    file, end = out.with_name("out.unfinished") / "bag" / "session_0.mcap", time.monotonic() + 240.0
+    while not file.exists() or file.stat().st_size < 200_000:
+        assert child.poll() is None and time.monotonic() < end, (out.parent / "log").read_text()
+        time.sleep(0.01)
+    child.kill()
+    child.wait()
+    wait_for_group(child.pid)
+    assert not out.exists()
+    return file.parents[1]
+
+
+def wait_for_group(leader: int) -> None:
+    """Until all processes of a group have gone."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        try:
+            os.killpg(leader, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.02)
+    pytest.fail("children of a killed replay go on")
+
+
+def test_a_killed_replay_says_so(killed: Path, session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its writer did not take the end of the pipe for the end of the session."""
+    assert not (killed / "bag" / "metadata.yaml").exists() and not (killed / "summary.json").exists()
+    with pytest.raises(BagError, match=r"incomplete: the end is missing.*incomplete: .*unfinished\.json"):
+        scan(killed / "bag")
+    for command in (["info", killed / "bag"], ["compare", killed, session], ["monitor", "--bag", killed / "bag"]):
+        assert main([str(part) for part in command]) == 1
+        assert "incomplete" in capsys.readouterr().err
+
+
+def test_a_bag_that_is_whole_in_a_result_that_is_not_says_so(
+    killed: Path, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As when the kill comes between the bag and the figures; figures alone are not believed either."""
+    unfinished = tmp_path / "out.unfinished"
+    write_session(unfinished / "bag", START + STEP * np.arange(9), np.zeros((9, 1)), np.zeros((9, 1)), None, {})
+    assert main(["info", str(unfinished / "bag")]) == 0
+    assert "incomplete" not in capsys.readouterr().out
+    (unfinished / "unfinished.json").write_bytes((killed / "unfinished.json").read_bytes())
+    assert main(["info", str(unfinished / "bag")]) == 0
+    assert "state      incomplete: " in capsys.readouterr().out
+    assert main(["info", "--json", str(unfinished / "bag" / "session_0.mcap")]) == 0
+    assert json.loads(capsys.readouterr().out)["incomplete"].startswith("incomplete: ")
+    for name, text in (("summary.json", '{"alarms": [], "output_sha256": ""}'), ("quantities.json", "{}")):
+        (unfinished / name).write_text(text)
+    assert main(["compare", str(unfinished), str(session)]) == 1
+    assert "incomplete" in capsys.readouterr().err
+
+
+def test_the_next_replay_takes_the_place_of_the_killed_one(killed: Path, session: Path) -> None:
+    out = killed.with_name("out")
+    replay(session, load_scene(), out, health=False)
+    assert (out / "summary.json").is_file() and not killed.exists()
+
+
+def test_figures_of_another_bag_are_not_compared(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Version 0.1.0 left the summary of an earlier replay beside the bag of one that was killed."""
+    out = tmp_path / "out"
+    assert main(["replay", str(session), "--out", str(out), "--no-pictures", "--no-health"]) == 0
+    for name in ("manifest.json", "bag/metadata.yaml"):
+        (out / name).unlink()
+    with (out / "bag" / "session_0.mcap").open("r+b") as file:
+        file.truncate(1000)
+    assert main(["compare", str(out), str(out)]) == 1
+    assert "summary.json is not of the bag beside it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("which", ["ahead", "behind"])
+def test_a_process_of_a_replay_that_dies_is_an_error(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
+) -> None:
+    """Never a short session, whatever the exit code of the process says."""
+    started: dict[str, Pipe] = {}
+    begin = Pipe.__init__
+
+    def kept(pipe: Pipe, module: str, *arguments: str, **options: Any) -> None:
+        begin(pipe, module, *arguments, **options)
+        started[module.rsplit(".", 1)[1]] = pipe
+
+    monkeypatch.setattr(Pipe, "__init__", kept)
+
+    def killing(samples: Any, total: int) -> Any:
+        for number, sample in enumerate(samples):
+            if number == 500:
+                os.kill(started[which]._process.pid, signal.SIGKILL)
+            yield sample
+
+    with pytest.raises(BagError, match="ended from outside"):
+        replay(session, load_scene(), tmp_path / "out", progress=killing, health=False)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_pipe_that_breaks_off_is_no_end() -> None:
+    """Also where the process says that all is well."""
+    pipe = Pipe("boom_twin.io.ahead")
+    pipe._process.kill()
+    pipe._process.wait()
+    pipe._process.returncode = 0
+    with pytest.raises(BagError, match="incomplete: a process of the replay was ended from outside"):
+        list(pipe.receive())
+
+
+@pytest.mark.parametrize("is_told", [True, False], ids=["end told", "end not told"])
+def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path, is_told: bool) -> None:
+    from boom_twin.io.topics import load_topics
+
+    pipe = Pipe(behind.__name__, str(tmp_path / "bag"))
+    pipe.send(({}, load_topics().outputs, load_scene(), Settings()))
+    pipe.wait_ready()
+    if is_told:
+        pipe.send(END)
+        pipe.finish()
+    else:
+        with pytest.raises(BagError, match="incomplete: a process of the replay was ended from outside"):
+            pipe.finish()
+    assert (tmp_path / "bag" / "metadata.yaml").exists() is is_told
+
+
+def unended(bag: Path) -> Path:
+    """The session as a recorder leaves it that was killed after its last file was complete."""
+    (bag / "session.yaml").write_text("boom_twin: 0.1.0\nstarted: 2026-01-02T03:04:05+00:00\nscene: |\n  ended: no\n")
+    return bag
+
+
+def test_a_recording_that_tells_no_end_is_incomplete_wherever_it_is_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    still = np.tile(strokes_of_posture(load_scene(), "arch"), (200, 1))
+    stamps = START + STEP * np.arange(200)
+    write_session(tmp_path / "bag", stamps, still, np.zeros_like(still), None, {"origin": "a test"})
+    bag = unended(tmp_path / "bag")
+    assert main(["info", str(bag)]) == 0
+    assert "state      incomplete: the recorder was ended by force" in capsys.readouterr().out
+    assert main(["replay", str(bag), "--out", str(tmp_path / "out"), "--no-pictures", "--no-health"]) == 0
+    assert "warning: " in (words := capsys.readouterr().err) and "incomplete: the recorder was ended by force" in words
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["session_incomplete"].startswith("incomplete: ")
+    assert "INCOMPLETE" in bag_feed(bag, load_scene(), Settings()).title
+    assert main(["recover", str(bag), "--out", str(tmp_path / "saved")]) == 0
+    assert scan(tmp_path / "saved").incomplete == ""
+    with (bag / "session.yaml").open("a") as sheet:
+        sheet.write("ended: 2026-01-02T03:05:05+00:00\n")
+    assert scan(bag).incomplete == ""
+
+
+def test_a_full_disk_leaves_one_line_and_an_earlier_result(session: Path, tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    out = tmp_path / "out"
+    with result_folder(out, REPLAY, [session]) as building:
+        replay_into(building, session, load_scene(), health=False)
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    command = [sys.executable, "-m", "boom_twin.cli.main", "replay", str(session), "--out", str(out), "--no-health"]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000)),
+    )  # fmt: skip
+    (fault,) = [line for line in done.stderr.splitlines() if line.startswith("boom_twin replay: ")]
+    assert done.returncode == 1 and "cannot be written (File too large). Make room" in fault and "Traceback" not in done.stderr
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
