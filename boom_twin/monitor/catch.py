@@ -113,6 +113,7 @@ class Catch:
 
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
+        self._store.check(table, columns)
         step = self._order.put(table, Row(stamp, columns, values))
         if step.is_set_back:
             self._store.clear()

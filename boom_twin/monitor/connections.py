@@ -21,9 +21,7 @@ from .door import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
 REQUEST_TIME = 5.0
-"""Seconds that a connection may take for its first whole request."""
-IDLE_TIME = 15.0
-"""Seconds that it may stay open after an answer, without a further whole request."""
+"""Seconds that a connection may take for its first whole request, and for each further one."""
 LONGEST = 200
 """Characters of what the log says of one."""
 MOST, MOST_OF_ONE = 256, 64
@@ -107,7 +105,7 @@ class Connection(web.RequestHandler):
 
     def __init__(self, server: web.Server, everyone: Connections) -> None:
         loop = asyncio.get_running_loop()
-        how: dict[str, Any] = {"keepalive_timeout": IDLE_TIME, "lingering_time": 0.0, "auto_decompress": False}
+        how: dict[str, Any] = {"keepalive_timeout": REQUEST_TIME, "lingering_time": 0.0, "auto_decompress": False}
         super().__init__(server, loop=loop, access_log=None, **how)  # type: ignore[arg-type]
         self._all, self.address = everyone, ""
         self._link: asyncio.Transport | None = None

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..printable import printable
 
-LOG = logging.getLogger("boom_twin.monitor")
+LOG = logging.getLogger("boom_twin.monitor.dropped")
 LONGEST = 200
 """Characters of a reason."""
 
@@ -58,5 +58,5 @@ class Dropped:
     def _add(self, topic: str, reason: str) -> None:
         loss = self.by_topic.setdefault(topic, Loss(topic, 0, ""))
         loss.count, loss.reason = loss.count + 1, printable(reason[:LONGEST], keep="")
-        LOG.warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)
+        LOG.getChild(topic).warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)
 

@@ -8,7 +8,7 @@ import time
 
 PERIOD = 10.0
 """Seconds."""
-MOST = 5
+MOST = 3
 """Records of one logger written in a `PERIOD`."""
 
 
@@ -35,4 +35,4 @@ def write_log() -> None:
     """Write warnings of all loggers of this process to its standard error, as many as `Limit` lets through."""
     handler = logging.StreamHandler(sys.stderr)
     handler.addFilter(Limit())
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s", handlers=[handler])
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -56,13 +56,18 @@ class Store:
         return (stamp - self.epoch) * NANO
 
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row to a table, made by its first one; MalformedError if it has other columns than that."""
+        """Add a row to a table, made by its first one."""
+        self.check(name, columns)
         table = self.tables.get(name)
         if table is None:
             table = self.tables[name] = Table(name, columns, self._capacity)
-        elif table.columns != tuple(columns):
-            raise MalformedError(_difference(table.columns, columns))
         table.append(self.time(stamp), values)
+
+    def check(self, name: str, columns: Sequence[str]) -> None:
+        """Raise MalformedError if a table has other columns than these."""
+        table = self.tables.get(name)
+        if table is not None and table.columns != tuple(columns):
+            raise MalformedError(_difference(table.columns, columns))
 
     @property
     def newest(self) -> float:

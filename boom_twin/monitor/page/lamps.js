@@ -59,7 +59,7 @@ export class Lamps {
   showDropped(dropped) {
     this.dropped.hidden = !dropped.length;
     const lines = dropped.slice(0, LOSSES).map(({ topic, count, reason }) => `<span>${escape(topic)}: ${count}, the last because: ${escape(reason)}</span>`);
-    const more = dropped.length > LOSSES ? `<span>and of ${dropped.length - LOSSES} more topics</span>` : "";
+    const more = dropped.length > LOSSES ? `<span>topics not listed here: ${dropped.length - LOSSES}</span>` : "";
     const words = dropped.length ? `<b>▲ ${dropped.reduce((sum, { count }) => sum + count, 0)} messages dropped</b>${lines.join("")}${more}` : "";
     if (this.words !== words) this.dropped.innerHTML = this.words = words;
   }
