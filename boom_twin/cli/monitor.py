@@ -8,6 +8,7 @@ from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from errno import EADDRINUSE
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,8 +24,8 @@ ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
 NICE = 5
 """By how much it gives way to the node on the same machine."""
 
-BACKLOG = 16
-"""Connections that may wait to be taken; the kernel turns away more before they cost the node's machine anything."""
+BACKLOG = 128
+"""Connections that may wait to be taken; the kernel turns away more."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -56,9 +57,11 @@ def run(args: Namespace) -> int:
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     from ..monitor.desk import Desk
+    from ..monitor.log import write_log
     from ..monitor.recording import Recording
 
     _give_way()
+    write_log()
     recording = Recording(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
         with _feed(args) as feed:
@@ -131,6 +134,9 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
 
     from aiohttp import web
 
+    from ..monitor.connections import Connections
+    from ..monitor.door import in_address
+
     stopped = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
@@ -138,23 +144,26 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
         asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)
     runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()
+    assert runner.server is not None
     try:
-        await _listen(runner, args.host, args.port)
-        port = runner.addresses[0][1]
-        address = f"http://{args.host}:{port}/" + (f"?token={token}" if token else "")
+        listener = await _listen(Connections(runner.server), args.host, args.port)
+        port = listener.sockets[0].getsockname()[1]
+        address = f"http://{in_address(args.host)}:{port}/" + (f"?token={token}" if token else "")
         print(f"open {address}   (Ctrl-C ends it)", file=sys.stderr, flush=True)
         await stopped.wait()
+        listener.close()
     finally:
         await runner.cleanup()
 
 
-async def _listen(runner: Any, host: str, port: int | None) -> None:
+async def _listen(connections: Any, host: str, port: int | None) -> Any:
     """At `port`; without one at the usual one, or at any if that is taken."""
-    from aiohttp import web
+    import asyncio
 
+    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=BACKLOG)
     try:
-        await web.TCPSite(runner, host, PORT if port is None else port, backlog=BACKLOG).start()
+        return await listen(PORT if port is None else port)
     except OSError as error:
         if port is not None or error.errno != EADDRINUSE:
             raise
-        await web.TCPSite(runner, host, 0, backlog=BACKLOG).start()
+        return await listen(0)

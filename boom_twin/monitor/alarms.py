@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import nan
 
 from .. import records
+from .checks import text
 from .lamps import HEALTH, Board, Lamp, Level
 
 MOST = 500
@@ -79,7 +80,7 @@ class Alarms:
         lasting: dict[tuple[str, int], Alarm] = {}
         for found in told:
             key = found.channel, found.since
-            alarm = self._judged.pop(key, None) or self._keep(Alarm(self._next(), found.channel, Level.WARN, "", 0.0))
+            alarm = self._judged.pop(key, None) or self._keep(Alarm(self._next(), text(found.channel), Level.WARN, "", 0.0))
             _renew(alarm, found, time)
             if found.until is None:
                 lasting[key] = alarm
@@ -127,9 +128,9 @@ class Alarms:
 
 def _renew(alarm: Alarm, found: records.Alarm, time: Callable[[int], float]) -> None:
     """As the judge tells it now."""
-    causes = tuple((each.cause, each.probability) for each in found.ranked) or ((found.cause or "not known", nan),)
+    causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
     is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
     alarm.is_acknowledged &= is_same and found.until is None
     alarm.level = Level.WARN if found.cause is None else Level.ERROR
-    alarm.reason, alarm.begin, alarm.causes = found.told, time(found.since), causes
+    alarm.reason, alarm.begin, alarm.causes = text(found.told), time(found.since), causes
     alarm.end = None if found.until is None else time(found.until)

@@ -16,8 +16,7 @@ from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
 from ..io.reader import Session, read, scan
 from ..io.session_model import SessionScene, baseline_of
-from ..io.topics import NODE, TYPES, Output, Topic, Topics
-from ..io.typestore import jazzy
+from ..io.topics import NODE, Output, Topic, Topics
 from ..records import Change, Sample, Stream
 from ..replay import scene_for
 from ..scene.parts import Scene
@@ -147,10 +146,9 @@ def _title(session: Session, is_published: bool) -> str:
 
 def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int]) -> Generator[None]:
     """What the node said, beside the measured acceleration; one message a step."""
-    takers = {name: take for name, take in feed.catch.takers.items() if name in counts}
-    known = _names(topics)
-    for name, _, message in read(session, {name: known[name].type for name in takers}):
-        takers[name](message, feed.now())
+    known, catch = _names(topics), feed.catch
+    for name, _, message in read(session, {name: known[name].type for name in counts if name in catch.names}):
+        catch.take(name, message, feed.now())
         yield
 
 
@@ -178,7 +176,7 @@ class _Twin:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
         self._twin, self._outlet = Twin(scene, settings, mounts, usual), Outlet(scene, settings)
-        self._takers = {key: feed.catch.takers[topic.absolute] for key, topic in topics.outputs.items() if key in SHOWN}
+        self._names = {key: topic.absolute for key, topic in topics.outputs.items() if key in SHOWN}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
@@ -209,8 +207,8 @@ class _Twin:
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))
         for key, encoded in self._outlet.fill(report):
-            if key in self._takers:
-                self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())
+            if key in self._names:
+                self._feed.catch.take_encoded(self._names[key], encoded, self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():
             self._look()
 

@@ -1,26 +1,41 @@
-"""From messages of the twin's topics to rows of the tables, for live topics and recorded ones alike."""
+"""From messages of the twin's topics to rows of the tables, for live topics and recorded ones alike.
+
+Nothing is known of who sent a message. Here, and nowhere after it, one that cannot be used is dropped and counted.
+"""
 
 from __future__ import annotations
 
+import re
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 from ..io.health import decode_health
 from ..io.intake import Intake, stamp_of
 from ..io.topics import Output, Topics
-from ..records import Sample, Stream
-from .lamps import Board, Level
+from ..io.typestore import jazzy
+from ..records import Sample, Stream, channels_of
+from . import checks
+from .dropped import Dropped, MalformedError
+from .lamps import MOST_NODES, Level
+from .order import Order, Row
 from .store import Store
 
 Taker = Callable[[Any, float], None]
 
-JUMP_BACK = 1.0
-"""A stamp earlier by more than this (s) begins everything anew."""
+LONGEST = 1_000_000
+"""Bytes of an encoded message; a longer one is not decoded."""
+MOST_STATUSES, MOST_CAUSES, MOST_MARKERS = 500, 100, 500
+"""Statuses or alarms of one message, causes of one alarm, markers of one shape."""
 WAITING = 1000
 """Measured samples, and residuals, that may wait for each other."""
 GAP = 0.1
 """A longer pause between strokes (s) is told as an alarm."""
+IMU = channels_of(0)[Stream.IMU]
+CYLINDER = re.compile(r"cylinder_[1-9][0-9]{0,2}")
+NO_MEASUREMENT = "no measurement"
+"""Of the intake: an Imu that says that it has none is nothing odd."""
 PLANE = ("x_m", "z_m")
 ACCELERATION = ("x_m_s2", "z_m_s2")
 
@@ -42,26 +57,33 @@ class Catch:
 
     Attributes
     ----------
-    takers : dict of str to callable
-        By the absolute name of the topic: takes a message, and the time (s) of its arrival that lamps count by.
+    names : frozenset of str
+        Absolute names of the topics that it takes.
+    dropped : Dropped
+        What could not be used.
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
-        self._store, self._intake = store, Intake(1, topics)
+        self._store, self._intake, self._order = store, Intake(1, topics), Order()
+        self.dropped = Dropped()
         self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
         self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
         self._forces: list[float] = []
         self._strokes: list[float] = []
         self._scene = ""
-        self.takers = self._takers(topics)
+        taken = [(topics.outputs[role], take) for role, take in self._by_role().items()]
+        taken += [(topics.inputs[Stream.IMU], self._take_measured), (topics.events, self._take_event)]
+        self._takers = {topic.absolute: take for topic, take in taken}
+        self._types = {topic.absolute: topic.type for topic, _ in taken}
+        self.names = frozenset(self._takers)
 
     @property
     def scene(self) -> str:
         """What the node calls its scene: a path, or the name of the package's own; empty if not known yet."""
         return self._scene
 
-    def _takers(self, topics: Topics) -> dict[str, Taker]:
-        by_role: dict[Output, Taker] = {
+    def _by_role(self) -> dict[Output, Taker]:
+        return {
             Output.TIP_DISPLACEMENT: self._take_displacement,
             Output.TIP_POSITION: self._take_position,
             Output.TIP_ACCELERATION: self._take_acceleration,
@@ -72,91 +94,133 @@ class Catch:
             Output.TIP_UNCERTAINTY: self._take_uncertainty,
             Output.DIAGNOSTICS: self._take_state,
         }
-        found = {topics.outputs[role].absolute: take for role, take in by_role.items()}
-        return {**found, topics.inputs[Stream.IMU].absolute: self._take_measured, topics.events.absolute: self._take_event}
+
+    def take(self, topic: str, message: Any, now: float) -> None:
+        """Take a message of a topic (absolute name) that came at `now` (s, as lamps count); a malformed one is dropped."""
+        with self.dropped.guard(topic):
+            self._takers[topic](message, now)
+
+    def take_encoded(self, topic: str, data: bytes, now: float) -> None:
+        """The same of one in CDR."""
+        with self.dropped.guard(topic):
+            checks.count("bytes", len(data), LONGEST)
+            self._takers[topic](jazzy().deserialize_cdr(data, self._types[topic]), now)
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first."""
         self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
         self._join(sample.stamp)
 
+    def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
+        """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
+        self._store.check(table, columns)
+        step = self._order.put(table, Row(stamp, columns, values))
+        if step.is_set_back:
+            self._store.clear()
+            self._measured.clear()
+            self._residuals.clear()
+        for row in step.rows:
+            if table == "displacement":
+                self._tell_gap(row.stamp)
+            self._store.append(table, row.columns, row.stamp, row.values)
+        if step.stray:
+            raise MalformedError(step.stray)
+
+    def _tell_gap(self, stamp: int) -> None:
+        store, known = self._store, self._store.tables.get("displacement")
+        time = store.time(stamp)
+        if known is not None and time - known.newest > GAP:
+            store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
+
     def _take_measured(self, msg: Any, now: float) -> None:
+        before = self._intake.oddities.copy()
         sample = self._intake.put(Stream.IMU, stamp_of(msg), msg)
+        odd = self._intake.oddities - before
         if sample is not None:
             self.measure(sample)
-
-    def _take_position(self, msg: Any, now: float) -> None:
-        self._store.append("position", PLANE, stamp_of(msg), (msg.point.x, msg.point.z))
-
-    def _take_acceleration(self, msg: Any, now: float) -> None:
-        self._store.append("acceleration", ACCELERATION, stamp_of(msg), (msg.accel.linear.x, msg.accel.linear.z))
-
-    def _take_event(self, msg: Any, now: float) -> None:
-        time = self._store.time(int(msg.stamp.sec) * 1_000_000_000 + int(msg.stamp.nanosec))
-        self._store.alarms.add("event", Level.OK, str(msg.msg), time, time)
+        elif NO_MEASUREMENT not in odd:
+            raise MalformedError(", ".join(odd))
 
     def _take_displacement(self, msg: Any, now: float) -> None:
-        stamp, store = stamp_of(msg), self._store
-        known = store.tables.get("displacement")
-        if known is not None:
-            time = (stamp - store.epoch) * 1e-9
-            if time < known.newest - JUMP_BACK:
-                store.clear()
-                self._measured.clear()
-                self._residuals.clear()
-            elif time - known.newest > GAP:
-                store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
-        store.append("displacement", PLANE, stamp, (msg.vector.x, msg.vector.z))
+        self._append("displacement", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
+
+    def _take_position(self, msg: Any, now: float) -> None:
+        self._append("position", PLANE, checks.stamp(msg), checks.numbers((msg.point.x, msg.point.z)))
+
+    def _take_acceleration(self, msg: Any, now: float) -> None:
+        linear = msg.accel.linear
+        self._append("acceleration", ACCELERATION, checks.stamp(msg), checks.numbers((linear.x, linear.z)))
+
+    def _take_uncertainty(self, msg: Any, now: float) -> None:
+        self._append("uncertainty", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
+
+    def _take_event(self, msg: Any, now: float) -> None:
+        time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
+        self._store.alarms.add("event", Level.OK, checks.text(msg.msg), time, time)
 
     def _take_cylinders(self, msg: Any, now: float) -> None:
-        places = [place for place, name in enumerate(msg.name) if name.startswith("cylinder_") and name[9:].isdigit()]
-        self._strokes = [float(msg.position[place]) for place in places]
-        self._forces = [float(msg.effort[place]) for place in places]
+        checks.named(msg, "position", "effort")
+        places = [place for place, name in enumerate(msg.name) if CYLINDER.fullmatch(name)]
+        strokes = checks.numbers([msg.position[place] for place in places])
+        self._strokes, self._forces = strokes, checks.numbers([msg.effort[place] for place in places])
 
     def _take_residuals(self, msg: Any, now: float) -> None:
-        stamp, values, sigmas = stamp_of(msg), list(msg.position), list(msg.effort)
-        if msg.name and msg.name[0].startswith("joint_"):
-            columns = [f"{name}_rad" for name in msg.name] + [f"{name}_normalised" for name in msg.name]
-            self._store.append("joints", columns, stamp, values + list(msg.velocity))
-        else:
+        checks.named(msg, "position", "velocity", "effort")
+        stamp, names = checks.stamp(msg), list(msg.name)
+        values, ratios, sigmas = (checks.numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
+        if names == list(IMU):
             self._residuals[stamp] = (values, sigmas)
             self._join(stamp)
+        else:
+            checks.joint_names(names)
+            columns = [f"{name}_rad" for name in names] + [f"{name}_normalised" for name in names]
+            self._append("joints", columns, stamp, values + ratios)
 
     def _join(self, stamp: int) -> None:
         """Make the row of a measurement and its residual, once both are there; forget what has waited long."""
+        for waiting in (self._measured, self._residuals):
+            if len(waiting) > WAITING:
+                waiting.popitem(last=False)
         if stamp in self._measured and stamp in self._residuals:
             measured, (values, sigmas) = self._measured.pop(stamp), self._residuals.pop(stamp)
             predicted = [m - v for m, v in zip(measured, values, strict=True)]
             columns = [f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz"]
-            self._store.append("force", columns, stamp, [*measured, *predicted, *sigmas])
-        for waiting in (self._measured, self._residuals):
-            if len(waiting) > WAITING:
-                waiting.popitem(last=False)
+            self._append("force", columns, stamp, [*measured, *predicted, *sigmas])
 
     def _take_shape(self, msg: Any, now: float) -> None:
+        checks.count("markers", len(msg.markers), MOST_MARKERS)
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
         boom, straight = lines.get(("boom", 0)), lines.get(("boom_undeflected", 0))
-        if not self._forces or boom is None or straight is None:  # not the twin's own
-            return
         pins = [point for (kind, _), ends in lines.items() if kind == "cylinders" for point in ends]
-        values = [number for point in (*boom, *straight, *pins) for number in (point.x, point.z)]
+        if boom is None or straight is None or not len(boom) == len(straight) > 1:
+            raise MalformedError("no lines of the boom, deflected and not, of as many points each")
+        if not self._forces:  # they come by a topic of their own
+            return
+        if len(pins) != 2 * len(self._forces):
+            raise MalformedError(f"{len(pins)} ends of cylinders, but {len(self._forces)} forces of cylinders")
         names = [("line", len(boom)), ("straight", len(straight)), ("pins", len(pins))]
         columns = [f"{name}_{i}_{axis}_m" for name, count in names for i in range(count) for axis in "xz"]
         columns += [f"force_{i + 1}_N" for i in range(len(self._forces))]
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
-        self._store.append("shape", columns, stamp_of(msg.markers[0]), values + self._forces + self._strokes)
+        checks.count("numbers of a shape", len(columns), checks.MOST_COLUMNS)
+        values = checks.numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
+        self._append("shape", columns, checks.stamp(msg.markers[0]), values + self._forces + self._strokes)
 
     def _take_health(self, msg: Any, now: float) -> None:
-        store = self._store
-        store.alarms.judge(store.time(stamp_of(msg)), decode_health(msg), store.time)
-
-    def _take_uncertainty(self, msg: Any, now: float) -> None:
-        self._store.append("uncertainty", PLANE, stamp_of(msg), (msg.vector.x, msg.vector.z))
+        checks.count("alarms", len(msg.status), MOST_STATUSES)
+        store, found = self._store, decode_health(msg)
+        for alarm in found:
+            checks.count("causes of an alarm", len(alarm.ranked), MOST_CAUSES)
+            checks.instant(alarm.since)
+            checks.instant(alarm.since if alarm.until is None else alarm.until)
+        store.alarms.judge(store.time(checks.stamp(msg)), found, store.time)
 
     def _take_state(self, msg: Any, now: float) -> None:
+        checks.count("statuses", len(msg.status), MOST_STATUSES)
         store = self._store
+        board = store.board(now).told(now, msg.status, stamp_of(msg) * 1e-9)
+        checks.count("nodes on one topic", len(board.nodes), MOST_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
-        board: Board = store.board(now).told(now, msg.status, stamp_of(msg) * 1e-9)
         store.light(now, board)

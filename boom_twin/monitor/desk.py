@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from unicodedata import category
 
 from .feed import Feed
 from .recording import Recording
 
 LONGEST = 500
 """Characters of a note."""
+NO_TEXT = ("Cc", "Cs")
+"""Unicode's categories of control characters, and of halves of characters, which cannot be published."""
 ACTS = ("mark", "acknowledge", "record")
 AT_NODE = "acknowledge-at-node"
 """Permits ``acknowledge``, and that it makes the node let go of alarms that ended."""
@@ -56,8 +59,8 @@ class Desk:
 
     def _mark(self, request: dict[str, Any]) -> str:
         note = request.get("note")
-        if not isinstance(note, str) or len(note) > LONGEST:
-            raise ValueError(f"a note is a text of at most {LONGEST} characters")
+        if not isinstance(note, str) or len(note) > LONGEST or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {LONGEST} characters, none of them a control character")
         self._feed.publish(f"mark: {note}")
         return f"marked: {note}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import re
 import secrets
 from ipaddress import ip_address
 
@@ -16,7 +17,7 @@ POLICY = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
 }
-LOCAL = ("localhost", "127.0.0.1", "[::1]")
+LOCAL = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
 def is_loopback(host: str) -> bool:
@@ -27,10 +28,16 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def in_address(host: str) -> str:
+    """`host` as it stands in the address of a page."""
+    return f"[{host}]" if ":" in host else host
+
+
 class Door:
     """Checks every request.
 
-    On loopback the ``Host`` must be a name of this machine, so that no page of another name that resolves to it gets in.
+    On loopback the ``Host`` must be `host` or a usual name of this machine, so that no page of another name that resolves to it
+    gets in.
     Elsewhere a token is needed: once in the address (``/?token=..``), from then on in a cookie. A WebSocket must come from a
     page of this server (``Origin``).
 
@@ -47,14 +54,18 @@ class Door:
 
     def __init__(self, host: str) -> None:
         self.token = "" if is_loopback(host) else secrets.token_urlsafe(24)
+        self._names = LOCAL | {in_address(host)}
 
     def check(self, request: web.Request) -> None:
         """Raise HTTPForbidden, or HTTPFound where a token is to be put into a cookie."""
+        hosts = request.headers.getall("Host", [])
+        if len(hosts) != 1 or request.raw_path[:1] not in ("/", "*"):
+            raise web.HTTPBadRequest(text="a request names its host once, and its path alone")
         if self.token:
             self._check_token(request)
-        elif request.host.rpartition(":")[0] not in LOCAL and request.host not in LOCAL:
+        elif re.sub(r":[0-9]*$", "", hosts[0]) not in self._names:
             raise web.HTTPForbidden(text="this monitor answers to localhost only")
-        if request.path == "/socket" and request.headers.get("Origin") != f"{request.scheme}://{request.host}":
+        if request.path == "/socket" and request.headers.getall("Origin", []) != [f"{request.scheme}://{hosts[0]}"]:
             raise web.HTTPForbidden(text="only a page of this monitor may connect")
 
     def _check_token(self, request: web.Request) -> None:
@@ -62,9 +73,9 @@ class Door:
             return
         if not self._fits(request.query.get("token", "")):
             raise web.HTTPForbidden(text="open the address that the monitor printed; it holds the token")
-        found = web.HTTPFound(request.path)
+        found = web.HTTPFound("/")  # whatever was asked for: no address that a request names is gone to
         found.set_cookie(COOKIE, self.token, httponly=True, samesite="Strict")
         raise found
 
     def _fits(self, token: str) -> bool:
-        return hmac.compare_digest(token.encode(), self.token.encode())
+        return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ..io.topics import Topics
 from ..scene import load_scene
 from ..scene.load import DEFAULT_NAME
@@ -25,7 +23,7 @@ class Feed:
     topics : Topics
         Their names, and how sensors are read.
     scene : Scene, optional
-        By default the one that the node names, if it can be read here.
+        By default the package's own, if the node says that it uses that. No file is opened that a message names.
     end : float, optional
         Length of a recorded session, s; None if it is live.
 
@@ -61,12 +59,8 @@ class Feed:
 
     def scene(self) -> Scene | None:
         """The scene, as soon as it is known."""
-        if self._scene is None and self.catch.scene:
-            path = Path(self.catch.scene)
-            if self.catch.scene == DEFAULT_NAME:
-                self._scene = load_scene()
-            elif path.is_file():
-                self._scene = load_scene(path)
+        if self._scene is None and self.catch.scene == DEFAULT_NAME:
+            self._scene = load_scene()
         return self._scene
 
     def strokes(self, time: float) -> list[float]:

@@ -8,8 +8,12 @@ from enum import IntEnum
 from math import inf, isfinite, isnan, nan
 from typing import Any
 
+from .checks import text
+
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""
+MOST_NODES, FORGOTTEN = 200, 60.0
+"""Where more nodes than so many have told something, those that have been silent for so many seconds are forgotten."""
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""
@@ -74,9 +78,12 @@ class Board:
         """
         found: dict[str, list[Lamp]] = {}
         for status in statuses:
-            node, _, name = str(status.name).partition(": ")
+            node, _, name = text(status.name).partition(": ")
             found.setdefault(node, []).append(_lamp(name or node, status, clock))
-        return Board({**self.nodes, **{node: (now, tuple(lamps)) for node, lamps in found.items()}})
+        nodes = {**self.nodes, **{node: (now, tuple(lamps)) for node, lamps in found.items()}}
+        if len(nodes) > MOST_NODES:
+            nodes = {node: told for node, told in nodes.items() if now - told[0] <= FORGOTTEN}
+        return Board(nodes)
 
     def groups(self, now: float) -> dict[str, list[Lamp]]:
         """Lamps by group; those of a node that is silent are stale, whatever they were."""
@@ -110,7 +117,7 @@ def _lamp(name: str, status: Any, clock: float) -> Lamp:
     values = {pair.key: _number(pair.value) for pair in status.values}
     quantity, limit = _judged(values, level)
     age = clock - values["since_s"] if isfinite(values.get("since_s", nan)) else nan
-    return Lamp(name, _group(name), level, str(status.message), quantity, values.get(quantity, nan), limit, age)
+    return Lamp(name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age)
 
 
 def _group(name: str) -> str:

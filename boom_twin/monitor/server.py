@@ -10,6 +10,7 @@ from pathlib import Path
 from aiohttp import web
 
 from .analyst import Analyst
+from .connections import Connection
 from .desk import Desk
 from .door import POLICY, Door
 from .feed import Feed
@@ -46,7 +47,9 @@ class Server:
     def application(self) -> web.Application:
         """The application, for `aiohttp.web`."""
         application = web.Application(middlewares=[self._guard], client_max_size=LONGEST)
-        application.add_routes([web.get("/", self._index), web.get("/socket", self._connect), web.static("/page", PAGE)])
+        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
+        application.add_routes([web.get(path, handler) for path, handler in routes.items()])
+        application.on_response_prepare.append(_add_policy)
         application.cleanup_ctx.append(self._run)
         application.on_shutdown.append(self._part)
         return application
@@ -54,13 +57,19 @@ class Server:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         self._door.check(request)
-        response = await handler(request)
-        if not response.prepared:
-            response.headers.update(POLICY)
-        return response
+        if isinstance(request.protocol, Connection):
+            request.protocol.let_in()
+        return await handler(request)
 
     async def _index(self, request: web.Request) -> web.FileResponse:
         return web.FileResponse(PAGE / "index.html")
+
+    async def _file(self, request: web.Request) -> web.FileResponse:
+        """One of the page's own files: what is asked for is compared with their names, no path is made of it."""
+        file = next((file for file in PAGE.iterdir() if file.name == request.match_info["name"]), None)
+        if file is None:
+            raise web.HTTPNotFound(text="there is no such file of the page")
+        return web.FileResponse(file)
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         if len(self._viewers) >= MOST_VIEWERS:
@@ -69,6 +78,8 @@ class Server:
         self._viewers.add(socket)
         try:
             await socket.prepare(request)
+            if isinstance(request.protocol, Connection):
+                request.protocol.become_viewer()
             await Viewer(socket, self._feed, self._desk, self._analyst).serve()
         finally:
             self._viewers.discard(socket)
@@ -99,6 +110,10 @@ class Server:
     async def _part(self, application: web.Application) -> None:
         for socket in set(self._viewers):
             await socket.close()
+
+
+async def _add_policy(request: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(POLICY)
 
 
 def _stop_on_fault(task: asyncio.Task[None]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..records import Array
-from .spectrum import SEGMENT
+from .spectrum import SEGMENT, spacing
 
 STEP = 2.0
 """Seconds of session time from one column to the next; columns end at its multiples."""
@@ -47,7 +47,7 @@ def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]
 
 def _periodogram(times: Array, values: Array) -> Array:
     """Density at multiples of 1 / `SEGMENT`, Hz."""
-    count = round(SEGMENT / float(np.median(np.diff(times))))
+    count = round(SEGMENT / spacing(times))
     even = times[-1] - SEGMENT + SEGMENT / count * np.arange(1, count + 1)
     window = np.hanning(count + 1)[:-1]
     rows = np.stack([np.interp(even, times, column) for column in values.T])

@@ -26,6 +26,10 @@ FALL = 0.3
 """Share of its start down to which a decay is looked at."""
 
 
+MOST_POINTS = 40_000
+"""Evenly spaced points that rows are brought to at most: a millisecond apart in a `WINDOW`."""
+
+
 @dataclass(frozen=True, slots=True)
 class Peak:
     """A peak of the spectrum: frequency (Hz), damping ratio (NaN if not to be had), density ((m/s^2)^2/Hz)."""
@@ -50,13 +54,18 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     times, values = times[finite], values[finite]
     if len(times) < 32 or times[-1] - times[0] < SEGMENT:
         return None
-    rate = 1.0 / float(np.median(np.diff(times)))
+    rate = 1.0 / spacing(times)
     even = times[0] + np.arange(round((times[-1] - times[0]) * rate) + 1) / rate
     values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
     length = min(round(SEGMENT * rate), len(even))
     frequencies, densities = welch(values, rate, "hann", length, detrend="constant", axis=0)
     peaks = tuple(sorted(_peaks(frequencies, densities.sum(axis=1), values, rate), key=lambda peak: peak.frequency))
     return Spectrum(frequencies, densities, peaks)
+
+
+def spacing(times: Array) -> float:
+    """Usual distance (s) of `times` (n,), at least so much that there are `MOST_POINTS` in all of their span."""
+    return max(float(np.median(np.diff(times))), float(times[-1] - times[0]) / MOST_POINTS)
 
 
 def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> list[Peak]:
@@ -67,7 +76,8 @@ def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> li
     peaks = []
     for i in sorted(found, key=lambda place: -level[place])[:MOST]:
         below, top, above = level[i - 1 : i + 2]
-        offset = 0.5 * (below - above) / (below - 2.0 * top + above)
+        bend = below - 2.0 * top + above
+        offset = 0.5 * (below - above) / bend if bend else 0.0
         frequency = float(frequencies[i] + offset * (frequencies[1] - frequencies[0]))
         peaks.append(Peak(frequency, damping(values, rate, frequency), float(density[i])))
     return peaks
@@ -91,6 +101,8 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     correlation = np.fft.irfft(power)[:count] / np.arange(count, 0, -1)
     envelope = np.abs(hilbert(correlation))
     start = round(rate / frequency)
+    if not envelope[start] > 0.0:
+        return nan
     stop = min(start + round(12.0 * rate / frequency), count // 2)
     low = np.flatnonzero(envelope[start:stop] < FALL * envelope[start])
     stop = start + int(low[0]) if len(low) else stop

@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from operator import itemgetter
 
 from .alarms import Alarms
+from .dropped import MalformedError
 from .lamps import Board
 from .table import Table
 
 NANO = 1e-9
+MOST_BOARDS = 100_000
+"""Earlier states of the lamps that are kept: a day of them."""
 
 
 class Store:
@@ -54,10 +57,17 @@ class Store:
 
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row to a table, made by its first one."""
+        self.check(name, columns)
         table = self.tables.get(name)
         if table is None:
             table = self.tables[name] = Table(name, columns, self._capacity)
         table.append(self.time(stamp), values)
+
+    def check(self, name: str, columns: Sequence[str]) -> None:
+        """Raise MalformedError if a table has other columns than these."""
+        table = self.tables.get(name)
+        if table is not None and table.columns != tuple(columns):
+            raise MalformedError(_difference(table.columns, columns))
 
     @property
     def newest(self) -> float:
@@ -69,9 +79,17 @@ class Store:
         if not self._keeps_boards:
             self._boards.clear()
         self._boards.append((time, board))
+        if len(self._boards) > MOST_BOARDS:
+            del self._boards[: MOST_BOARDS // 2]
         self.alarms.follow(self.newest, board)
 
     def board(self, time: float) -> Board:
         """The lamps as they were last told at `time` (s)."""
         place = bisect_right(self._boards, time, key=itemgetter(0)) if self._keeps_boards else len(self._boards)
         return self._boards[place - 1][1] if place else Board()
+
+
+def _difference(first: Sequence[str], columns: Sequence[str]) -> str:
+    odd = [name for name in (*columns, *first) if (name in columns) != (name in first)]
+    told = f"{odd[0]} is only in one of them" if odd else "in another order"
+    return f"{len(columns)} numbers, but {len(first)} at first ({told}); start the monitor again if the scene was changed"

@@ -8,11 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+FIRST = 1024
+"""Rows that there is room for at first."""
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
 class Table:
     """Named columns and a time for every row; the oldest rows make room for new ones.
+
+    Memory is taken as rows come.
 
     Parameters
     ----------
@@ -30,8 +34,9 @@ class Table:
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
         self.name, self.columns, self.count = name, tuple(columns), 0
-        self._times = np.zeros(capacity)
-        self._values = np.zeros((capacity, len(columns)), dtype=np.float32)
+        self._capacity = capacity
+        self._times = np.zeros(min(capacity, FIRST))
+        self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
     @property
     def first(self) -> int:
@@ -45,9 +50,16 @@ class Table:
 
     def append(self, time: float, values: Sequence[float]) -> None:
         """Add a row: `time` (s), values (columns,)."""
+        if self.count == len(self._times) < self._capacity:
+            self._grow(min(2 * self.count, self._capacity))
         place = self.count % len(self._times)
         self._times[place], self._values[place] = time, values
         self.count += 1
+
+    def _grow(self, size: int) -> None:
+        more = size - len(self._times)
+        self._times = np.pad(self._times, (0, more))
+        self._values = np.pad(self._values, ((0, more), (0, 0)))
 
     def until(self, time: float) -> int:
         """Number of the first row after `time` (s), the rows being in order."""

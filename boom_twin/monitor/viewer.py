@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -56,7 +56,7 @@ class Viewer:
         self._generation = -1
         self._tables = 0
         self._alarms = ""
-        self._past: float | None = None
+        self._past = -inf
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
@@ -100,7 +100,7 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent, self._past = store.generation, 0, {}, None
+            self._generation, self._tables, self._sent, self._past = store.generation, 0, {}, -inf
             await self._say({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
@@ -113,7 +113,8 @@ class Viewer:
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        await self._say({**message, "trouble": feed.trouble, "is_recording": self._desk.is_recording})
+        message |= {"trouble": feed.trouble, "dropped": feed.catch.dropped.told(), "is_recording": self._desk.is_recording}
+        await self._say(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
             self._alarms = told
@@ -167,7 +168,7 @@ class Viewer:
     async def _send_past(self, position: float) -> None:
         """The columns of the spectrogram that are owed."""
         generation = self._generation
-        found = await self._analyst.past(position - HISTORY if self._past is None else self._past, position)
+        found = await self._analyst.past(max(self._past, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
             self._past, block = found
             await self._socket.send_bytes(block)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,6 @@ from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
 from ..io.topics import NODE, Output, Topics
-from ..io.typestore import jazzy
 from ..monitor.feed import Feed
 from ..monitor.store import Store
 from ..records import Stream
@@ -32,8 +31,8 @@ MOST = 400
 NANO = 1_000_000_000
 RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)
 """Outputs of which none may be missed."""
-
-Taker = Callable[[Any, float], None]
+MOST_BYTES = 4_000_000
+"""Of one topic taken in one look: no more are taken once there are so many."""
 
 
 class TopicFeed(Feed):
@@ -46,21 +45,21 @@ class TopicFeed(Feed):
     ----------
     topics : Topics
     scene : Scene, optional
-        By default that which the node names on ``/diagnostics``.
+        As of a `Feed`.
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
         super().__init__("live", Store(CAPACITY), topics, scene)
         self._node = rclpy.create_node(NAME)
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
-        self._heard: list[tuple[Subscription[Any], str, Taker]] = []
+        self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:
-            if (take := self.catch.takers.get(topic.absolute)) is not None:
+            if topic.absolute in self.catch.names:
                 kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
                 if topic not in (*(topics.outputs[role] for role in RARE), topics.events):
                     qos.reliability = ReliabilityPolicy.BEST_EFFORT
                 heard = self._node.create_subscription(kind, topic.absolute, lambda _: None, qos, raw=True)
-                self._heard.append((heard, topic.type, take))
+                self._heard.append((heard, topic.absolute))
         events = topics.events
         self._events = self._node.create_publisher(Log, events.absolute, qos_profile(events.qos))
         self._asked = self._node.create_client(Trigger, f"/{NODE}/acknowledge")
@@ -68,11 +67,11 @@ class TopicFeed(Feed):
     def poll(self) -> None:
         """Take what has come."""
         now = time.monotonic()
-        for subscription, kind, take in self._heard:
+        for subscription, name in self._heard:
             with subscription.handle:
                 receive = partial(subscription.handle.take_message, subscription.msg_type, True)
-                for data, _ in _until_none(receive):
-                    take(jazzy().deserialize_cdr(data, kind), now)
+                for data in _taken(receive):
+                    self.catch.take_encoded(name, data, now)
 
         with self._asked.handle:
             _, answer = self._asked.handle.take_response(Trigger.Response)
@@ -109,10 +108,9 @@ class TopicFeed(Feed):
         self._node.destroy_node()
 
 
-def _until_none(receive: Callable[[], tuple[bytes, Any] | None]) -> Any:
-    """What `receive` gives, at most `MOST` times."""
-    for _ in range(MOST):
-        found = receive()
-        if found is None:
-            return
-        yield found
+def _taken(receive: Callable[[], tuple[bytes, Any] | None]) -> Iterator[bytes]:
+    """What `receive` gives, at most `MOST` messages and little more than `MOST_BYTES`."""
+    count = size = 0
+    while count < MOST and size < MOST_BYTES and (found := receive()) is not None:
+        count, size = count + 1, size + len(found[0])
+        yield found[0]

@@ -84,7 +84,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
                 kind = message_class(topic.type)
                 self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
         if self.get_parameter("monitor").value:
-            self._page = Page(self, self._topics, self.get_parameter("mapping").value)
+            mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
+            self._page = Page(self, self._topics, mapping, scene)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

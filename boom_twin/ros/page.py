@@ -29,16 +29,19 @@ class Page:
     node : Node
         Its names, namespace and remappings are those that the page listens to.
     topics : Topics
-    mapping : str
-        Path of the mapping; empty: the package's own.
+    mapping, scene : str
+        Their paths; empty: the package's own.
     """
 
-    def __init__(self, node: Node, topics: Topics, mapping: str) -> None:
+    def __init__(self, node: Node, topics: Topics, mapping: str, scene: str) -> None:
         self._node = node
         known = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
         names = {topic.absolute: node.resolve_topic_name(topic.name) for topic in known}
         names |= {f"/{NODE}/{name}": node.resolve_service_name(f"~/{name}") for name in ("get_parameters", *TEXTS)}
-        arguments = ["--until-stdin-ends", *(["--mapping", mapping] if mapping else []), "--ros-args"]
+        arguments = ["--until-stdin-ends"]
+        for option, path in (("--mapping", mapping), ("--scene", scene)):
+            arguments += [option, path] if path else []
+        arguments.append("--ros-args")
         for name, resolved in names.items():
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
         self._process = _start(arguments)

@@ -231,6 +231,28 @@ def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("path", ["/", "//evil.example/path", "/%5cevil.example/", "/page/x"])
+def test_with_a_token_one_is_led_to_the_page_and_nowhere_else(path: str) -> None:
+    async def run() -> None:
+        door, feed = Door("0.0.0.0"), Made()
+        async with TestServer(Server(feed, Desk(feed, frozenset()), door).application()) as server:
+            head = await ask(server, f"{path}?token={door.token}")
+            assert " 302 " in head and "\r\nLocation: /\r\n" in head and "Content-Security-Policy" in head
+            head = await ask(server, "/", "Cookie: boom_twin_monitor=\xff")
+            assert " 403 " in head and "Content-Security-Policy" in head
+
+    asyncio.run(run())
+
+
+async def ask(server: TestServer, path: str, header: str = "X: y") -> str:
+    """The head of the answer to a request as it is, byte by byte."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+    writer.write(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{header}\r\n\r\n".encode("latin-1"))
+    answer = await asyncio.wait_for(reader.read(), 60.0)
+    writer.close()
+    return answer.partition(b"\r\n\r\n")[0].decode("latin-1") + "\r\n"
+
+
 def test_only_the_page_is_served_and_it_asks_for_nothing_from_elsewhere() -> None:
     async def talk(session: ClientSession, url: str) -> None:
         response = await session.get(url)

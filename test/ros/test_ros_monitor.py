@@ -194,5 +194,7 @@ def test_time_set_back_begins_anew(pair: tuple[Any, Rig]) -> None:
     rig.send(Output.TIP_DISPLACEMENT, 30_000_000, lambda message: setattr(message.header.stamp, "sec", EPOCH + 10))
     until(feed, lambda: feed.store.newest > 5.0)
     rig.send(Output.TIP_DISPLACEMENT, 40_000_000, lambda message: None)
+    rig.send(Output.TIP_DISPLACEMENT, 45_000_000, lambda message: None)  # one alone would be a stray stamp
     until(feed, lambda: feed.store.generation == 1)
-    assert feed.store.newest == 0.0 and list(feed.store.tables) == ["displacement"]
+    assert feed.store.newest == pytest.approx(0.005) and list(feed.store.tables) == ["displacement"]
+    assert feed.store.tables["displacement"].count == 2 and not feed.catch.dropped.told()

@@ -18,6 +18,8 @@ pytest.importorskip("aiohttp")
 
 from sensor_msgs.msg import JointState
 
+import boom_twin
+
 LISTENING = "open http"
 
 
@@ -96,10 +98,12 @@ def test_the_page_comes_and_goes_with_the_configuration(watched: Any, remote: An
 
 
 def test_the_page_hears_a_node_under_other_names(spawn_node: Callable[..., Any], motion: dict[str, Any]) -> None:
-    node = spawn_node("-p", "monitor:=true", "-r", "__ns:=/crane", "-r", "tip_imu:=/rig/imu")
+    scene = str(Path(boom_twin.__file__).parent / "msg_config" / "scene.yaml")
+    node = spawn_node("-p", "monitor:=true", "-p", f"scene:={scene}", "-r", "__ns:=/crane", "-r", "tip_imu:=/rig/imu")
     node.wait_for(LISTENING)
     (page,) = children(node)
     arguments = Path(f"/proc/{page}/cmdline").read_text().split("\0")
     assert "/tip_imu:=/rig/imu" in arguments and "/boom_twin/tip/position:=/crane/boom_twin/tip/position" in arguments
+    assert arguments[arguments.index("--scene") + 1] == scene  # it opens none that a message names
     assert not any("/diagnostics" in each for each in arguments)
     node.close()

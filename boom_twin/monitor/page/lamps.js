@@ -4,6 +4,7 @@ import { escape, show } from "./sheet.js";
 
 export const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
 const OVERALL = { OK: "ALL WELL", WARN: "WARNING", ERROR: "FAULT", STALE: "STALE" };
+const LOSSES = 3; // topics whose dropped messages are told one by one
 const SILENCE = 2000; // ms without a word from the monitor after which nothing here is known
 
 export class Lamps {
@@ -12,6 +13,7 @@ export class Lamps {
     this.overall = document.getElementById("overall");
     this.groups = document.getElementById("groups");
     this.notice = document.getElementById("notice");
+    this.dropped = document.getElementById("dropped");
     link.addEventListener("state", event => { this.state = event.detail; this.show(event.detail); });
     link.addEventListener("alarms", event => this.showAlarms(event.detail.alarms));
   }
@@ -49,7 +51,17 @@ export class Lamps {
       }
       put(lamp, group.level, group.level, group.reason, detail(worst(group)));
     }
+    this.showDropped(state.dropped);
     this.fillTable(state);
+  }
+
+  // Messages that could not be used: how many, of which topic, why the last one.
+  showDropped(dropped) {
+    this.dropped.hidden = !dropped.length;
+    const lines = dropped.slice(0, LOSSES).map(({ topic, count, reason }) => `<span>${escape(topic)}: ${count}, the last because: ${escape(reason)}</span>`);
+    const more = dropped.length > LOSSES ? `<span>topics not listed here: ${dropped.length - LOSSES}</span>` : "";
+    const words = dropped.length ? `<b>▲ ${dropped.reduce((sum, { count }) => sum + count, 0)} messages dropped</b>${lines.join("")}${more}` : "";
+    if (this.words !== words) this.dropped.innerHTML = this.words = words;
   }
 
   fillTable(state) {

@@ -1,0 +1,68 @@
+"""What must hold of a message before its numbers are rows; each check raises MalformedError with the reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from math import isnan
+from typing import Any
+
+from ..io.intake import LATEST, LONGEST, stamp_of
+from ..printable import printable
+from .dropped import MalformedError
+
+LARGEST = 1e12
+"""Largest magnitude of a number: none of the twin's, in SI units, comes near it."""
+MOST_COLUMNS = 1000
+"""Most numbers of one stamp; a boom of nine sections has some two hundred."""
+LONGEST_TEXT = 500
+"""Characters of a text that are kept."""
+JOINT = re.compile(r"joint_[1-9][0-9]{0,2}")
+
+
+def stamp(msg: Any) -> int:
+    """``header.stamp`` in ns, which must be after 1970 and fit into a message."""
+    return instant(stamp_of(msg))
+
+
+def instant(found: int) -> int:
+    """The same of a stamp alone."""
+    if not 0 < found < LATEST:
+        raise MalformedError("no stamp" if found == 0 else f"impossible stamp {found / 1e9:.9g} s")
+    return found
+
+
+def numbers(values: Sequence[float], *, may_lack: bool = False) -> list[float]:
+    """Values of at most `LARGEST`; NaN only where a sensor `may_lack`."""
+    found = [float(value) for value in values]
+    for value in found:
+        if not abs(value) <= LARGEST and not (may_lack and isnan(value)):
+            raise MalformedError(f"a number is {value:g}; at most {LARGEST:g} is possible")
+    return found
+
+
+def count(what: str, found: int, most: int) -> None:
+    """Not more than `most` of something."""
+    if found > most:
+        raise MalformedError(f"{found} {what}, at most {most} are possible")
+
+
+def joint_names(names: Sequence[str]) -> None:
+    """``joint_1`` and the like, each once."""
+    odd = next((name for name in names if JOINT.fullmatch(name) is None), None)
+    if odd is not None or len(set(names)) != len(names) or not names:
+        raise MalformedError(f"names of joints, each once, are expected; not {odd if odd is not None else list(names)!r}")
+
+
+def named(msg: Any, *fields: str) -> None:
+    """The arrays `fields` of a sensor_msgs/JointState have one value for every name, of which there are not too many."""
+    count("names", len(msg.name), LONGEST)
+    found = {field: len(getattr(msg, field)) for field in fields}
+    if any(length != len(msg.name) for length in found.values()):
+        lengths = ", ".join(f"{length} of {field}" for field, length in found.items())
+        raise MalformedError(f"{len(msg.name)} names, but {lengths}")
+
+
+def text(found: str) -> str:
+    """A text as it may be shown: the beginning of a long one, control characters as escapes."""
+    return printable(found[:LONGEST_TEXT], keep="")

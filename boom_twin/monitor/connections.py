@@ -1,0 +1,159 @@
+"""Connections to the page's server: how long one may be without a request, and how many there may be.
+
+None is kept for a stranger. One that has sent no whole request has few seconds and few places, in which the newest drives out
+the oldest: a page sends its request at once, so that a thousand silent connections do not keep it out. Those whose request was
+let in have places of their own; a viewer's WebSocket needs neither, see `boom_twin.monitor.server.MOST_VIEWERS`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from functools import partial
+from http import HTTPStatus
+from typing import Any
+
+from aiohttp import web
+
+from ..printable import printable
+from .door import POLICY
+
+LOG = logging.getLogger("boom_twin.monitor.connections")
+REQUEST_TIME = 5.0
+"""Seconds that a connection may take for its first whole request, and for each further one."""
+LONGEST = 200
+"""Characters of what the log says of one."""
+MOST, MOST_OF_ONE = 256, 64
+"""Connections of one kind, silent or let in; as many of one address."""
+
+
+class Places:
+    """Connections of one kind in the order in which they were last of use; the oldest makes room for a new one."""
+
+    def __init__(self) -> None:
+        self._open: dict[Connection, None] = {}
+        self._counts: Counter[str] = Counter()
+
+    def take(self, connection: Connection) -> Connection | None:
+        """Give it the newest place; the connection that must go for that, if any."""
+        self.leave(connection)
+        address, gone = connection.address, None
+        if self._counts[address] >= MOST_OF_ONE:
+            gone = next(each for each in self._open if each.address == address)
+        elif len(self._open) >= MOST:
+            gone = next(iter(self._open))
+        if gone is not None:
+            self.leave(gone)
+        self._open[connection] = None
+        self._counts[address] += 1
+        return gone
+
+    def leave(self, connection: Connection) -> None:
+        """Take its place from it, if it has one."""
+        if connection in self._open:
+            del self._open[connection]
+            self._counts -= Counter([connection.address])
+
+
+class Connections:
+    """All connections to one server.
+
+    Parameters
+    ----------
+    server : aiohttp.web.Server
+        What answers their requests.
+    """
+
+    def __init__(self, server: web.Server) -> None:
+        self._server = server
+        self._silent, self._let_in = Places(), Places()
+
+    def __call__(self) -> Connection:
+        """A new one, as `asyncio.loop.create_server` asks for it."""
+        return Connection(self._server, self)
+
+    def begin(self, connection: Connection) -> None:
+        """It was made, and has sent nothing yet."""
+        self._cut(self._silent.take(connection), "a newer one")
+
+    def let_in(self, connection: Connection) -> None:
+        """A request of it was let in."""
+        self._silent.leave(connection)
+        self._cut(self._let_in.take(connection), "a newer one")
+
+    def end(self, connection: Connection) -> None:
+        """It needs no place any more: it is closed, or a viewer's."""
+        self._silent.leave(connection)
+        self._let_in.leave(connection)
+
+    def expire(self, connection: Connection) -> None:
+        """Its time is over."""
+        self._cut(connection, f"it sent no request within {REQUEST_TIME:g} s")
+
+    def _cut(self, connection: Connection | None, reason: str) -> None:
+        if connection is not None:
+            self.end(connection)
+            LOG.warning("cut off a connection of %s: %s", connection.address, reason)
+            connection.abort()
+
+
+class Connection(web.RequestHandler):
+    """One connection, whose requests aiohttp reads; every answer has the headers of `POLICY`, also to what is no request."""
+
+    __slots__ = ("_all", "_deadline", "_link", "address")
+
+    def __init__(self, server: web.Server, everyone: Connections) -> None:
+        loop = asyncio.get_running_loop()
+        how: dict[str, Any] = {"keepalive_timeout": REQUEST_TIME, "lingering_time": 0.0, "auto_decompress": False}
+        super().__init__(server, loop=loop, access_log=None, **how)  # type: ignore[arg-type]
+        self._all, self.address = everyone, ""
+        self._link: asyncio.Transport | None = None
+        self._deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin to wait for a request."""
+        super().connection_made(transport)
+        assert isinstance(transport, asyncio.Transport)
+        self._link, self.address = transport, str((transport.get_extra_info("peername") or [""])[0])
+        self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, partial(self._all.expire, self))
+        self._all.begin(self)
+
+    def connection_lost(self, exc: BaseException | None) -> None:
+        """Give its place to another."""
+        self._wait_no_more()
+        self._all.end(self)
+        super().connection_lost(exc)
+
+    def let_in(self) -> None:
+        """A whole request came, and was let in."""
+        self._wait_no_more()
+        self._all.let_in(self)
+
+    def become_viewer(self) -> None:
+        """It is a WebSocket from now on."""
+        self._all.end(self)
+
+    def abort(self) -> None:
+        """Close it without a word."""
+        self._wait_no_more()
+        if self._link is not None:
+            self._link.abort()
+
+    def handle_error(
+        self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
+    ) -> web.StreamResponse:
+        """Answer to what is no request, which is told in one line, or to a fault of a handler."""
+        if status == HTTPStatus.BAD_REQUEST:
+            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LONGEST], keep=""))
+            response: web.StreamResponse = web.Response(status=status, text=message)
+            response.force_close()
+        else:
+            response = super().handle_error(request, status, exc, message)
+        response.headers.update(POLICY)
+        return response
+
+    def _wait_no_more(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None

@@ -1,0 +1,62 @@
+"""Messages that could not be used: how many of which topic, and why the last one."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..printable import printable
+
+LOG = logging.getLogger("boom_twin.monitor.dropped")
+LONGEST = 200
+"""Characters of a reason."""
+
+
+class MalformedError(Exception):
+    """A message that cannot be used; the text says why."""
+
+
+@dataclass(slots=True)
+class Loss:
+    """Messages of one topic that were dropped: how many, and why the last one."""
+
+    topic: str
+    count: int
+    reason: str
+
+
+class Dropped:
+    """Counts messages that were dropped, and logs them.
+
+    Every one is handed to the log; how many lines of it are written is bounded there, see `boom_twin.monitor.log`.
+
+    Attributes
+    ----------
+    by_topic : dict of str to Loss
+    """
+
+    def __init__(self) -> None:
+        self.by_topic: dict[str, Loss] = {}
+
+    @contextmanager
+    def guard(self, topic: str) -> Iterator[None]:
+        """Drop and count the message that is taken within, if anything is wrong with it."""
+        try:
+            yield
+        except MalformedError as error:
+            self._add(topic, str(error))
+        except Exception as error:  # whatever a message holds, the page goes on
+            self._add(topic, f"cannot be read: {type(error).__name__}: {error}")
+
+    def told(self) -> list[dict[str, Any]]:
+        """As plain values, the most messages first."""
+        return [asdict(loss) for loss in sorted(self.by_topic.values(), key=lambda loss: -loss.count)]
+
+    def _add(self, topic: str, reason: str) -> None:
+        loss = self.by_topic.setdefault(topic, Loss(topic, 0, ""))
+        loss.count, loss.reason = loss.count + 1, printable(reason[:LONGEST], keep="")
+        LOG.getChild(topic).warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)
+

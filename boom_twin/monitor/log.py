@@ -1,0 +1,38 @@
+"""Log lines of the monitor, of which nobody outside can cause a flood."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+
+PERIOD = 10.0
+"""Seconds."""
+MOST = 3
+"""Records of one logger written in a `PERIOD`."""
+
+
+class Limit(logging.Filter):
+    """Lets `MOST` records of each logger through in a `PERIOD`; the first one after it says how many were left out."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._periods: dict[str, tuple[float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether it is written."""
+        now = time.monotonic()
+        begin, count = self._periods.get(record.name, (now, 0))
+        if now - begin >= PERIOD:
+            if count > MOST:
+                record.msg, record.args = f"{record.getMessage()} ({count - MOST} lines before this were left out)", None
+            begin, count = now, 0
+        self._periods[record.name] = begin, count + 1
+        return count < MOST
+
+
+def write_log() -> None:
+    """Write warnings of all loggers of this process to its standard error, as many as `Limit` lets through."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(Limit())
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -1,0 +1,234 @@
+"""A real server process under silent, slow and odd connections: an honest page gets in, and every answer has its headers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from aiohttp import ClientSession, WSMsgType
+
+from boom_twin.monitor import connections
+from boom_twin.monitor.door import POLICY
+from boom_twin.printable import printable
+
+BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
+HALF_OPEN = 1000
+PATIENCE = 60.0
+HALVES = (b"", b"G", b"GET / HTTP/1.1\r\nHost: localhost\r\nX", b"GET /socket HTTP/1.1\r\nUpgrade: websocket\r\n")
+
+
+class Server:
+    """``boom_twin monitor`` of the bundled session as a process; what it said, at its end."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self._log, command = log, [sys.executable, "-m", "boom_twin.cli.main", "monitor", "--port", "0"]
+        with log.open("w") as file:
+            self.process = subprocess.Popen([*command, "--bag", str(BUNDLED), *arguments], stderr=file)
+        end = time.monotonic() + 240.0
+        while (found := re.search(r"open (http\S+)", self.said())) is None:
+            assert self.process.poll() is None and time.monotonic() < end, self.said()
+            time.sleep(0.1)
+        self.url, parts = found[1], urlsplit(found[1])
+        self.address = (parts.hostname or "", parts.port or 0)
+        self.host = parts.netloc
+
+    def said(self) -> str:
+        return self._log.read_text()
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(PATIENCE)
+
+    def ask(self, request: bytes) -> bytes:
+        """The answer to raw bytes, up to its end."""
+        with socket.create_connection(self.address, PATIENCE) as link:
+            link.sendall(request)
+            return b"".join(iter(lambda: link.recv(65536), b""))
+
+
+@contextmanager
+def serving(log: Path, *arguments: str) -> Iterator[Server]:
+    server = Server(log, *arguments)
+    try:
+        yield server
+    finally:
+        server.process.kill()
+        server.process.wait()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("served") / "log", "--host", "127.0.0.2") as made:
+        yield made
+
+
+@pytest.fixture
+def many_files() -> Iterator[None]:
+    """Room for all the sockets."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 3 * HALF_OPEN:
+        pytest.skip(f"only {hard} files may be open here")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 3 * HALF_OPEN), hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+async def visit(server: Server) -> None:
+    """As a page does: the document, its files, and the stream with rows."""
+    async with asyncio.timeout(PATIENCE), ClientSession() as session:
+        for path in ("", "page/main.js", "page/uplot.js", "page/style.css"):
+            async with session.get(server.url + path) as answer:
+                assert answer.status == 200 and await answer.read()
+        origin = {"Origin": f"http://{server.host}"}
+        async with session.ws_connect(f"{server.url}socket", headers=origin, max_msg_size=0) as link:
+            kinds = set()
+            while not {"hello", "state", "rows"} <= kinds:
+                message = await link.receive()
+                assert message.type in (WSMsgType.TEXT, WSMsgType.BINARY)
+                kinds.add(json.loads(message.data)["kind"] if message.type is WSMsgType.TEXT else "rows")
+
+
+def test_a_thousand_half_open_connections_keep_no_page_out(server: Server, many_files: None) -> None:
+    lines = len(server.said().splitlines())
+    links: list[socket.socket] = []
+    try:
+        for number in range(HALF_OPEN):
+            link = socket.create_connection(server.address, PATIENCE)
+            links.append(link)
+            with suppress(ConnectionError):
+                link.sendall(HALVES[number % len(HALVES)])
+        asyncio.run(visit(server))
+        open_files = len(list(Path(f"/proc/{server.process.pid}/fd").iterdir()))
+        assert open_files < 2 * connections.MOST + 100
+        end = time.monotonic() + PATIENCE
+        for link in links:  # all are cut off, the newest by their time
+            link.settimeout(max(0.1, end - time.monotonic()))
+            with suppress(ConnectionError):
+                assert link.recv(1) == b""
+    finally:
+        for link in links:
+            link.close()
+    told = server.said().splitlines()[lines:]
+    assert 1 <= len(told) <= 20 and all("cut off a connection of 127.0.0" in line for line in told)
+
+
+def test_headers_that_trickle_in_are_not_waited_for(server: Server) -> None:
+    links = [socket.create_connection(server.address, PATIENCE) for _ in range(3)]
+    for link, path in zip(links, ("/", "/socket", "/"), strict=True):
+        link.sendall(f"GET {path} HTTP/1.1\r\nHost: {server.host}\r\n".encode())
+    links[2].sendall(b"\r\nGET / HTTP/1.1\r\n")  # one that had its first answer
+    end, is_open = time.monotonic() + PATIENCE, dict.fromkeys(links, True)
+    while any(is_open.values()):
+        assert time.monotonic() < end
+        time.sleep(0.2)
+        for link in [link for link, is_so in is_open.items() if is_so]:
+            try:
+                link.sendall(b"X: y\r\n")
+                is_open[link] = link.recv(1_000_000, socket.MSG_DONTWAIT) != b""
+            except BlockingIOError:
+                continue
+            except ConnectionError:
+                is_open[link] = False
+    for link in links:
+        link.close()
+    asyncio.run(visit(server))
+
+
+ODD = {
+    "a name of 300": ("GET", "/page/" + "a" * 300, b"404"),
+    "a path of 9000": ("GET", "/" + "a" * 9000, b"400"),
+    "NUL": ("GET", "/page/%00", b"404"),
+    "raw NUL": ("GET", "/page/\0", b"400"),
+    "bad escapes": ("GET", "/page/%zz%c0%af%ff", b"404"),
+    "up": ("GET", "/page/..%2f..%2fserver.py", b"404"),
+    "two slashes": ("GET", "//evil.example/?token=x", b"404"),
+    "absolute": ("GET", "http://evil.example/", b"400"),
+    "HEAD": ("HEAD", "/", b"200"),
+    "TRACE": ("TRACE", "/", b"405"),
+    "POST": ("POST", "/", b"405"),
+    "OPTIONS": ("OPTIONS", "*", b"404"),
+    "CONNECT": ("CONNECT", "evil.example:80", b"400"),
+    "no origin": ("GET", "/socket", b"403"),
+    "no HTTP": ("\x16\x03\x01", "/", b"400"),
+}
+HEADERS = {
+    "Cookie: boom_twin_monitor=\xff": b"200",
+    "Host: evil.example": b"400",
+    "X: " + "y" * 20_000: b"400",
+    "\r\n".join(f"X{number}: y" for number in range(3000)): b"400",
+    "Expect: x\r\nContent-Length: 1": b"417",
+    "Range: bytes=99999999-": b"416",
+    "Content-Length: 99999999999": b"200",
+    "Transfer-Encoding: chunked\r\n\r\nzz": b"400",
+}
+
+
+def check(answer: bytes, status: bytes) -> None:
+    """Its status, in words, with all headers of the policy."""
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.split(b" ")[1] == status, head
+    for name, value in POLICY.items():
+        assert f"\r\n{name}: {value}".encode() in head
+    assert b"Traceback" not in body
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_every_answer_has_the_policy_whatever_is_asked_for(server: Server, name: str) -> None:
+    method, path, status = ODD[name]
+    check(server.ask(f"{method} {path} HTTP/1.1\r\nHost: {server.host}\r\nConnection: close\r\n\r\n".encode("latin-1")), status)
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=lambda header: printable(header[:20], keep=""))
+def test_and_whatever_the_headers_are(server: Server, header: str) -> None:
+    usual = f"GET / HTTP/1.1\r\nHost: {server.host}\r\nConnection: close\r\n"
+    check(server.ask(f"{usual}{header}\r\n\r\n".encode("latin-1")), HEADERS[header])
+
+
+HOSTS = {"evil.example": b"403", "localhost": b"200", "127.0.0.2": b"200", "127.0.0.3": b"403", "\xff": b"403", "": b"403"}
+
+
+@pytest.mark.parametrize(("host", "status"), HOSTS.items())
+def test_only_names_of_this_machine_are_answered(server: Server, host: str, status: bytes) -> None:
+    check(server.ask(f"GET / HTTP/1.1\r\nHost: {host}:80\r\nConnection: close\r\n\r\n".encode("latin-1")), status)
+    check(server.ask(b"GET / HTTP/1.0\r\n\r\n"), b"400")
+
+
+FRAMES = {
+    "not UTF-8": (b"\x81\x82", b"\xff\xff"),
+    "compressed": (b"\xc1\x82", b"\x4b\x04"),
+    "huge": (b"\x81\xff" + b"\x7f" * 8, b""),
+    "of JSON": (b"\x81\xfe\x0f\xa0", b"[" * 4000),
+    "of half a character": (b"\x81\xa5", rb'{"do": "mark", "note": "\ud800 \u0000"}'),
+}
+SHAKE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + "A" * 22 + "=="
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_frame_that_is_none_closes_its_viewer_only(server: Server, name: str) -> None:
+    head, body = FRAMES[name]
+    with socket.create_connection(server.address, PATIENCE) as link:
+        origin = f"Host: {server.host}\r\nOrigin: http://{server.host}"
+        link.sendall(f"GET /socket HTTP/1.1\r\n{origin}\r\n{SHAKE}\r\n\r\n".encode())
+        link.sendall(head + bytes(4) + body)
+        found = b""
+        with suppress(ConnectionError):
+            while data := link.recv(65536):  # until it is closed
+                found = found or data
+        assert found.startswith(b"HTTP/1.1 101")
+    asyncio.run(visit(server))
+
+
+def test_nothing_of_all_that_was_a_fault_of_the_server(server: Server) -> None:
+    assert "Traceback" not in server.said() and server.process.poll() is None
