@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import subprocess
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BoomTwinError
+from .isolation import isolated
 from .stop import on_stop_signal
 
 if TYPE_CHECKING:
@@ -39,12 +39,14 @@ class Child:
     log : Path
     parting : Signals
         What ends it in order.
+    lock : int
+        Of the domain, see `boom_twin.ros.isolation.Isolation`: held as long as this runs, even if its parent is killed.
     """
 
-    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals) -> None:
+    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals, lock: int) -> None:
         self._name, self._log, self._parting = " ".join(arguments[:3]), log, parting
         with log.open("w", encoding="utf-8") as file:
-            self._process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file)
+            self._process = subprocess.Popen([sys.executable, *arguments], stdout=file, stderr=file, pass_fds=(lock,))
 
     def said(self) -> str:
         """All that it said so far."""
@@ -73,6 +75,8 @@ class Company:
     ----------
     out : Path
         Folder of the logs and of the recording.
+    lock : int
+        Of the domain.
 
     Attributes
     ----------
@@ -80,8 +84,8 @@ class Company:
         The recording.
     """
 
-    def __init__(self, out: Path) -> None:
-        self._out, self.recorded = out, out / "recorded"
+    def __init__(self, out: Path, lock: int) -> None:
+        self._out, self.recorded, self._lock = out, out / "recorded", lock
         self._children: list[Child] = []
         self._is_asked_to_end = False
 
@@ -93,7 +97,7 @@ class Company:
 
     def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
         """Start one more."""
-        self._children.append(Child(arguments, self._out / f"{name}.log", parting))
+        self._children.append(Child(arguments, self._out / f"{name}.log", parting, self._lock))
         return self._children[-1]
 
     def check(self) -> None:
@@ -126,6 +130,7 @@ class Company:
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
+        player.refuse_rivals()
 
     def end(self) -> None:
         """End all, the last first."""
@@ -135,17 +140,30 @@ class Company:
 
 
 @contextmanager
-def company(out: Path, origin: str) -> Iterator[Company]:
-    """Node and recorder in a domain of their own, as long as this lasts; the recording of an earlier run is removed."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if (out / "recorded").is_dir():
-            shutil.rmtree(out / "recorded")
-    except OSError as error:
-        raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
-    running = Company(out)
+def company(out: Path, origin: str, domain: int | None = None) -> Iterator[Company]:
+    """Node and recorder as long as this lasts, isolated; the recording of an earlier run is removed.
+
+    Parameters
+    ----------
+    out : Path
+    origin : str
+        Kept in the recording.
+    domain : int, optional
+        As for `boom_twin.ros.isolation.isolated`.
+    """
+    with isolated(domain) as isolation:
+        print(isolation, file=sys.stderr)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            if (out / "recorded").is_dir():
+                shutil.rmtree(out / "recorded")
+        except OSError as error:
+            raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
+        yield from _run(Company(out, isolation.lock), origin)
+
+
+def _run(running: Company, origin: str) -> Iterator[Company]:
+    """Start, and end whatever happens."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     on_stop_signal(running.ask_to_end)
     try:

@@ -22,6 +22,7 @@ from ..replay import Replay, replay
 from ..scene import load_scene
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
+from .isolation import add_domain
 from .require import require_rclpy
 from .scorecard import Scorecard, score
 
@@ -37,7 +38,7 @@ def main() -> int:
         require_rclpy()
         session = scan(args.bag)
         about = session.notes.get("origin", "origin not noted")
-        with company(args.out, f"live run of: {about}") as running:
+        with company(args.out, f"live run of: {about}", args.domain) as running:
             sent, recorded = _play(session, args.duration, running), running.recorded
         if (args.bag / TRUTH).is_file():
             shutil.copy(args.bag / TRUTH, recorded)
@@ -60,6 +61,7 @@ def _arguments() -> Namespace:
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
+    add_domain(parser)
     return parser.parse_args()
 
 

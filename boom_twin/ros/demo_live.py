@@ -15,6 +15,7 @@ from pathlib import Path
 from ..errors import BoomTwinError
 from ..io.reader import scan
 from .company import LOOK, Company, company
+from .isolation import add_domain
 from .require import require_rclpy
 
 
@@ -23,7 +24,7 @@ def main() -> int:
     args = _arguments()
     try:
         require_rclpy()
-        with company(args.out, f"demo-live of {args.bag}") as running:
+        with company(args.out, f"demo-live of {args.bag}", args.domain) as running:
             _play(args, running)
     except BoomTwinError as error:
         print(f"demo-live: {error}", file=sys.stderr)
@@ -38,6 +39,7 @@ def _arguments() -> Namespace:
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--out", type=Path, default=Path("out/demo_live"), help="folder for recording and logs")
     parser.add_argument("--port", help="of the page (8420, or any that is free if that is taken)")
+    add_domain(parser)
     return parser.parse_args()
 
 

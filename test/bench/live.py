@@ -32,6 +32,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from boom_twin.io.cdr import stamp_in
+from boom_twin.ros.isolation import isolated
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
@@ -224,9 +225,8 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=60.0, help="s (60)")
     parser.add_argument("--runs", type=int, default=3)
     args, rest = parser.parse_known_args()
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
+    with isolated():
+        runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
     for name in runs[0]:
         values = [each[name] for each in runs]
         print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")
