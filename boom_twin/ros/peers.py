@@ -57,7 +57,8 @@ def _as_discovered(qos: QoSProfile) -> QoSProfile:
 def _peers(address: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
     """From the other ends, and the QoS offered and asked for."""
     faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
-    return Peers(address, tuple(name for name, _ in faults), tuple(f"{name}: {reason}" for name, reason in faults if reason))
+    names, ids = tuple(name for name, _ in faults), tuple(bytes(end.endpoint_gid).hex() for end, _, _ in ends)
+    return Peers(address, names, tuple(f"{name}: {reason}" for name, reason in faults if reason), ids)
 
 
 def _reason(offered: QoSProfile, asked: QoSProfile) -> str:

@@ -48,11 +48,8 @@ class TopicJudge:
         judge.begin(now, thresholds)
         judge.note("topic", publishers.address)
         self._count(stream, now)
-        names = ", ".join(publishers.names)
-        judge.note("publisher_names", names)
-        told = f"{len(publishers.names)} publishers of the same readings: {names}"
         judge.note("publishers", len(publishers.names))
-        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Bounds(warn=0), told)
+        judge.note("publisher_names", ", ".join(publishers.names))
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
         if stream.newest is None and not self._required:

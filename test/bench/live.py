@@ -85,7 +85,11 @@ def echo_on_events() -> None:
 
 
 def source(rate_text: str, duration_text: str, *more: str) -> None:
-    """Send, once it has been found, with ``imu`` that too; prints a line when it begins, and the stamps of the strokes."""
+    """Send, once it has been found; prints a line when it begins, and the stamps of the strokes.
+
+    More words: ``imu`` sends that too, ``later=S`` stamps by a clock that is ahead by so many seconds.
+    """
+    later = sum(round(float(word.removeprefix("later=")) * 1e9) for word in more if word.startswith("later="))
     rate, duration = float(rate_text), float(duration_text)
     node, scene = rclpy.create_node("source"), load_scene()
     publishers = [node.create_publisher(JointState, name, SENSOR) for name in ("cylinder_strokes", "joint_angles")]
@@ -115,7 +119,7 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
             time.sleep(left)
         for number, publisher in enumerate(publishers):
             place = 200 * number + k % 200
-            stamp = time.time_ns()
+            stamp = time.time_ns() + later
             data = templates[place]
             data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")
             publisher.publish(bytes(data))
