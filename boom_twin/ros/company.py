@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..child_process import python_command
 from ..errors import BoomTwinError
+from .isolation import isolated
 from .stop import on_stop_signal
 
 if TYPE_CHECKING:
@@ -40,12 +40,15 @@ class Child:
     log : Path
     parting : Signals
         What ends it in order.
+    lock : int
+        Of the domain, see `boom_twin.ros.isolation.Isolation`: held as long as this runs, even if its parent is killed.
     """
 
-    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals) -> None:
+    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals, lock: int) -> None:
         self._name, self._log, self._parting = " ".join(arguments[:2]), log, parting
         with log.open("w", encoding="utf-8") as file:
-            self._process = subprocess.Popen(python_command(*arguments), stdout=file, stderr=file)
+            command = python_command(*arguments)
+            self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
     def said(self) -> str:
         """All that it said so far."""
@@ -76,6 +79,8 @@ class Company:
         Folder of the logs and of the recording.
     scene : str
         Text of the scene that the node is given.
+    lock : int
+        Of the domain.
 
     Attributes
     ----------
@@ -83,8 +88,8 @@ class Company:
         The recording.
     """
 
-    def __init__(self, out: Path, scene: str) -> None:
-        self._out, self._scene, self.recorded = out, scene, _free(out / "recorded")
+    def __init__(self, out: Path, scene: str, lock: int) -> None:
+        self._out, self._scene, self._lock, self.recorded = out, scene, lock, _free(out / "recorded")
         self._children: list[Child] = []
         self._is_asked_to_end = False
 
@@ -98,7 +103,7 @@ class Company:
 
     def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
         """Start one more."""
-        self._children.append(Child(arguments, self._out / f"{name}.log", parting))
+        self._children.append(Child(arguments, self._out / f"{name}.log", parting, self._lock))
         return self._children[-1]
 
     def check(self) -> None:
@@ -131,6 +136,7 @@ class Company:
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
+        player.refuse_rivals()
 
     def end(self) -> None:
         """End all, the last first."""
@@ -146,15 +152,30 @@ def _free(folder: Path) -> Path:
 
 
 @contextmanager
-def company(out: Path, origin: str, scene: str) -> Iterator[Company]:
-    """Node and recorder in a domain of their own, as long as this lasts; recordings of earlier runs stay."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
-    running = Company(out, scene)
+def company(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[Company]:
+    """Node and recorder as long as this lasts, isolated; recordings of earlier runs stay.
+
+    Parameters
+    ----------
+    out : Path
+    origin : str
+        Kept in the recording.
+    scene : str
+        Text of the scene that the node is given.
+    domain : int, optional
+        As for `boom_twin.ros.isolation.isolated`.
+    """
+    with isolated(domain) as isolation:
+        print(isolation, file=sys.stderr)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
+        yield from _run(Company(out, scene, isolation.lock), origin)
+
+
+def _run(running: Company, origin: str) -> Iterator[Company]:
+    """Start, and end whatever happens."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     on_stop_signal(running.ask_to_end)
     try:

@@ -24,6 +24,7 @@ from ..records import Stream
 from ..replay import Replay, replay_into
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
+from .isolation import add_domain
 from .require import require_rclpy
 from .scorecard import Scorecard, score
 
@@ -40,7 +41,7 @@ def main() -> int:
         session = scan(args.bag)
         about = session.notes.get("origin", "origin not noted")
         taken = scene_of(args.bag)
-        with company(args.out, f"live run of: {about}", taken.text) as running:
+        with company(args.out, f"live run of: {about}", taken.text, args.domain) as running:
             sent, recorded = _play(session, args.duration, running), running.recorded
         if holds_file(args.bag / TRUTH):
             with open_received(args.bag / TRUTH) as truth:
@@ -66,6 +67,7 @@ def _arguments() -> Namespace:
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
+    add_domain(parser)
     return parser.parse_args()
 
 

@@ -16,6 +16,7 @@ from ..errors import BoomTwinError
 from ..io.reader import scan
 from ..io.session_model import scene_of
 from .company import LOOK, Company, company
+from .isolation import add_domain
 from .require import require_rclpy
 
 
@@ -24,7 +25,7 @@ def main() -> int:
     args = _arguments()
     try:
         require_rclpy()
-        with company(args.out, f"demo-live of {args.bag}", scene_of(args.bag).text) as running:
+        with company(args.out, f"demo-live of {args.bag}", scene_of(args.bag).text, args.domain) as running:
             _play(args, running)
     except BoomTwinError as error:
         print(f"demo-live: {error}", file=sys.stderr)
@@ -39,6 +40,7 @@ def _arguments() -> Namespace:
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--out", type=Path, default=Path("out/demo_live"), help="folder for recording and logs")
     parser.add_argument("--port", help="of the page (8420, or any that is free if that is taken)")
+    add_domain(parser)
     return parser.parse_args()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 
 from rclpy.clock import Clock, ClockType
@@ -17,9 +18,10 @@ from ..watch.sensors import sensors_of
 from ..watch.twin import TwinWatch
 from .board import Board
 from .peers import PeerBook
+from .receive_queue import ReceiveQueue
 
 TICK = 0.1  # s of steady time between looks at whether something is urgent
-PERIOD = 10  # ticks from one message to the next, where nothing is
+PERIOD = 1.0  # s from one message to the next, where nothing is
 NANO = 1e-9
 
 
@@ -30,16 +32,18 @@ class Diagnostics:
     ----------
     node : Node
     topics : Topics
+    queue : ReceiveQueue
+        Of the inputs.
     """
 
-    def __init__(self, node: Node, topics: Topics) -> None:
-        self._node = node
+    def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
+        self._node, self._queue = node, queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
         self._board = Board(node, topics.outputs[Output.DIAGNOSTICS])
         self._peers = PeerBook(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._ticks, self._active = 0, False
+        self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._scene, self._joints = "", 0
@@ -87,9 +91,9 @@ class Diagnostics:
     def _tick(self) -> None:
         """Look up one topic's other ends; look at everything, if it is due."""
         self._peers.look()
-        self._ticks += 1
-        if self._ticks >= PERIOD or (self._active and self._watch.is_urgent()):
-            self._ticks = 0
+        now = time.monotonic()
+        if now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent()):
+            self._due = now + PERIOD
             self._look()
 
     def _look(self) -> None:
@@ -97,8 +101,9 @@ class Diagnostics:
         told: dict[str, str | int] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
         peers = self._peers
-        others = self._other_booms()
-        self._board.show(self._watch.look(told, self._active, peers.publishers, peers.subscribers.values(), clock, others))
+        others, received = self._other_booms(), self._queue.look()
+        ends = peers.publishers, peers.subscribers.values()
+        self._board.show(self._watch.look(told, self._active, *ends, clock, received, others))
         self._tell_oddities()
         self._tell_clock(clock)
 

@@ -64,7 +64,7 @@ def _live(node: TwinNode, stop: Stop) -> int:
     try:
         if node.autostart and not node.start():
             return 1
-        spin(node, lambda: node.finished or stop.asked)
+        spin(node, node.queue, lambda: node.finished or stop.asked)
     except STOPPED:
         pass
     stop.over()

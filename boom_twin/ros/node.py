@@ -26,6 +26,7 @@ from .diagnostics import Diagnostics
 from .page import Page
 from .parameters import baseline_of, baseline_text, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
 from .qos import qos_profile
+from .receive_queue import ReceiveQueue
 from .services import Services
 from .started import Started
 from .types import message_class
@@ -54,7 +55,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
         self._topics = load_mapping(mapping_path(self))
-        self._diagnostics = Diagnostics(self, self._topics)
+        self.queue = ReceiveQueue()
+        self._diagnostics = Diagnostics(self, self._topics, self.queue)
         self._diagnostics.tune(thresholds_of(self))
         guard(self, lambda: self._twin is not None, self._tune)
 
@@ -100,8 +102,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
             wire = Wire(topic.type, partial(deserialize_message, message_type=kind))
-            receive = partial(self._receive, streams, wire)
-            self._subscriptions_in.append(self.create_subscription(kind, name, receive, qos, raw=True))
+            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, wire))
+            self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
         return outcome
@@ -164,6 +166,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._diagnostics.stop()
         while self._subscriptions_in:
             self.destroy_subscription(self._subscriptions_in.pop())
+        self.queue.close()
         gc.unfreeze()
 
     def _discard(self) -> None:

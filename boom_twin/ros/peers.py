@@ -56,8 +56,9 @@ def _as_discovered(qos: QoSProfile) -> QoSProfile:
 
 def _peers(address: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
     """From the other ends, and the QoS offered and asked for."""
-    faults = [(_name(end), _reason(offered, asked)) for end, offered, asked in ends]
-    return Peers(address, tuple(name for name, _ in faults), tuple(f"{name}: {reason}" for name, reason in faults if reason))
+    faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
+    names, ids = tuple(name for name, _ in faults), tuple(bytes(end.endpoint_gid).hex() for end, _, _ in ends)
+    return Peers(address, names, tuple(f"{name}: {reason}" for name, reason in faults if reason), ids)
 
 
 def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
@@ -66,5 +67,8 @@ def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
     return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
 
 
-def _name(endpoint: Any) -> str:
+def node_name(endpoint: Any) -> str:
+    """Namespace and name of the node of a publisher or subscriber that was discovered."""
+    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
+        return "a node without a known name"
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"

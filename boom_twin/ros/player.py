@@ -11,11 +11,12 @@ from typing import Any
 import rclpy
 from rclpy.publisher import Publisher
 
-from ..errors import BagError
+from ..errors import BagError, BoomTwinError
 from ..io.publishable import publishable
 from ..io.reader import Session, read_both
 from .clock import CLOCK, CLOCK_TYPE, clock_message
 from .definition import installed_class
+from .peers import node_name
 from .qos import qos_profile
 from .types import message_class
 
@@ -93,6 +94,14 @@ class Player:
         if timeout > 0.0:
             time.sleep(SETTLE)
         return lonely
+
+    def refuse_rivals(self) -> None:
+        """Raise BoomTwinError if anybody else publishes one of the topics."""
+        for name in self._publishers:
+            ends = self._node.get_publishers_info_by_topic(name)
+            if len(ends) > 1:
+                names = ", ".join(sorted(node_name(end) for end in ends))
+                raise BoomTwinError(f"{name} is published by {names}: of these only one may be. End the other first.")
 
     def length(self, start: float = 0.0, duration: float | None = None) -> float:
         """Seconds of that part of the session; BagError if it starts after the end."""

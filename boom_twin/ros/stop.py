@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
+import threading
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -23,7 +27,9 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 class Stop:
     """A stop by SIGINT or SIGTERM: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
 
-    An exception in the midst of a callback is reported by rclpy as a fault of the callback.
+    An exception in the midst of a callback is reported by rclpy as a fault of the callback. Python handles a signal between two
+    of its instructions, and compiling has some that take seconds: a thread, which runs meanwhile, ends a process that goes on.
+    So this is for one that holds nothing which could be lost.
 
     Attributes
     ----------
@@ -33,15 +39,28 @@ class Stop:
 
     LONGEST = 0.5
     """Time (s) for a piece of work to come to its end."""
+    LAST = 1.7
+    """Time (s) after which the process is ended, if it has not come to its end by itself."""
 
     def __init__(self) -> None:
         self.asked = False
+        reading, writing = os.pipe()
+        os.set_blocking(writing, False)
+        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)  # written to as soon as a signal comes, whatever Python does
+        threading.Thread(target=self._end, args=(reading,), daemon=True).start()
         on_stop_signal(self._ask)
 
     def _ask(self) -> None:
         self.asked = True
         signal.signal(signal.SIGALRM, signal.default_int_handler)
         signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
+
+    def _end(self, reading: int) -> None:
+        while os.read(reading, 1)[0] not in (signal.SIGINT, signal.SIGTERM):
+            pass
+        time.sleep(self.LAST)
+        os.write(sys.stderr.fileno(), b"stopped in the midst of its work\n")
+        os._exit(0)
 
     def over(self) -> None:
         """Interrupt nothing from now on: the process is ending."""

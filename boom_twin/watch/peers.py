@@ -18,8 +18,11 @@ class Peers:
         Their nodes.
     incompatible : sequence of str
         Those of them that cannot hear or be heard for their quality of service, and why, in words.
+    ids : sequence of str
+        GIDs, hexadecimal, in the order of `names`.
     """
 
     address: str = ""
     names: Sequence[str] = ()
     incompatible: Sequence[str] = ()
+    ids: Sequence[str] = ()

@@ -59,11 +59,8 @@ class TopicJudge:
         self._count(stream, now)
         if other_boom:
             judge.fault(Level.ERROR, other_boom)
-        names = ", ".join(publishers.names)
-        judge.note("publisher_names", names)
-        told = f"{len(publishers.names)} publishers of the same readings: {names}"
         judge.note("publishers", len(publishers.names))
-        judge.check("surplus_publishers", max(0, len(publishers.names) - 1), Bounds(warn=0), told)
+        judge.note("publisher_names", ", ".join(publishers.names))
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
         if stream.newest is None and not self._required:

@@ -13,11 +13,13 @@ from .health import HealthWatch, level_of
 from .model import ModelWatch
 from .outputs import OutputsJudge
 from .peers import Peers
+from .publishers import PublishersJudge
+from .reception import Reception, ReceptionJudge
 from .residual import ResidualJudge
 from .sensor import Sensor, SensorJudge
 from .status import Level, Status
 from .stream import StreamWatch
-from .topic import TopicJudge
+from .topic import TopicJudge, seconds
 
 
 class TwinWatch:
@@ -49,6 +51,7 @@ class TwinWatch:
         ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]).T for stream, each in sensors.items()}
         self._streams = {stream: StreamWatch(low, high, monotonic) for stream, (low, high) in ranges.items()}
         self._model, self._outputs = ModelWatch(), OutputsJudge()
+        self._publishers, self._reception = PublishersJudge(), ReceptionJudge()
         self.begin()
 
     def begin(self) -> None:
@@ -102,6 +105,7 @@ class TwinWatch:
         publishers: Mapping[Stream, Peers],
         subscribers: Iterable[Peers],
         clock: float,
+        reception: Mapping[str, Reception] | None = None,
         other_booms: Mapping[Stream, str] | None = None,
     ) -> list[Status]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
@@ -118,6 +122,8 @@ class TwinWatch:
             Of all outputs.
         clock : float
             Time that people know, s.
+        reception : dict of str to Reception, optional
+            By name of the topic; None where nothing is received live, and so nobody publishes.
         other_booms : dict of Stream to str, optional
             Of inputs whose messages are of another boom: that in words.
         """
@@ -128,6 +134,10 @@ class TwinWatch:
             return found
         sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
         found += [self._topic(stream, publishers[stream], now, clock, others.get(stream, "")) for stream in self._streams]
+        if reception is not None:
+            followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
+            found.insert(0, self._publishers.status(publishers, followed, self.thresholds, now, clock))
+            found.append(self._reception.status(reception, self.thresholds, now, clock))
         found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
         if self.health is not None:
             found.append(self.health.status(self.thresholds, now, clock))

@@ -32,6 +32,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from boom_twin.io.cdr import stamp_in
+from boom_twin.ros.isolation import isolated
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
@@ -84,7 +85,11 @@ def echo_on_events() -> None:
 
 
 def source(rate_text: str, duration_text: str, *more: str) -> None:
-    """Send, once it has been found, with ``imu`` that too; prints a line when it begins, and the stamps of the strokes."""
+    """Send, once it has been found; prints a line when it begins, and the stamps of the strokes.
+
+    More words: ``imu`` sends that too, ``later=S`` stamps by a clock that is ahead by so many seconds.
+    """
+    later = sum(round(float(word.removeprefix("later=")) * 1e9) for word in more if word.startswith("later="))
     rate, duration = float(rate_text), float(duration_text)
     node, scene = rclpy.create_node("source"), load_scene()
     publishers = [node.create_publisher(JointState, name, SENSOR) for name in ("cylinder_strokes", "joint_angles")]
@@ -114,7 +119,7 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
             time.sleep(left)
         for number, publisher in enumerate(publishers):
             place = 200 * number + k % 200
-            stamp = time.time_ns()
+            stamp = time.time_ns() + later
             data = templates[place]
             data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")
             publisher.publish(bytes(data))
@@ -224,9 +229,8 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=60.0, help="s (60)")
     parser.add_argument("--runs", type=int, default=3)
     args, rest = parser.parse_known_args()
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
+    with isolated():
+        runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
     for name in runs[0]:
         values = [each[name] for each in runs]
         print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")

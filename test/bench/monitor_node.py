@@ -27,6 +27,8 @@ import numpy as np
 from aiohttp import ClientSession
 from live import cpu
 
+from boom_twin.ros.isolation import isolated
+
 LIVE = [sys.executable, str(Path(__file__).with_name("live.py"))]
 SETTLING = 3.0
 KINDS = ("none", "read", "attacked", "stopped")
@@ -175,9 +177,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=4)
     parser.add_argument("--seconds", type=float, default=30.0, help="of every span (30)")
     args = parser.parse_args()
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    spans, steps, delays = watch(args.rounds, args.seconds)
+    with isolated():
+        spans, steps, delays = watch(args.rounds, args.seconds)
     print(f"load: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores; {args.rounds} rounds of {args.seconds:g} s")
     for name, (times, values), scale in (("step", steps.T, 1e3), ("delay", delays.T, 1e-6)):
         for q in (0.5, 0.99):

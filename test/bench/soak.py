@@ -6,7 +6,6 @@ rises by more than 1 MB.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from live import memory
+
+from boom_twin.ros.isolation import isolated
 
 SETTLING = 60.0
 """Time (s) before memory is looked at."""
@@ -29,9 +30,8 @@ def main() -> int:
     parser.add_argument("--duration", type=float, default=600.0, help="s (600)")
     parser.add_argument("--rate", type=float, default=200.0, help="of strokes and of angles, Hz (200)")
     args = parser.parse_args()
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    rows = np.array(samples(args.rate, args.duration))
+    with isolated():
+        rows = np.array(samples(args.rate, args.duration))
     time_s, resident = rows[rows[:, 0] > SETTLING].T
     slope = np.polyfit(time_s, resident, 1)[0]
     rise = slope * (time_s[-1] - time_s[0])

@@ -17,6 +17,7 @@ import pytest
 
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.session import write_session
+from boom_twin.ros.isolation import Isolation, isolated
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
@@ -64,17 +65,21 @@ class Process:
         self._file.close()
 
 
+@pytest.fixture(scope="session")
+def isolation() -> Iterator[Isolation]:
+    """A ROS domain that only this test run uses, closed to others."""
+    with isolated() as claimed:
+        yield claimed
+
+
 @pytest.fixture(scope="module")
-def domain(request: pytest.FixtureRequest) -> Iterator[None]:
-    """A domain that only this module of this run uses, confined to this machine; rclpy is started in it."""
+def domain(isolation: Isolation) -> Iterator[None]:
+    """rclpy, started in the domain of this test run."""
     import rclpy
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(1 + (os.getpid() + 17 * len(request.module.__name__)) % 101))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        rclpy.init(args=[])
-        yield
-        rclpy.try_shutdown()
+    rclpy.init(args=[])
+    yield
+    rclpy.try_shutdown()
 
 
 @pytest.fixture(scope="module")

@@ -125,11 +125,34 @@ def test_signals_end_the_node_in_order_at_any_time(
     assert "Traceback" not in node.said() and "FATAL" not in node.said()
 
 
+STUCK = """
+import hashlib, sys
+from boom_twin.twin import Twin
+Twin.warm_up = lambda self: hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)
+from boom_twin.ros.main import main
+sys.exit(main([]))
+"""
+"""A node whose preparation is one call into C that takes minutes, as compiling a large kernel takes seconds."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_that_is_deep_in_compiled_code(
+    spawn: Callable[..., Any], number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.getcwd()}")
+    (tmp_path / "start_stuck.py").write_text(STUCK)
+    node = spawn("start_stuck")
+    node.wait_for("preparing the model")
+    time.sleep(0.7)
+    assert node.stop(number) == 0, node.said()
+    assert "stopped in the midst of its work" in node.said() and "Traceback" not in node.said()
+
+
 MISSING = "del e.EventsExecutor"
 FAILING = """
 class Bad:
     add_node = remove_node = lambda self, node: None
-    def spin_until_future_complete(self, future, timeout_sec): raise RuntimeError("worn out")
+    def spin_once(self, timeout_sec): raise RuntimeError("worn out")
 e.EventsExecutor = Bad
 """
 

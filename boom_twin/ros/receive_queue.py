@@ -1,0 +1,135 @@
+"""Received messages that wait for their turn, so that a flood of them leaves time for services, timers and diagnostics.
+
+The executor only puts messages here, which takes some microseconds; they are read between two turns of it, for a limited time.
+Left to itself rclpy's events executor calls back once for every message that ever arrived, in one row with services and timers:
+where messages come faster than they are read, the row grows without limit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from inspect import Parameter, Signature
+from math import nan
+from typing import Any
+
+from ..watch.reception import Reception
+
+FRESH = 0.005
+"""Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
+NANO = 1e-9
+
+
+class _Topic:
+    """Waiting messages of one topic, with their arrival (ns), and what is counted."""
+
+    def __init__(self, depth: int, read: Callable[[bytes], None]) -> None:
+        self.waiting: deque[tuple[int, int, bytes]] = deque()
+        self.depth, self.read = depth, read
+        self.received = self.lost = self.dropped = 0
+        self.wait, self.number, self._missed, self._is_numbered = nan, -1, 0, True
+
+    def count(self, number: int | None) -> None:
+        """Go on with a message of this number; a number that is not above the last one is another publisher's."""
+        self.received += 1
+        if number is None:
+            return
+        if number <= self.number:
+            self._is_numbered = False
+        elif self.number >= 0:
+            self._missed += number - self.number - 1
+        self.number = number
+
+    def look(self) -> Reception:
+        """What is known; begins a new span of time."""
+        self.lost += self._missed if self._is_numbered else 0
+        found = Reception(self.received, self.lost, self.dropped, len(self.waiting), self.wait, self._is_numbered)
+        self._missed, self._is_numbered, self.wait = 0, True, nan
+        return found
+
+
+class ReceiveQueue:
+    """Reads messages of several topics in the order of their arrival.
+
+    Of a topic of which too many wait, the oldest gives way; others do not suffer from it.
+
+    Parameters
+    ----------
+    clock : callable
+        Time of the system, ns: the one by which the middleware notes arrivals.
+
+    Attributes
+    ----------
+    received : int
+        Messages of all topics that were put.
+    is_behind : bool
+        Whether the newest message had waited for the executor, so that there may be more.
+    """
+
+    def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
+        self._clock = clock
+        self._topics: dict[str, _Topic] = {}
+        self.received, self.is_behind = 0, False
+
+    def __bool__(self) -> bool:
+        """Whether a message waits."""
+        return any(topic.waiting for topic in self._topics.values())
+
+    def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
+        """The callback of a raw subscription.
+
+        Parameters
+        ----------
+        name : str
+            Of the topic.
+        depth : int
+            Most messages that may wait.
+        read : callable
+            What is to be done with one; it must not raise.
+        """
+        self._topics[name] = topic = _Topic(depth, read)
+
+        def put(*received: Any) -> None:
+            # message and information; rclpy 7.1's events executor gives the two as one
+            data, info = received if len(received) == 2 else received[0]
+            now = self._clock()
+            arrival = info["received_timestamp"] or now
+            topic.count(info["publication_sequence_number"])
+            topic.waiting.append((self.received, arrival, data))
+            if len(topic.waiting) > topic.depth:
+                topic.waiting.popleft()
+                topic.dropped += 1
+            self.received += 1
+            self.is_behind = (now - arrival) * NANO > FRESH
+
+        # rclpy tells by the signature that the information is wanted too
+        both = [Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")]
+        put.__signature__ = Signature(both)  # type: ignore[attr-defined]
+        return put
+
+    def close(self) -> None:
+        """Forget all topics, and what waits."""
+        self._topics.clear()
+        self.is_behind = False
+
+    def work(self, budget: float) -> None:
+        """Read messages until none waits or `budget`, s, has passed; the last one may take longer."""
+        end = time.monotonic() + budget
+        while (topic := self._next()) is not None:
+            _, arrival, data = topic.waiting.popleft()
+            wait = max(0, self._clock() - arrival) * NANO
+            if not wait <= topic.wait:
+                topic.wait = wait
+            topic.read(data)
+            if time.monotonic() >= end:
+                return
+
+    def look(self) -> Mapping[str, Reception]:
+        """What is known of every topic, by name; begins a new span of time."""
+        return {name: topic.look() for name, topic in self._topics.items()}
+
+    def _next(self) -> _Topic | None:
+        """The topic with the oldest message."""
+        waiting = [topic for topic in self._topics.values() if topic.waiting]
+        return min(waiting, key=lambda topic: topic.waiting[0][0], default=None)

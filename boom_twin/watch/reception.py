@@ -1,0 +1,74 @@
+"""Whether the messages that were published are received, and how long they wait for their turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import nan
+
+from ..thresholds import Thresholds
+from .gate import Bounds
+from .judge import Judge
+from .status import Status
+
+
+@dataclass(frozen=True, slots=True)
+class Reception:
+    """One topic; counts since the node was activated.
+
+    Attributes
+    ----------
+    received : int
+        Messages that arrived.
+    lost : int
+        That never arrived, by the publisher's numbers, as far as one publisher can be told: see `is_numbered`.
+    dropped : int
+        That arrived and gave way to newer ones before they were read.
+    waiting : int
+        That wait now.
+    wait : float
+        Longest time (s) from arrival to being read since the last look; NaN without any.
+    is_numbered : bool
+        Whether the numbers since the last look were those of one publisher.
+    """
+
+    received: int = 0
+    lost: int = 0
+    dropped: int = 0
+    waiting: int = 0
+    wait: float = nan
+    is_numbered: bool = True
+
+
+class ReceptionJudge:
+    """Judges all input topics together."""
+
+    def __init__(self) -> None:
+        self._judge = Judge("reception")
+        self._before: dict[str, Reception] = {}
+
+    def status(self, topics: Mapping[str, Reception], thresholds: Thresholds, now: float, clock: float) -> Status:
+        """State of the reception; `topics` by name, times as for `boom_twin.watch.sensor.SensorJudge`."""
+        judge = self._judge
+        judge.begin(now, thresholds)
+        for name, each in topics.items():
+            self._check(name, each, thresholds)
+        self._before = dict(topics)
+        return judge.finish(clock, "all that arrives is read at once")
+
+    def _check(self, name: str, each: Reception, thresholds: Thresholds) -> None:
+        before = self._before.get(name, Reception())
+        if each.received < before.received:  # counted anew
+            before = Reception()
+        lost, dropped = each.lost - before.lost, each.dropped - before.dropped
+        published = each.received - before.received + lost
+        share = (lost + dropped) / published if published else nan
+        for key in ("received", "lost", "dropped", "waiting"):
+            self._judge.note(f"{name} {key}", getattr(each, key))
+        told = f"{name}: {share:.0%} of the messages were not read ({lost} never arrived, {dropped} gave way to newer ones)"
+        bounds = Bounds(thresholds.unread_warn, thresholds.unread_error)
+        self._judge.check(f"{name} unread_share", share, bounds, told)
+        told = f"{name}: messages wait {each.wait:.3f} s for their turn: too many come, or the model is too slow"
+        self._judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
+        if not each.is_numbered:
+            self._judge.note(f"{name} lost", "unknown: numbers of several publishers, or of one that started anew")

@@ -1,0 +1,161 @@
+"""Demonstrations, tests and benchmarks neither feed a live rig on the same computer nor are fed by it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from sensor_msgs.msg import JointState
+
+from boom_twin.errors import BoomTwinError
+from boom_twin.ros import isolation as module
+from boom_twin.ros.isolation import Isolation, isolated
+
+TOPIC = "cylinder_strokes"
+RIG = f"""
+import sys, time, rclpy
+from sensor_msgs.msg import JointState
+rclpy.init(args=[])
+node = rclpy.create_node("some_rig")
+publisher = node.create_publisher(JointState, "{TOPIC}", 10)
+def hear(msg):
+    if msg.name != ["rig"]:
+        print("fed by", msg.name[0], flush=True)
+node.create_subscription(JointState, "{TOPIC}", hear, 10)
+print("there", flush=True)
+while True:
+    publisher.publish(JointState(name=["rig"]))
+    rclpy.spin_once(node, timeout_sec=0.02)
+"""
+"""A program of somebody else, with the twin's default topics."""
+FREE = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE")
+
+
+@contextmanager
+def rig_in(domain: int, log: Path) -> Iterator[None]:
+    """It runs, in the same domain, and knows nothing of isolation."""
+    known = {name: value for name, value in os.environ.items() if name not in FREE}
+    with log.open("w") as file:
+        process = subprocess.Popen(
+            [sys.executable, "-c", RIG], env={**known, "ROS_DOMAIN_ID": str(domain)}, stdout=file, stderr=file
+        )
+        try:
+            until(lambda: "there" in log.read_text() or process.poll() is not None)
+            assert process.poll() is None, log.read_text()
+            yield
+        finally:
+            process.kill()
+            process.wait()
+
+
+def until(condition: Callable[[], bool], patience: float = 60.0) -> None:
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody is looked for: for tests in which nobody comes before, or rclpy runs."""
+    monkeypatch.setattr(module, "refuse_foreign", lambda topics: None)
+
+
+def test_the_tests_run_in_a_domain_that_nobody_uses(isolation: Isolation) -> None:
+    assert int(os.environ["ROS_DOMAIN_ID"]) == isolation.domain > 101
+    assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+
+
+def test_no_two_runs_share_a_domain(unguarded: None) -> None:
+    with isolated() as one, isolated() as other, isolated() as third:
+        assert len({one.domain, other.domain, third.domain}) == 3
+        assert min(one.domain, other.domain, third.domain) > 101
+        with pytest.raises(BoomTwinError, match=f"domain {one.domain} is claimed by another"), isolated(one.domain):
+            pass
+    with isolated(one.domain) as again:
+        assert again.domain == one.domain
+
+
+def test_the_environment_is_put_back(unguarded: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_STATIC_PEERS", "192.0.2.1")
+    before = dict(os.environ)
+    with isolated():
+        assert "ROS_STATIC_PEERS" not in os.environ
+    assert dict(os.environ) == before
+
+
+def test_a_claim_lasts_as_long_as_a_child_that_holds_it(unguarded: None) -> None:
+    with isolated() as claim:
+        wait = [sys.executable, "-c", "import sys; sys.stdin.read()"]
+        child = subprocess.Popen(wait, stdin=subprocess.PIPE, pass_fds=(claim.lock,))
+    with pytest.raises(BoomTwinError, match="claimed by another"), isolated(claim.domain):
+        pass
+    child.communicate()
+    with isolated(claim.domain):
+        pass
+
+
+@pytest.mark.parametrize("handed_out", ["32768\t60999", "1024\t65535", "garbage"])
+def test_domains_whose_ports_nobody_else_gets_come_first(
+    handed_out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "range").write_text(handed_out)
+    monkeypatch.setattr(module, "HANDED_OUT", tmp_path / "range")
+    domains = module._preferred()
+    assert sorted(domains) == list(range(102, 233))
+    if handed_out.startswith("32768"):
+        assert sorted(domains[:18]) == list(range(215, 233))
+
+
+def test_a_rig_in_the_same_domain_neither_feeds_nor_is_fed(isolation: Isolation, domain: None, tmp_path: Path) -> None:
+    heard: list[str] = []
+    node = rclpy.create_node("isolated")
+    publisher = node.create_publisher(JointState, TOPIC, 10)
+    node.create_subscription(JointState, TOPIC, lambda msg: heard.append(msg.name[0]), 10)
+
+    def send() -> None:
+        publisher.publish(JointState(name=["isolated"]))
+        rclpy.spin_once(node, timeout_sec=0.02)
+
+    def is_seen() -> bool:
+        send()
+        return len(node.get_publishers_info_by_topic(TOPIC)) == 2
+
+    with rig_in(isolation.domain, tmp_path / "rig"):
+        until(is_seen)  # discovered, so it would be heard
+        for _ in range(100):
+            send()
+    node.destroy_node()
+    assert len(heard) > 50 and set(heard) == {"isolated"}
+    assert "fed by" not in (tmp_path / "rig").read_text()
+
+
+@pytest.mark.parametrize("demo", ["demo", "demo_live"])
+def test_a_demonstration_refuses_a_domain_in_use(
+    demo: str, isolation: Isolation, bag: Path, spawn: Callable[..., Any], tmp_path: Path
+) -> None:
+    with rig_in(free := unclaimed(), tmp_path / "rig"):
+        process = spawn(f"boom_twin.ros.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
+        assert process.end() == 1
+    assert f"ROS domain {free} is in use" in process.said() and "Traceback" not in process.said()
+    assert "/some_rig" in process.said() or "a node without a known name" in process.said()
+    assert f"publishes /{TOPIC}" in process.said() or f"listens to /{TOPIC}" in process.said()
+    assert not (tmp_path / "out").exists()
+
+
+def unclaimed() -> int:
+    """A domain that nobody has claimed a moment ago."""
+    claimed, lock = module._claim(module._preferred())
+    lock.close()
+    return claimed

@@ -1,0 +1,73 @@
+"""Levels of reception and of publishers."""
+
+from __future__ import annotations
+
+from boom_twin.records import Stream
+from boom_twin.thresholds import Thresholds
+from boom_twin.watch.peers import Peers
+from boom_twin.watch.publishers import PublishersJudge
+from boom_twin.watch.reception import Reception, ReceptionJudge
+from boom_twin.watch.status import Level, Status
+
+T = Thresholds()
+
+
+def received(*looks: Reception) -> Status:
+    """The state after looks that are two seconds apart."""
+    judge = ReceptionJudge()
+    for second, each in enumerate(looks):
+        status = judge.status({"cylinder_strokes": each}, T, 2.0 * second, 0.0)
+    return status
+
+
+def test_all_is_read() -> None:
+    status = received(*(Reception(200 * k, 0, 0, 0, 0.001) for k in range(4)))
+    assert (status.level, status.message) == (Level.OK, "all that arrives is read at once")
+    assert status.values["cylinder_strokes received"] == 600
+
+
+def test_messages_that_never_arrive_or_give_way() -> None:
+    some = received(*(Reception(1000 * k, 20 * k, 30 * k, 0, 0.001) for k in range(4)))
+    assert some.level == Level.WARN and "5% of the messages were not read (20 never arrived, 30 gave way" in some.message
+    most = received(*(Reception(1000 * k, 0, 900 * k, 4, 0.001) for k in range(4)))
+    assert most.level == Level.ERROR and most.values["cylinder_strokes dropped"] == 2700
+
+
+def test_messages_that_wait_long() -> None:
+    status = received(*(Reception(1000 * k, 0, 0, 100, 0.4) for k in range(4)))
+    assert status.level == Level.WARN and "messages wait 0.400 s" in status.message
+
+
+def test_counts_that_begin_anew_are_no_loss() -> None:
+    status = received(Reception(1000, 0, 900), Reception(2000, 0, 1800), Reception(10, 0, 0, 0, 0.001))
+    assert status.values["cylinder_strokes unread_share"] == 0.0
+
+
+def test_numbers_of_several_publishers_are_said_to_tell_nothing() -> None:
+    assert "unknown" in str(received(Reception(10, is_numbered=False)).values["cylinder_strokes lost"])
+
+
+def publishers(**names: tuple[str, ...]) -> Status:
+    peers = {stream: Peers(f"/{stream.value}", names.get(stream.value, ("/driver",))) for stream in Stream}
+    followed = dict.fromkeys(Stream, "12.500000000")
+    return PublishersJudge().status(peers, followed, T, 0.0, 0.0)
+
+
+def test_one_source_for_each_topic() -> None:
+    assert publishers().level == publishers(tip_imu=()).level == Level.OK
+
+
+def test_a_second_source_is_an_error_at_once() -> None:
+    status = publishers(joint_angles=("/driver", "/other"))
+    assert status.level == Level.ERROR
+    assert "2 publishers of /joint_angles: /driver, /other" in status.message and "whose stamps go on" in status.message
+    assert status.values["/joint_angles newest_stamp_s"] == "12.500000000"
+
+
+def test_streams_that_share_a_topic_may_have_a_publisher_each() -> None:
+    def status(names: tuple[str, ...]) -> Status:
+        peers = dict.fromkeys((Stream.STROKES, Stream.ANGLES), Peers("/joint_states", names))
+        return PublishersJudge().status(peers, dict.fromkeys(Stream, "1.0"), T, 0.0, 0.0)
+
+    assert status(("/cylinders", "/encoders")).level == Level.OK
+    assert status(("/cylinders", "/encoders", "/other")).level == Level.ERROR
