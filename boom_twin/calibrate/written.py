@@ -16,6 +16,7 @@ from ..io.sheet import FILE_NAME
 from ..plain import plain, read_plain
 from ..records import Stream
 from ..retouch import with_value, yaml_text
+from ..scene.end_mark import with_end_mark
 from ..scene.load import default_text
 from ..scene.parts import Scene
 from ..scene.read import parse, read_text
@@ -67,7 +68,7 @@ def write_scene(found: Calibration, scene: Scene, source: str | None, out: Path,
         read, faults = None, []
     if read is None or faults or not _same(read.model_dump(), wanted.model_dump()):
         text = anew(wanted)  # blocks share their text, so that an edit of one changes another
-    out.write_text(text, encoding="utf-8")
+    out.write_text(with_end_mark(text), encoding="utf-8")
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
 from ..scene import Scene
+from ..scene.end_mark import with_end_mark
 from ..scene.load import default_text
 from ..scene.read import read_text
 
@@ -137,7 +138,8 @@ def write(source: str | None, scene: Scene, found: Proposal, most: float, out: P
         f"# ({found.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    out.write_text("\n".join(head) + "\n\n" + rewritten(text, scene, found.edits), encoding="utf-8")
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits)
+    out.write_text(with_end_mark(body), encoding="utf-8")
 
 
 def _meaning(scene: Scene, edit: Edit) -> str:

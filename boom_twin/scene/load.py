@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import Fault, SceneError, SceneWarning
 from .checks import CHECKS
+from .end_mark import missing_end_mark
 from .parts import Scene
 from .read import parse, read_text
 from .structure import structure
@@ -63,11 +64,15 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
     """Like `load_scene`, with the oddities returned instead of issued as warnings."""
     name = DEFAULT_NAME if source is None else str(source)
     text = default_text() if source is None else read_text(Path(source))
+    cut, unmarked = missing_end_mark(text)
+    if cut is not None:
+        raise SceneError(name, (cut,))
     document = parse(text, name)
     scene, draft, faults = structure(document)
     findings = [finding for check in CHECKS for finding in check(draft)]
     faults += document.faults + [finding.fault for finding in findings if not finding.odd]
-    oddities = _in_order(finding.fault for finding in findings if finding.odd)
+    odd = [finding.fault for finding in findings if finding.odd]
+    oddities = _in_order(odd if unmarked is None else [*odd, unmarked])
     if faults or scene is None:
         raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
     return scene, oddities
