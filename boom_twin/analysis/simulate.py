@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..chain.program import State, Work
 from ..chain.status import OK, SENTENCES
 from ..chain.step import run
 from ..errors import SolverError, UsageError
@@ -18,9 +20,9 @@ from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
-from .doubt import doubt
+from .doubt import FIRST_ORDER, ROWS_ORDER, Deviation, differences, rings, told, too_fast
 from .pchip import pchip
-from .rows import first_row, row_width, taken_apart
+from .rows import Rows, first_row, row_width, taken_apart
 from .statics import checked_strokes, settle
 
 RHO = 0.8
@@ -45,8 +47,10 @@ class Simulation:
     step_error : float
         Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
-    doubt : str
-        What the motion gives reason to doubt: too coarse a step, ringing. Empty if nothing; see `analysis.doubt`.
+    step_errors, row_errors : tuple of Deviation
+        Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive.
+    doubts : tuple of str
+        What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast.
     pin_names : tuple of str
         Pins with clearance.
     pins : ndarray, shape (m, k, 4)
@@ -65,10 +69,17 @@ class Simulation:
     tip_acceleration: Array
     passes: float
     step_error: float
-    doubt: str
+    step_errors: tuple[Deviation, ...]
+    row_errors: tuple[Deviation, ...]
+    doubts: tuple[str, ...]
     pin_names: tuple[str, ...]
     pins: Array
     lost_contacts: NDArray[np.int64]
+
+    @property
+    def doubt(self) -> str:
+        """All `doubts` in one text; empty if there are none."""
+        return "; ".join(self.doubts)
 
     def columns(self) -> dict[str, Array]:
         """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
@@ -89,6 +100,9 @@ def simulate(
     scene: Scene, times: Array, strokes: Array, dt: float = 1e-3, angles: Array | None = None, rho: float = RHO
 ) -> Simulation:
     """Start at rest in the equilibrium of the first row and follow the strokes.
+
+    The motion is stepped three times, the second time with half the step and the third by every second row, to tell how
+    far the first can be trusted.
 
     Parameters
     ----------
@@ -112,25 +126,75 @@ def simulate(
     """
     times, strokes = _checked(scene, times, strokes, dt)
     plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+    start, work = plan.state(), plan.work()
+    settle(plan, start, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+
+    def stepped(rows: slice | Array, longest: float, finer: int) -> _Run:
+        return _stepped(plan, start, work, times[rows], strokes[rows], longest, finer, rho)
+
+    every, second = slice(None), np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
+    own = stepped(every, dt, 1)
+    if own.status != OK:
+        raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
+    found, tip = own.rows, own.rows.tip
+    step_errors, failed = _compared(times, found, stepped(every, dt, 2), FIRST_ORDER)
+    doubts = [f"with half the step the motion fails: {failed}; take a smaller step"] if failed else []
+    row_errors: tuple[Deviation, ...] = ()
+    if len(second) < len(times):
+        row_errors, failed = _compared(times[second], found.at(second), stepped(second, own.longest, 1), ROWS_ORDER)
+        doubts += [f"by every second row of the drive the motion fails: {failed}; give rows closer together"] if failed else []
+    if rings(own.jolt, own.shake, own.square):
+        doubts.append("the accelerations change sign from step to step; take a smaller step")
+    doubts += told(step_errors, f"the step of {dt:g} s is coarse", "take a smaller step")
+    apart = float(np.diff(times, prepend=times[0]).max())
+    doubts += told(row_errors, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together")
+    doubts += too_fast(times, own.rates)
+    return Simulation(
+        times, strokes, found.joints, found.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
+        own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
+        step_errors, row_errors, tuple(doubts), plan.pins, found.pins, own.lost,
+    )  # fmt: skip
+
+
+class _Run(NamedTuple):
+    """A motion by rows, what `chain.step.run` returns, and rates of the drive at the rows."""
+
+    status: int
+    row: int
+    rows: Rows
+    passes: float
+    jolt: float
+    shake: float
+    square: float
+    rates: Array
+    longest: float
+    lost: NDArray[np.int64]
+
+
+def _stepped(
+    plan: Plan, start: State, work: Work, times: Array, strokes: Array, dt: float, finer: int, rho: float
+) -> _Run:
+    """Follow the rows from the state `start`, which stays, in steps of at most `dt` divided by `finer`."""
+    state = State(*(array.copy() for array in start))
     rows = np.empty((len(times), row_width(plan)))
     rows[0] = first_row(plan, state)
-    steps, counts, drives, rates = _drive(plan, times, strokes, dt)
+    steps, counts, drives, rates = _drive(plan, times, strokes, dt, finer)
     status, row, passes, jolt, shake = run(
         plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
-    if status != OK:
-        raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
-    found = taken_apart(plan, rows)
-    tip = found.tip
-    travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
-    return Simulation(
-        times, strokes, found.joints, found.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
-        passes / max(int(counts.sum()), 1), abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt,
-        doubt(jolt, shake, travel, float(counts @ steps**2)), plan.pins, found.pins,
+    ends = np.cumsum(counts) - 1
+    return _Run(
+        int(status), int(row), taken_apart(plan, rows), passes / max(int(counts.sum()), 1), jolt, shake,
+        float(counts @ steps**2), np.vstack([np.zeros((1, plan.joints)), rates[ends]]), float(steps.max(initial=0.0)),
         state.contacts[:, LOST].astype(np.int64),
     )  # fmt: skip
+
+
+def _compared(times: Array, found: Rows, other: _Run, factor: float) -> tuple[tuple[Deviation, ...], str]:
+    """Errors of `found` by another run of the same rows, or why that run failed."""
+    if other.status != OK:
+        return (), SENTENCES[other.status]
+    return differences(times, found, other.rows, factor), ""
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:
@@ -152,11 +216,11 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
 
 
 def _drive(
-    plan: Plan, times: Array, strokes: Array, dt: float
+    plan: Plan, times: Array, strokes: Array, dt: float, finer: int
 ) -> tuple[Array, NDArray[np.int64], Array, Array]:
     """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
     spans = np.diff(times)
-    counts = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
+    counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
     if len(spans) == 0:
         empty = np.zeros((0, plan.joints))
         return spans, counts, empty, empty
