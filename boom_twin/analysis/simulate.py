@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain.program import State, Work
 from ..chain.status import OK, SENTENCES
-from ..chain.step import run
 from ..errors import SolverError, UsageError
-from ..physics.contact import LOST
-from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import compile_scene
-from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
-from .doubt import FIRST_ORDER, ROWS_ORDER, Deviation, differences, rings, told, too_fast
-from .pchip import pchip
-from .rows import Rows, first_row, row_width, taken_apart
+from .course import Course
+from .doubt import EstimatedError, ringing, told, too_fast
+from .estimated_errors import row_errors, step_errors
 from .statics import checked_strokes, settle
 
 RHO = 0.8
-TOLERANCE = 1e-6  # rad in the last pass of a step; what is left is about 1 to 50 times its square
-PASSES = np.int64(20)
-
 
 @dataclass(frozen=True)
 class Simulation:
@@ -47,7 +38,7 @@ class Simulation:
     step_error : float
         Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
-    step_errors, row_errors : tuple of Deviation
+    step_errors, row_errors : tuple of EstimatedError
         Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive.
     doubts : tuple of str
         What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast.
@@ -69,8 +60,8 @@ class Simulation:
     tip_acceleration: Array
     passes: float
     step_error: float
-    step_errors: tuple[Deviation, ...]
-    row_errors: tuple[Deviation, ...]
+    step_errors: tuple[EstimatedError, ...]
+    row_errors: tuple[EstimatedError, ...]
     doubts: tuple[str, ...]
     pin_names: tuple[str, ...]
     pins: Array
@@ -101,8 +92,7 @@ def simulate(
 ) -> Simulation:
     """Start at rest in the equilibrium of the first row and follow the strokes.
 
-    The motion is stepped three times, the second time with half the step and the third by every second row, to tell how
-    far the first can be trusted.
+    The motion is stepped again with half the step and by every second row, to tell how far it can be trusted.
 
     Parameters
     ----------
@@ -128,73 +118,23 @@ def simulate(
     plan = compile_scene(scene)
     start, work = plan.state(), plan.work()
     settle(plan, start, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-
-    def stepped(rows: slice | Array, longest: float, finer: int) -> _Run:
-        return _stepped(plan, start, work, times[rows], strokes[rows], longest, finer, rho)
-
-    every, second = slice(None), np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
-    own = stepped(every, dt, 1)
+    course = Course(plan, start, work, times, strokes, rho)
+    own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
-    found, tip = own.rows, own.rows.tip
-    step_errors, failed = _compared(times, found, stepped(every, dt, 2), FIRST_ORDER)
-    doubts = [f"with half the step the motion fails: {failed}; take a smaller step"] if failed else []
-    row_errors: tuple[Deviation, ...] = ()
-    if len(second) < len(times):
-        row_errors, failed = _compared(times[second], found.at(second), stepped(second, own.longest, 1), ROWS_ORDER)
-        doubts += [f"by every second row of the drive the motion fails: {failed}; give rows closer together"] if failed else []
-    if rings(own.jolt, own.shake, own.square):
-        doubts.append("the accelerations change sign from step to step; take a smaller step")
-    doubts += told(step_errors, f"the step of {dt:g} s is coarse", "take a smaller step")
+    by_steps, by_rows, tip = step_errors(course, own, dt), row_errors(course, own), own.rows.tip
     apart = float(np.diff(times, prepend=times[0]).max())
-    doubts += told(row_errors, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together")
-    doubts += too_fast(times, own.rates)
+    doubts = [
+        *ringing(own.jolt, own.shake, own.square),
+        *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
+        *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
+        *too_fast(times, own.rates),
+    ]
     return Simulation(
-        times, strokes, found.joints, found.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
+        times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
-        step_errors, row_errors, tuple(doubts), plan.pins, found.pins, own.lost,
+        by_steps, by_rows, tuple(doubts), plan.pins, own.rows.pins, own.lost,
     )  # fmt: skip
-
-
-class _Run(NamedTuple):
-    """A motion by rows, what `chain.step.run` returns, and rates of the drive at the rows."""
-
-    status: int
-    row: int
-    rows: Rows
-    passes: float
-    jolt: float
-    shake: float
-    square: float
-    rates: Array
-    longest: float
-    lost: NDArray[np.int64]
-
-
-def _stepped(
-    plan: Plan, start: State, work: Work, times: Array, strokes: Array, dt: float, finer: int, rho: float
-) -> _Run:
-    """Follow the rows from the state `start`, which stays, in steps of at most `dt` divided by `finer`."""
-    state = State(*(array.copy() for array in start))
-    rows = np.empty((len(times), row_width(plan)))
-    rows[0] = first_row(plan, state)
-    steps, counts, drives, rates = _drive(plan, times, strokes, dt, finer)
-    status, row, passes, jolt, shake = run(
-        plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
-    )
-    ends = np.cumsum(counts) - 1
-    return _Run(
-        int(status), int(row), taken_apart(plan, rows), passes / max(int(counts.sum()), 1), jolt, shake,
-        float(counts @ steps**2), np.vstack([np.zeros((1, plan.joints)), rates[ends]]), float(steps.max(initial=0.0)),
-        state.contacts[:, LOST].astype(np.int64),
-    )  # fmt: skip
-
-
-def _compared(times: Array, found: Rows, other: _Run, factor: float) -> tuple[tuple[Deviation, ...], str]:
-    """Errors of `found` by another run of the same rows, or why that run failed."""
-    if other.status != OK:
-        return (), SENTENCES[other.status]
-    return differences(times, found, other.rows, factor), ""
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:
@@ -213,19 +153,3 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     for values in (strokes.min(axis=0), strokes.max(axis=0), strokes[0]):
         checked_strokes(scene, values)
     return times, strokes
-
-
-def _drive(
-    plan: Plan, times: Array, strokes: Array, dt: float, finer: int
-) -> tuple[Array, NDArray[np.int64], Array, Array]:
-    """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
-    spans = np.diff(times)
-    counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
-    if len(spans) == 0:
-        empty = np.zeros((0, plan.joints))
-        return spans, counts, empty, empty
-    steps = spans / counts
-    inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
-    at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
-    lengths, rates = pchip(times, plan.closed_lengths + strokes, np.minimum(at, times[-1]))
-    return steps, counts, lengths, rates
