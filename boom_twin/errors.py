@@ -18,9 +18,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from .printable import printable
+
 
 class BoomTwinError(Exception):
-    """Base of all errors that are the input's fault, not the program's."""
+    """Base of all errors that are the input's fault, not the program's; their text is `printable`."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(printable(text))
 
 
 class UsageError(BoomTwinError):
@@ -77,7 +82,7 @@ class Fault:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
         state = "is absent" if self.value is ABSENT else f"= {_shortened(self.value)}"
         stop = "" if self.bound.endswith("?") else "."
-        return f"{where} {state}: {self.bound}{stop} {self.remedy}"
+        return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
 
 
 def _shortened(value: Any, width: int = 60) -> str:

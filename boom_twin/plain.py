@@ -19,7 +19,9 @@ MOST = 50_000
 """Values that it may hold, aliases written out."""
 DEEPEST = 30
 
-_TAG = "tag:yaml.org,2002:"
+TAG = "tag:yaml.org,2002:"
+TYPED = {"int": "whole number", "float": "number", "bool": "true or false", "null": "empty value"}
+"""Kinds of scalars that are more than text, in words."""
 
 
 def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: bool = False) -> Any:
@@ -92,7 +94,7 @@ class _Values:
         found: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
-            if not isinstance(key_node, ScalarNode) or key_node.tag == _TAG + "merge":
+            if not isinstance(key_node, ScalarNode) or key_node.tag == TAG + "merge":
                 raise ValueError(f"line {line}: a key that is not plain")
             key = self._scalar(key_node)
             if key in found:
@@ -101,9 +103,18 @@ class _Values:
         return found
 
     def _scalar(self, node: ScalarNode) -> Any:
-        kind = str(node.tag).removeprefix(_TAG)
-        if kind in ("int", "float", "bool", "null"):
-            return self._constructor.construct_object(node)
+        kind = str(node.tag).removeprefix(TAG)
+        if kind in TYPED:
+            return typed_value(self._constructor, node)
         if kind not in ("str", "timestamp"):
             raise ValueError(f"line {node.start_mark.line + 1}: the tag {node.tag}, which is not allowed")
         return node.value
+
+
+def typed_value(constructor: Any, node: ScalarNode) -> Any:
+    """The value of a scalar of one of the kinds `TYPED`; ValueError if its text is none, as in ``!!bool maybe``."""
+    try:
+        return constructor.construct_object(node)
+    except (ArithmeticError, LookupError, TypeError, ValueError, YAMLError):
+        kind, line = str(node.tag).removeprefix(TAG), node.start_mark.line + 1
+        raise ValueError(f"line {line}: {node.value[:40]!r}, which is no {TYPED[kind]}") from None

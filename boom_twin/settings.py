@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from .analysis.doubt import STROKE_RATE
 from .errors import UsageError
 from .parameter_file import checked, read_parameters
 from .thresholds import Thresholds
@@ -41,7 +42,7 @@ class Settings(BaseModel):
     rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")
     payload: Load = Field(default=-1.0, description="mass at the tip, kg; below 0: that of the scene")
     line_fill: Load = Field(default=-1.0, description="concrete in the pipe line, kg/m; below 0: that of the scene")
-    stroke_rate: Limit = Field(default=0.5, description="no cylinder is faster, m/s; a stroke that would be is left out")
+    stroke_rate: Limit = Field(default=STROKE_RATE, description="no cylinder is faster, m/s; such a stroke is left out")
     gap: Limit = Field(default=0.1, description="longer pauses between strokes are flagged, s")
     restart_gap: Limit = Field(default=5.0, description="longer pauses start again from rest, s")
     jump_back: Limit = Field(default=1.0, description="a stamp earlier by more than this starts everything again, s")

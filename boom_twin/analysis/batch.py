@@ -16,8 +16,9 @@ from ..errors import UsageError
 from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.plan import Plan
 from ..records import Array
+from .course import PASSES, TOLERANCE
 from .rows import first_row, row_width
-from .simulate import PASSES, RHO, TOLERANCE
+from .simulate import RHO
 from .statics import settle
 
 SHARES = 4  # pieces of work a core, so that one that is slowed down does not hold up the others

@@ -21,9 +21,10 @@ from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
+from .course import PASSES, TOLERANCE
 from .doubt import doubt
 from .rows import first_row, row_width, taken_apart
-from .simulate import PASSES, RHO, TOLERANCE
+from .simulate import RHO
 from .statics import settle
 
 FAMILIES = {

@@ -34,6 +34,10 @@ class Rows:
     tip: Array
     pins: Array
 
+    def at(self, rows: Array) -> Rows:
+        """Some of the instants, by their numbers."""
+        return Rows(self.joints[rows], self.cylinder_forces[rows], self.tip[rows], self.pins[rows])
+
 
 def row_width(plan: Plan) -> int:
     """Numbers of one instant."""

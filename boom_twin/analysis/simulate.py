@@ -9,24 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chain.status import OK, SENTENCES
-from ..chain.step import run
 from ..errors import SolverError, UsageError
-from ..physics.contact import LOST
-from ..physics.integrators import GENERALISED_ALPHA
 from ..plan.compile import compile_scene
-from ..plan.plan import Plan
 from ..records import Array
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.parts import Scene
-from .doubt import doubt
-from .pchip import pchip
-from .rows import first_row, row_width, taken_apart
+from .course import Course
+from .doubt import EstimatedError, ringing, told, too_fast
+from .estimated_errors import row_errors, step_errors
 from .statics import checked_strokes, settle
 
 RHO = 0.8
-TOLERANCE = 1e-6  # rad in the last pass of a step; what is left is about 1 to 50 times its square
-PASSES = np.int64(20)
-
 
 @dataclass(frozen=True)
 class Simulation:
@@ -45,8 +38,10 @@ class Simulation:
     step_error : float
         Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
-    doubt : str
-        What the motion gives reason to doubt: too coarse a step, ringing. Empty if nothing; see `analysis.doubt`.
+    step_errors, row_errors : tuple of EstimatedError
+        Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive.
+    doubts : tuple of str
+        What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast.
     pin_names : tuple of str
         Pins with clearance.
     pins : ndarray, shape (m, k, 4)
@@ -65,10 +60,17 @@ class Simulation:
     tip_acceleration: Array
     passes: float
     step_error: float
-    doubt: str
+    step_errors: tuple[EstimatedError, ...]
+    row_errors: tuple[EstimatedError, ...]
+    doubts: tuple[str, ...]
     pin_names: tuple[str, ...]
     pins: Array
     lost_contacts: NDArray[np.int64]
+
+    @property
+    def doubt(self) -> str:
+        """All `doubts` in one text; empty if there are none."""
+        return "; ".join(self.doubts)
 
     def columns(self) -> dict[str, Array]:
         """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
@@ -89,6 +91,8 @@ def simulate(
     scene: Scene, times: Array, strokes: Array, dt: float = 1e-3, angles: Array | None = None, rho: float = RHO
 ) -> Simulation:
     """Start at rest in the equilibrium of the first row and follow the strokes.
+
+    The motion is stepped again with half the step and by every second row, to tell how far it can be trusted.
 
     Parameters
     ----------
@@ -112,24 +116,24 @@ def simulate(
     """
     times, strokes = _checked(scene, times, strokes, dt)
     plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-    rows = np.empty((len(times), row_width(plan)))
-    rows[0] = first_row(plan, state)
-    steps, counts, drives, rates = _drive(plan, times, strokes, dt)
-    status, row, passes, jolt, shake = run(
-        plan.tables, state, work, steps, counts, drives, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
-    )
-    if status != OK:
-        raise SolverError(f"step failed after t = {times[row]:.6g} s: {SENTENCES[status]}.")
-    found = taken_apart(plan, rows)
-    tip = found.tip
-    travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
+    start, work = plan.state(), plan.work()
+    settle(plan, start, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+    course = Course(plan, start, work, times, strokes, rho)
+    own = course.stepped(np.arange(len(times)), dt)
+    if own.status != OK:
+        raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
+    by_steps, by_rows, tip = step_errors(course, own, dt), row_errors(course, own), own.rows.tip
+    apart = float(np.diff(times, prepend=times[0]).max())
+    doubts = [
+        *ringing(own.jolt, own.shake, own.square),
+        *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
+        *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
+        *too_fast(times, own.rates),
+    ]
     return Simulation(
-        times, strokes, found.joints, found.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
-        passes / max(int(counts.sum()), 1), abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * jolt,
-        doubt(jolt, shake, travel, float(counts @ steps**2)), plan.pins, found.pins,
-        state.contacts[:, LOST].astype(np.int64),
+        times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
+        own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
+        by_steps, by_rows, tuple(doubts), plan.pins, own.rows.pins, own.lost,
     )  # fmt: skip
 
 
@@ -149,19 +153,3 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     for values in (strokes.min(axis=0), strokes.max(axis=0), strokes[0]):
         checked_strokes(scene, values)
     return times, strokes
-
-
-def _drive(
-    plan: Plan, times: Array, strokes: Array, dt: float
-) -> tuple[Array, NDArray[np.int64], Array, Array]:
-    """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
-    spans = np.diff(times)
-    counts = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
-    if len(spans) == 0:
-        empty = np.zeros((0, plan.joints))
-        return spans, counts, empty, empty
-    steps = spans / counts
-    inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
-    at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
-    lengths, rates = pchip(times, plan.closed_lengths + strokes, np.minimum(at, times[-1]))
-    return steps, counts, lengths, rates

@@ -17,6 +17,7 @@ from ..io.sheet import kept
 from ..plain import plain
 from ..records import Stream
 from ..retouch import with_value, yaml_text
+from ..scene.end_mark import with_end_mark
 from ..scene.parts import Scene
 from ..scene.read import parse
 from ..scene.structure import structure
@@ -70,7 +71,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
         read, faults = None, []
     if read is None or faults or not _same(read.model_dump(), wanted.model_dump()):
         text = anew(wanted)  # blocks share their text, so that an edit of one changes another
-    write_atomic(out, text)
+    write_atomic(out, with_end_mark(text))
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:

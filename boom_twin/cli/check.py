@@ -32,7 +32,7 @@ def run(args: Namespace) -> int:
     scene, oddities = examine(args.scene)
     account = explain(scene)
     name = args.scene or DEFAULT_NAME
-    values, lines = summary(name, account, oddities), report(name, scene, account, oddities)
+    values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
         found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
         values |= need.summary(found, args.need)
@@ -72,6 +72,14 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
         "warnings": [str(oddity) for oddity in oddities],
     }
+
+
+def _restitutions(scene: Scene) -> dict[str, float]:
+    """What is asked of the contact law, and what it gives; nothing without clearance."""
+    if scene.clearance is None:
+        return {}
+    law = scene.clearance.contact
+    return {"restitution": law.restitution, "restitution_given": law.given_restitution}
 
 
 def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
@@ -144,7 +152,8 @@ def _oil(joint: JointAccount) -> str:
 
 def _clearance_title(clearance: Clearance) -> str:
     law = clearance.contact
-    words = f"{law.law} contact, restitution {law.restitution:g}, friction {law.friction:g}"
+    given = f"restitution {law.restitution:g} (it really gives {law.given_restitution:.3f})"
+    words = f"{law.law} contact, {given}, friction {law.friction:g}"
     linear = ", linearised at the preload" if clearance.treatment == "spring-damper" else ""
     return f"Pins with clearance ({words}{linear})"
 

@@ -12,11 +12,13 @@ import os
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
-from typing import Protocol, cast
+from typing import Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
+from ..printable import PrintableStream
 
 # name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -72,6 +74,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str]) -> int:
+    """Run one command; whatever it prints, of whatever file or message, cannot steer the terminal."""
+    with redirect_stdout(_printable(sys.stdout)), redirect_stderr(_printable(sys.stderr)):
+        return _run(arguments)
+
+
+def _printable(stream: TextIO) -> TextIO:
+    return cast(TextIO, PrintableStream(stream))
+
+
+def _run(arguments: Sequence[str]) -> int:
     args = _parser(arguments).parse_args(arguments)
     command = _command(args.command)
     try:

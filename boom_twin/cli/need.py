@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..io.atomic import check_target, write_atomic
 from ..scene import Scene
+from ..scene.end_mark import with_end_mark
 from ..scene.load import default_text
 from ..scene.read import read_text
 
@@ -138,7 +139,8 @@ def write(source: str | None, scene: Scene, found: Proposal, most: float, out: P
         f"# ({found.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    write_atomic(out, "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits))
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits)
+    write_atomic(out, with_end_mark(body))
 
 
 def _meaning(scene: Scene, edit: Edit) -> str:

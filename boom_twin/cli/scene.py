@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
+from ..scene.end_mark import with_end_mark
 from ..scene.load import clearance_text, default_text
 
 
@@ -15,7 +16,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Print the file."""
-    sys.stdout.write(default_text())
-    if args.clearance:
-        sys.stdout.write("\n" + clearance_text())
+    text = default_text()
+    sys.stdout.write(with_end_mark(f"{text}\n{clearance_text()}") if args.clearance else text)
     return 0

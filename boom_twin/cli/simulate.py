@@ -42,8 +42,8 @@ def run(args: Namespace) -> int:
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles)
-    if result.doubt:
-        print(f"boom_twin simulate: warning: {result.doubt} (--dt is {args.dt:g} s).", file=sys.stderr)
+    for doubt in result.doubts:
+        print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
     columns = result.columns()
     table = np.column_stack(list(columns.values()))
     text = StringIO(newline="")

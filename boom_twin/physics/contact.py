@@ -23,6 +23,7 @@ pin: it turns with the force of a cylinder, and stays on its side when the force
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,6 +33,7 @@ SMOOTH = 1e-6  # m, over which contact sets in
 NEAR = 4.0 * SMOOTH  # m, width of the gap at which journal and bush count as touching
 LEAST_GAP = 3e-5  # m, least difference of radii in K
 SLOWEST = 1e-3  # m/s, least speed of approach
+LEAST_RESTITUTION = 0.01  # that chi is solved for
 LEAST_SHARE = 0.01  # of the elastic force, however fast the journal leaves
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
@@ -80,7 +82,50 @@ def hunt_crossley(restitution: float) -> float:
     return 1.5 * (1.0 - restitution)
 
 
-LAWS = {"hertz": hertz, "lankarani-nikravesh": lankarani_nikravesh, "flores": flores, "hunt-crossley": hunt_crossley}
+def hunt_crossley_exact(restitution: float) -> float:
+    """Hunt and Crossley's force with the chi that really gives this restitution, solved for; see `restitution_of`."""
+    wanted, low, high = max(restitution, LEAST_RESTITUTION), 0.0, 1.0
+    while restitution_of(high) > wanted:
+        low, high = high, 2.0 * high
+    return _bisect(lambda chi: restitution_of(chi) > wanted, low, high)
+
+
+LAWS = {
+    "hertz": hertz,
+    "lankarani-nikravesh": lankarani_nikravesh,
+    "flores": flores,
+    "hunt-crossley": hunt_crossley,
+    "hunt-crossley-exact": hunt_crossley_exact,
+}
+
+
+def restitution_of(loss: float) -> float:
+    """The restitution that an impact with chi = `loss` really has, whatever speed, mass, K and exponent.
+
+    With u the speed over that of approach, m v^2 u du = -K d^e (1 + chi u) dd integrates to G(-e) = G(1) over an impact, with
+    G(u) the integral of s/max(1 + chi s, `LEAST_SHARE`) from 0 to u (Gonthier, McPhee, Lange and Piedboeuf 2004).
+    """
+    entering = _impact(loss, 1.0)
+    return _bisect(lambda e: _impact(loss, -e) < entering, 0.0, 1.0)
+
+
+def _impact(chi: float, u: float) -> float:
+    """G(u) of `restitution_of`."""
+    free = (1.0 - LEAST_SHARE) / chi if chi > 0.0 else math.inf
+    within, beyond = max(u, -free), max(-u - free, 0.0)
+    if chi < 1e-3:
+        found = within**2 * (0.5 - chi * within / 3.0 + (chi * within) ** 2 / 4.0)
+    else:
+        found = within / chi - math.log1p(chi * within) / chi**2
+    return found + beyond * (free + 0.5 * beyond) / LEAST_SHARE if beyond > 0.0 else found
+
+
+def _bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
+    """Where `is_below` turns from true to false."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_below(middle) else (low, middle)
+    return 0.5 * (low + high)
 
 
 def contact_stiffness(radius: float, gap: float, softness: float) -> float:

@@ -11,6 +11,7 @@ from .finding import Finding
 CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     consistency.counts,
     consistency.sections,
+    consistency.modes,
     consistency.joints,
     placement.pins,
     placement.thin_parts,

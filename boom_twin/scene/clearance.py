@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 from .draft import Draft
 from .finding import Finding, odd, wrong
-from .parts import Joint
+from .parts import ContactLaw, Joint
 
 PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
+NEAR_ENOUGH = 0.02  # between the restitution that is asked for and the one that a law gives
 WIDE = 0.1  # of the pin's radius; contact of a journal in a bush is meant for much less
 
 
@@ -17,6 +18,7 @@ def pins(draft: Draft) -> Iterator[Finding]:
     """Every pin of the block names a pin of the boom, and its clearance fits its radius."""
     if draft.clearance is None:
         return
+    yield from _restitution(draft, draft.clearance.contact)
     seen: dict[str, int] = {}
     for i, pin in enumerate(draft.clearance.pins):
         place = ("clearance", "pins", i)
@@ -34,6 +36,14 @@ def pins(draft: Draft) -> Iterator[Finding]:
         elif share > WIDE:
             bound = f"it is more than a tenth of pin_radius = {pin.pin_radius:g} m, for which the contact law is not meant"
             yield odd(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
+
+
+def _restitution(draft: Draft, law: ContactLaw) -> Iterator[Finding]:
+    """A law that does not keep the restitution it is given."""
+    if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_ENOUGH:
+        bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
+        remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
+        yield odd(draft, ("clearance", "contact", "restitution"), law.restitution, bound, remedy)
 
 
 def names_of(index: int, joint: Joint) -> list[str]:

@@ -98,7 +98,7 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
         "pins": "a list with one block per pin",
     },
     ContactLaw: {
-        "law": "hertz, lankarani-nikravesh, flores or hunt-crossley",
+        "law": "hertz, lankarani-nikravesh, flores, hunt-crossley or hunt-crossley-exact",
         "exponent": "the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's",
         "restitution": "the coefficient of restitution, above 0 and at most 1",
         "friction": "Coulomb's coefficient of friction, 0 to 2",

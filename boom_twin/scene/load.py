@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import Fault, SceneError, SceneWarning
 from .checks import CHECKS
+from .end_mark import missing_end_mark
 from .parts import Scene
 from .read import parse, read_text
 from .structure import structure
@@ -68,11 +69,15 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
 
 def examine_text(text: str, name: str) -> tuple[Scene, list[Fault]]:
     """Like `examine`, of a scene's text; `name` is what it is called in errors."""
+    cut, unmarked = missing_end_mark(text)
+    if cut is not None:
+        raise SceneError(name, (cut,))
     document = parse(text, name)
     scene, draft, faults = structure(document)
     findings = [finding for check in CHECKS for finding in check(draft)]
     faults += document.faults + [finding.fault for finding in findings if not finding.odd]
-    oddities = _in_order(finding.fault for finding in findings if finding.odd)
+    odd = [finding.fault for finding in findings if finding.odd]
+    oddities = _in_order(odd if unmarked is None else [*odd, unmarked])
     if faults or scene is None:
         raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
     return scene, oddities

@@ -26,6 +26,7 @@ BOUNDS = {
     "model_type": "a block of keys is needed, not {what}",
 }
 
+LONGEST = 40  # characters of a text that is taken for a number
 ITEMS = {MEANING[Scene][key]: "a block of keys, as in the default scene" for key in ("sections", "joints")}
 
 
@@ -111,6 +112,8 @@ def _number_remedy(value: Any, give: str) -> str:
     if not isinstance(value, str):
         return give
     text = value.strip()
+    if len(text) > LONGEST:
+        return give
     pointed = text.replace(",", ".", 1)
     if NUMBER.fullmatch(text):
         return f"Write it without quotes: {text}."

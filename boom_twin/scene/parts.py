@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..physics.contact import LAWS, restitution_of
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -114,11 +116,16 @@ class Joint(Part):
 class ContactLaw(Part):
     """How journal and bush touch: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
 
-    law: Literal["hertz", "lankarani-nikravesh", "flores", "hunt-crossley"] = "lankarani-nikravesh"
+    law: Literal["hertz", "lankarani-nikravesh", "flores", "hunt-crossley", "hunt-crossley-exact"] = "lankarani-nikravesh"
     exponent: Annotated[float, Field(ge=1.3, le=3)] = 1.5
     restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
     friction: Annotated[float, Field(ge=0, le=2)] = 0.0
     bush: Material | None = None
+
+    @property
+    def given_restitution(self) -> float:
+        """Restitution that impacts by this law really have."""
+        return restitution_of(LAWS[self.law](self.restitution))
 
 
 class Pin(Part):

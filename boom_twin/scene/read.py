@@ -16,23 +16,24 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from ..errors import Fault, SceneError
-from ..plain import BoundedComposer
+from ..plain import TAG, TYPED, BoundedComposer, typed_value
+from ..printable import printable
 
 Place = tuple[str | int, ...]
 
 MAX_BYTES = 4_000_000
 MAX_VALUES = 200_000
 MAX_DEPTH = 20
-TAG = "tag:yaml.org,2002:"
+SURROGATE = re.compile("[\ud800-\udfff]")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def words(place: Place) -> str:
-    """A place in the words of the file: ``sections[1].root.mass``."""
+    """A place in the words of the file: ``sections[1].root.mass``; line ends in a key are shown as escapes."""
     text = ""
     for step in place:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return text or "scene"
+    return printable(text, keep="") or "scene"
 
 
 @dataclass
@@ -138,10 +139,12 @@ class _Reader:
                 bound = "nested too deeply, or too many values, for a scene"
                 self._fault(place, "...", bound, "Write it without aliases that hold themselves.")
             return None
-        if isinstance(node, MappingNode):
-            return self._mapping(node, place)
         if isinstance(node, ScalarNode):
             return self._scalar(node, place)
+        if node.tag not in (TAG + "map", TAG + "seq"):
+            self._refuse_tag(node, place)
+        if isinstance(node, MappingNode):
+            return self._mapping(node, place)
         return tuple(self.value(item, (*place, i)) for i, item in enumerate(node.value))
 
     def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
@@ -162,17 +165,24 @@ class _Reader:
 
     def _scalar(self, node: ScalarNode, place: Place) -> Any:
         kind = str(node.tag).removeprefix(TAG)
-        if kind in ("int", "float", "bool", "null"):
+        if kind in TYPED:
             try:
-                return self.constructor.construct_object(node)
-            except (ValueError, OverflowError, YAMLError):
+                return typed_value(self.constructor, node)
+            except ValueError:
+                self._fault(place, node.value, f"this is no {TYPED[kind]}", "Write the value alone, without a tag.")
                 return node.value
         if kind not in ("str", "timestamp"):
-            remedy = "Remove the tag: a scene holds plain values only."
-            self._fault(place, node.value, f"the tag {node.tag} is not allowed", remedy)
+            self._refuse_tag(node, place)
+        elif SURROGATE.search(node.value):
+            self._fault(place, node.value, "it holds half a character", "Write the text without \\uD800 to \\uDFFF.")
+            return ""
         elif node.style is None and NUMBER.fullmatch(node.value):  # +.5e3, which YAML takes for text
             return float(node.value)
         return node.value
+
+    def _refuse_tag(self, node: Node, place: Place) -> None:
+        remedy = "Remove the tag: a scene holds plain values only."
+        self._fault(place, node.value if isinstance(node, ScalarNode) else "...", f"the tag {node.tag} is not allowed", remedy)
 
     def _fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
         self.document.faults.append(self.document.fault(place, value, bound, remedy))

@@ -10,6 +10,7 @@ from ruamel.yaml.error import YAMLError
 
 from ..errors import SceneError
 from ..retouch import with_value
+from ..scene.end_mark import with_end_mark
 from ..scene.parts import Scene
 from ..scene.read import parse
 from ..scene.structure import structure
@@ -41,7 +42,7 @@ def anew(scene: Scene) -> str:
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     yaml.dump(_plain(scene.model_dump(exclude_none=True)), stream)
-    return stream.getvalue()
+    return with_end_mark(stream.getvalue())
 
 
 def _plain(value: object) -> object:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..io.atomic import write_atomic
+from ..printable import printable
 from ..records import Array
 
 if TYPE_CHECKING:
@@ -51,6 +52,10 @@ LOOK = {
 }
 
 
+LARGE: dict[str, Any] = {"fontsize": 17, "color": INK, "va": "top", "ha": "left", "weight": "bold", "parse_math": False}
+SMALL: dict[str, Any] = {"fontsize": 13, "color": GREY, "va": "top", "ha": "right", "style": "italic", "parse_math": False}
+
+
 @contextmanager
 def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
     """A figure of `size` (hundreds of pixels), titled, written to `path` as PNG when the block is left.
@@ -66,10 +71,9 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
         FigureCanvasAgg(figure)
         top = 1.0 - 0.52 / size[1]
         figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)  # type: ignore[union-attr, call-arg]
-        figure.text(0.012, 1.0 - 0.14 / size[1], title, fontsize=17, color=INK, va="top", ha="left", weight="bold")
+        figure.text(0.012, 1.0 - 0.14 / size[1], printable(title, ""), **LARGE)
         if note:
-            small: dict[str, Any] = {"fontsize": 13, "color": GREY, "style": "italic", "va": "top", "ha": "right"}
-            figure.text(0.988, 1.0 - 0.16 / size[1], shorten(note, NOTE, placeholder=" .."), **small)
+            figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)
         yield figure
         content = BytesIO()
         figure.savefig(content, dpi=DPI, metadata={"Software": None}, format=path.suffix[1:] or "png")

@@ -17,8 +17,9 @@ from oracle import booms, energy
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, contact_energy, with_pins
 
+from boom_twin.analysis.course import PASSES, TOLERANCE
 from boom_twin.analysis.rows import row_width
-from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
+from boom_twin.analysis.simulate import RHO
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.step import run
 from boom_twin.physics.contact import LOST

@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 
-from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
+from boom_twin.analysis.course import PASSES, TOLERANCE
+from boom_twin.analysis.simulate import RHO
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.program import State
 from boom_twin.chain.step import run

@@ -9,6 +9,7 @@ import pytest
 
 from boom_twin.cli.main import main
 from boom_twin.scene import load_scene
+from boom_twin.scene.end_mark import with_end_mark
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import clearance_text, default_text
 
@@ -35,7 +36,7 @@ def test_the_printed_scene_is_whole(scene_file: Path) -> None:
     assert scene.clearance is not None
     assert [pin.at for pin in scene.clearance.pins] == [f"cylinder_{i}.rod" for i in range(1, 5)]
     assert scene.model_copy(update={"clearance": None}) == load_scene()
-    assert scene_file.read_text() == default_text() + "\n" + clearance_text()
+    assert scene_file.read_text() == with_end_mark(default_text() + "\n" + clearance_text())
 
 
 def test_simulate_tells_lost_contacts_and_draws_orbits(

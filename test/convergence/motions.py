@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.analysis.simulate import PASSES, RHO, TOLERANCE
+from boom_twin.analysis.course import PASSES, TOLERANCE
+from boom_twin.analysis.simulate import RHO
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.step import observe, run
 from boom_twin.physics.integrators import GENERALISED_ALPHA

@@ -7,7 +7,7 @@ import pytest
 from convergence import motions
 from oracle import booms, energy, segments
 
-from boom_twin.analysis.simulate import PASSES, TOLERANCE
+from boom_twin.analysis.course import PASSES, TOLERANCE
 from boom_twin.analysis.statics import settle
 from boom_twin.chain.step import LONGEST_INCREMENT, advance
 from boom_twin.physics.integrators import GENERALISED_ALPHA, prepare

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from boom_twin.analysis.course import PASSES
 from boom_twin.analysis.posture import set_undeformed
-from boom_twin.analysis.simulate import PASSES, RHO
+from boom_twin.analysis.simulate import RHO
 from boom_twin.chain.place import place
 from boom_twin.chain.program import State, Work
 from boom_twin.chain.step import advance, observe, run

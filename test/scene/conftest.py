@@ -12,6 +12,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from boom_twin.errors import Fault, SceneError
+from boom_twin.scene.end_mark import with_end_mark
 from boom_twin.scene.load import default_text, examine
 
 Values = dict[str, Any]
@@ -34,7 +35,7 @@ class Bench:
         """A scene file of these values."""
         stream = io.StringIO()
         YAML(typ="safe", pure=True).dump(values, stream)
-        return self.text(stream.getvalue())
+        return self.text(with_end_mark(stream.getvalue()))
 
     def text(self, text: str) -> Path:
         """A scene file of this text."""

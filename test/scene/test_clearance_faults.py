@@ -36,7 +36,7 @@ FAULTS = [
     (pin(clearance=1e-4), "pins[0].clearance", ("unknown key", "`radial_clearance`")),
     ({"pins": [{"at": "cylinder_1.rod", "pin_radius": 0.03}]}, "pins[0].radial_clearance", ("is absent", "m.")),
     ({"pins": "cylinder_1.rod"}, "pins", ("a list is needed, not text", "one block per pin")),
-    (law(law="hertzian"), "contact.law", ("'hertzian'", "'hertz', 'lankarani-nikravesh', 'flores' or 'hunt-crossley'")),
+    (law(law="hertzian"), "contact.law", ("'hertzian'", "'flores', 'hunt-crossley' or 'hunt-crossley-exact'")),
     (law(restitution=0), "contact.restitution", ("greater than 0", "at most 1")),
     (law(restitution=1.1), "contact.restitution", ("1.1", "not be more than 1")),
     (law(exponent=0.5), "contact.exponent", ("not be less than 1.3", "1.5 for Hertz's")),

@@ -10,6 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from boom_twin.scene import Scene, load_scene
+from boom_twin.scene.end_mark import with_end_mark
 from boom_twin.scene.load import default_text, examine
 from boom_twin.scene.read import parse
 from boom_twin.scene.structure import structure
@@ -72,7 +73,7 @@ def test_an_edited_scene_differs_in_the_edited_keys_only() -> None:
 
 @pytest.mark.parametrize("form", [str, in_blocks], ids=["braces", "blocks"])
 def test_the_edited_text_describes_the_edited_scene(form, tmp_path: Path) -> None:
-    text = form(default_text())
+    text = with_end_mark(form(default_text()))
     scene = scene_of(text)
     after = rewritten(text, scene, EDITS)
     (tmp_path / "lean.yaml").write_text(after, encoding="utf-8")

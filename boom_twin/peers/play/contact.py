@@ -11,15 +11,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, sqrt, tanh
+from math import hypot, log1p, sqrt, tanh
+
+from scipy.optimize import brentq
 
 LEAST_SPEED = 1e-3  # m/s, of approach at entry
+
+
+def keeping(restitution: float) -> float:
+    """chi with which an impact keeps just this share e of its speed: chi (1 + e) = log[(1 + chi)/(1 - chi e)]."""
+
+    def excess(chi: float) -> float:
+        return chi * (1.0 + restitution) - log1p(chi) + log1p(-chi * restitution)
+
+    most = (1.0 - 1e-15) / restitution
+    if restitution == 1.0 or excess(most) > 0.0:
+        return 0.0 if restitution == 1.0 else most
+    return float(brentq(excess, 0.5 * (1.0 - restitution), most))
+
 
 HYSTERESIS: dict[str, Callable[[float], float]] = {
     "hertz": lambda e: 0.0,
     "lankarani-nikravesh": lambda e: 3.0 * (1.0 - e**2) / 4.0,
     "flores": lambda e: 8.0 * (1.0 - e) / (5.0 * e),
     "hunt-crossley": lambda e: 3.0 * (1.0 - e) / 2.0,
+    "hunt-crossley-exact": keeping,
 }
 """chi over the restitution that the law is meant to give."""
 
