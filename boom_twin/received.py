@@ -10,8 +10,8 @@ import os
 import stat
 from contextlib import ExitStack
 from errno import ENOENT
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from .errors import BagError
 
@@ -43,7 +43,7 @@ def holds_file(path: Path) -> bool:
     return True
 
 
-def open_received(path: Path) -> BinaryIO:
+def open_received(path: Path) -> BufferedReader:
     """Open a file of a received folder for reading.
 
     Raises
