@@ -151,15 +151,18 @@ class KernelCache:
 def read_checked(path: Path) -> bytes | None:
     """What `write_checked` wrote; None if nothing is there, it is not as it was written, or others can write it."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        with open(path, "rb", opener=_without_links) as file:
+            state = os.fstat(file.fileno())
+            if not stat.S_ISREG(state.st_mode) or _writers(state):
+                return None
+            told, data = file.read(_DIGEST), file.read()
     except OSError:
         return None
-    with open(descriptor, "rb") as file:
-        state = os.fstat(descriptor)
-        if not stat.S_ISREG(state.st_mode) or _writers(state):
-            return None
-        told, data = file.read(_DIGEST), file.read()
     return data if hashlib.sha256(data).digest() == told else None
+
+
+def _without_links(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
 
 
 def write_checked(path: Path, data: bytes) -> None:

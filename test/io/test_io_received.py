@@ -1,0 +1,135 @@
+"""A session's folder from somebody else: what is no file of its own in it is refused by name, and not opened."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.io.mapping import mapping_of
+from boom_twin.io.reader import scan
+from boom_twin.io.recover import recover
+from boom_twin.received import holds_file, open_received
+from boom_twin.report.quantities import FILE_NAME as QUANTITIES
+from boom_twin.report.quantities import read
+from boom_twin.report.side import side_of
+from boom_twin.truth import FILE_NAME as TRUTH
+from boom_twin.truth import load_truth
+
+MCAP, METADATA, SHEET, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
+LINK = "a symbolic link"
+KINDS = {"link": LINK, "loose link": LINK, "pipe": "a named pipe", "socket": "a socket", "folder": "a directory"}
+
+
+def put(path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace a file by something else under its name."""
+    elsewhere = path.parents[1] / f"elsewhere_{path.name}"
+    if path.is_file():
+        path.rename(elsewhere)
+    elif kind == "link":
+        elsewhere.write_text("mapping: ''\n")
+    if kind == "link":
+        path.symlink_to(elsewhere)
+    elif kind == "loose link":
+        path.symlink_to(path.parent / "nothing")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        monkeypatch.chdir(path.parent)  # names of sockets are short
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(path.name)
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.mark.parametrize("name", [MCAP, METADATA])
+def test_files_of_a_bag(bag: Path, name: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(bag / name, kind, monkeypatch)
+    words = f"{bag / name}: {KINDS[kind]}, not opened"
+    with pytest.raises(BagError, match=words):
+        scan(bag)
+    with pytest.raises(BagError, match=words):
+        recover(bag, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bag_without_metadata(bag: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (bag / METADATA).unlink()
+    put(bag / MCAP, kind, monkeypatch)
+    with pytest.raises(BagError, match=f"{bag / MCAP}: {KINDS[kind]}"):
+        scan(bag)
+
+
+def test_files_beside_a_bag(bag: Path, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(bag / SHEET, kind, monkeypatch)
+    put(bag / TRUTH, kind, monkeypatch)
+    with pytest.raises(BagError, match=f"{bag / SHEET}: {KINDS[kind]}"):
+        mapping_of(bag)
+    with pytest.raises(BagError, match=f"{bag / TRUTH}: {KINDS[kind]}"):
+        load_truth(bag)
+    with pytest.raises(BagError, match=f"{bag / SHEET}: {KINDS[kind]}"):
+        recover(bag, tmp_path / "out")
+
+
+def test_files_of_a_replay(tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "replay").mkdir()
+    put(tmp_path / "replay" / SUMMARY, kind, monkeypatch)
+    put(tmp_path / "replay" / QUANTITIES, kind, monkeypatch)
+    with pytest.raises(BagError, match=f"{tmp_path / 'replay' / SUMMARY}: {KINDS[kind]}"):
+        side_of(tmp_path / "replay", lambda path: path)
+    with pytest.raises(BagError, match=f"{tmp_path / 'replay' / QUANTITIES}: {KINDS[kind]}"):
+        read(tmp_path / "replay")
+
+
+COMMANDS = (
+    (METADATA, ["info", "bag"]),
+    (SHEET, ["replay", "bag", "--out", "out"]),
+    (METADATA, ["monitor", "--bag", "bag", "--port", "0"]),
+)
+
+
+@pytest.mark.parametrize(("name", "arguments"), COMMANDS)
+def test_a_command_refuses_a_device(bag: Path, name: str, arguments: list[str], tmp_path: Path) -> None:
+    (bag / name).unlink(missing_ok=True)
+    (bag / name).symlink_to("/dev/zero")
+    program = [sys.executable, "-P", "-m", "boom_twin.cli.main", *arguments]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=200, check=False)
+    assert done.returncode == 1 and f"bag/{name}: a symbolic link" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_what_the_user_names_may_be_a_link(bag: Path, tmp_path: Path) -> None:
+    (tmp_path / "linked").symlink_to(bag)
+    (tmp_path / "linked.mcap").symlink_to(bag / MCAP)
+    assert len(scan(tmp_path / "linked").files) == len(scan(tmp_path / "linked.mcap").files) == 1
+    assert main(["info", str(tmp_path / "linked")]) == main(["info", str(tmp_path / "linked.mcap")]) == 0
+    shutil.copy(bag / MCAP, tmp_path / "received.mcap")
+    assert mapping_of(tmp_path / "received.mcap").source == mapping_of(bag).source
+
+
+def test_a_file_is_opened_and_nothing_is_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"abc")
+    with open_received(tmp_path / "a") as file:
+        assert file.read() == b"abc"
+    assert holds_file(tmp_path / "a") and not holds_file(tmp_path / "b") and not holds_file(tmp_path / "a" / "b")
+    with pytest.raises(FileNotFoundError):
+        open_received(tmp_path / "b")
+
+
+def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "secret").write_bytes(b"abc")
+    (tmp_path / "a").symlink_to(tmp_path / "secret")
+    monkeypatch.setattr("boom_twin.received.holds_file", lambda path: True)  # as it was when it was looked at
+    with pytest.raises(OSError, match="symbolic links"):
+        open_received(tmp_path / "a")

@@ -1,0 +1,206 @@
+"""Compiled kernels on disk: nobody else can have written them, they are whole, and they are of these sources."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from boom_twin.physics import kernel_cache
+from boom_twin.physics.kernel_cache import ROOT, cache_folder, fault_of, read_checked, source_hash, write_checked
+
+PROGRAM = """
+import logging, sys
+{before}
+from boom_twin.physics.jit import inner, kernel
+@inner
+def twice(x):
+    return 2.0 * x
+@kernel
+def add(x, y):
+    return twice(x) + y
+found = add(1.0, 2.0), add(1, 2)
+hits = getattr(add.dispatcher, "_cache_hits", None)
+print(found, "loaded", 0 if hits is None else sum(hits.values()))
+"""
+
+
+def run(folder: Path, before: str = "") -> subprocess.CompletedProcess[str]:
+    """A process that calls a kernel twice, once for every type; its cache is in `folder`."""
+    script = folder.parent / "program.py"
+    script.write_text(PROGRAM.format(before=before))
+    command, environment = [sys.executable, str(script)], os.environ | {"NUMBA_CACHE_DIR": str(folder)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+
+
+def told(done: subprocess.CompletedProcess[str]) -> str:
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the process above keeps."""
+    folder = tmp_path_factory.mktemp("compiled") / "cache"
+    run(folder)
+    return folder
+
+
+def test_what_one_process_compiled_another_loads(tmp_path: Path) -> None:
+    first, second = run(tmp_path / "cache"), run(tmp_path / "cache")
+    assert told(first) == "(4.0, 4.0) loaded 0" and told(second) == "(4.0, 4.0) loaded 2"
+    assert "compiling the model" in first.stderr and "compiling" not in second.stderr
+    (folder,) = (tmp_path / "cache").iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert {path.suffix for path in folder.iterdir()} == {".kernel"}
+
+
+def harmed(path: Path, harm: str) -> None:
+    """Do something to a file that `write_checked` wrote."""
+    data = path.read_bytes()
+    half = len(data) // 2
+    contents = {
+        "cut": data[:half],
+        "empty": b"",
+        "flipped": data[:half] + bytes([data[half] ^ 1]) + data[half + 1 :],
+        "garbage": os.urandom(9000),
+        "bare": data[32:],
+    }
+    if harm == "writable":
+        path.chmod(0o666)
+        return
+    path.unlink()
+    if harm == "link":
+        path.with_suffix(".there").write_bytes(data)
+        path.symlink_to(path.with_suffix(".there"))
+    elif harm == "fifo":
+        os.mkfifo(path)
+    elif harm == "folder":
+        path.mkdir()
+    else:
+        path.write_bytes(contents[harm])
+
+
+@pytest.mark.parametrize("harm", ["cut", "empty", "flipped", "garbage", "bare", "writable", "link", "fifo", "folder"])
+def test_a_file_that_is_not_as_it_was_written_is_not_read(tmp_path: Path, harm: str) -> None:
+    write_checked(tmp_path / "file", b"something" * 1000)
+    assert read_checked(tmp_path / "file") == b"something" * 1000
+    harmed(tmp_path / "file", harm)
+    assert read_checked(tmp_path / "file") is None
+
+
+@pytest.mark.parametrize("harm", ["flipped", "folder"])
+def test_code_that_is_not_as_it_was_written_is_compiled_anew(tmp_path: Path, compiled: Path, harm: str) -> None:
+    shutil.copytree(compiled, tmp_path / "cache")
+    (folder,) = (tmp_path / "cache").iterdir()
+    for path in list(folder.iterdir()):
+        harmed(path, harm)
+    assert told(run(tmp_path / "cache")) == "(4.0, 4.0) loaded 0"
+    assert told(run(tmp_path / "cache")) == f"(4.0, 4.0) loaded {0 if harm == 'folder' else 2}"
+
+
+@pytest.mark.parametrize("place", [".", ".."])
+def test_a_folder_that_others_can_write_is_not_used(tmp_path: Path, compiled: Path, place: str) -> None:
+    shutil.copytree(compiled, tmp_path / "shared" / "cache")
+    (folder,) = (tmp_path / "shared" / "cache").iterdir()
+    before = sorted(folder.iterdir())
+    (folder / place).resolve().chmod(0o777)
+    done = run(tmp_path / "shared" / "cache")
+    assert told(done) == "(4.0, 4.0) loaded 0"
+    assert done.stderr.count("compiled code is not kept") == 1 and "can be written by others: `chmod go-w` it" in done.stderr
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can give a folder away")
+@pytest.mark.parametrize("place", [".", ".."])
+def test_a_folder_of_another_user_is_not_used(tmp_path: Path, place: str) -> None:
+    folder = tmp_path / "cache" / "inner"
+    folder.mkdir(parents=True)
+    assert fault_of(folder) is None
+    os.chown((folder / place).resolve(), 12345, 12345)
+    assert "belongs to user 12345" in str(fault_of(folder))
+
+
+def test_a_sticky_folder_may_be_above_it_but_not_it(tmp_path: Path) -> None:
+    """As /tmp is: others can add entries, but not exchange those of the user."""
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "tmp").chmod(0o1777)
+    assert fault_of(tmp_path / "tmp" / "own") is None
+    assert "can be written by others" in str(fault_of(tmp_path / "tmp"))
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="root's own group")
+def test_the_users_own_group_may_write(tmp_path: Path) -> None:
+    (tmp_path / "cache").mkdir()
+    os.chown(tmp_path / "cache", 0, 0)
+    (tmp_path / "cache").chmod(0o770)
+    assert fault_of(tmp_path / "cache") is None
+    os.chown(tmp_path / "cache", 0, 12345)
+    (tmp_path / "cache").chmod(0o770)
+    assert "can be written by others" in str(fault_of(tmp_path / "cache"))
+
+
+def test_a_place_that_cannot_be_used_is_told_and_the_model_runs(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    done = run(tmp_path / "taken")
+    assert told(done) == "(4.0, 4.0) loaded 0" and "Not a directory" in done.stderr
+    assert "relative path" in str(fault_of(Path("somewhere")))
+    assert not Path("somewhere").exists()
+
+
+def test_relative_places_of_caches_are_not_taken_from_the_working_directory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    for value in ("", "cache"):
+        monkeypatch.setenv("XDG_CACHE_HOME", value)
+        assert cache_folder().parent == Path.home() / ".cache" / "boom_twin"
+
+
+def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An edit of any kernel source, in any depth of folders, gives another folder; with NUMBA_CACHE_DIR too."""
+    for name in kernel_cache.KERNEL_FOLDERS:
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    before = source_hash(tmp_path)
+    assert before == source_hash()
+    (tmp_path / "chain" / "deeper").mkdir()
+    (tmp_path / "chain" / "deeper" / "step.py").write_text("a = 1\n")
+    deeper = source_hash(tmp_path)
+    (tmp_path / "chain" / "deeper" / "step.py").write_text("a = 2\n")
+    (tmp_path / "chain" / "other").mkdir()
+    edited = source_hash(tmp_path)
+    (tmp_path / "chain" / "deeper" / "step.py").rename(tmp_path / "chain" / "other" / "step.py")
+    assert len({before, deeper, edited, source_hash(tmp_path)}) == 4
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert cache_folder() == tmp_path / before
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    assert cache_folder() != tmp_path / before
+
+
+def test_files_are_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_checked(tmp_path / "a", b"first")
+    with monkeypatch.context() as patch, pytest.raises(OSError, match="full"):
+        patch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError("full")))
+        write_checked(tmp_path / "a", b"second")
+    assert read_checked(tmp_path / "a") == b"first" and [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+WITHOUT_OPTIONS = """
+from numba.core.cpu import CPUTargetOptions
+for name in ("_nrt", "no_cfunc_wrapper", "forceinline"):
+    delattr(next(each for each in CPUTargetOptions.__mro__ if name in vars(each)), name)
+"""
+GONE = {
+    "a method": "import numba.core.compiler as c; del c.CompileResult._reduce",
+    "a name": "import numba; import numba.core.runtime as r; del r.rtsys",
+    "options": WITHOUT_OPTIONS,
+}
+
+
+@pytest.mark.parametrize("part", GONE)
+def test_a_numba_that_changed_inside_compiles_all_the_same(tmp_path: Path, part: str) -> None:
+    done = run(tmp_path / "cache", GONE[part])
+    assert told(done) == "(4.0, 4.0) loaded 0"
+    assert ("is not the one that was tested" in done.stderr) == (part != "options")
