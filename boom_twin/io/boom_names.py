@@ -79,6 +79,8 @@ def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[s
     """The names in the messages of strokes and angles, in order: within the window, and on until every cylinder was named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
+    if not present:
+        return {}
     found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
     needed = {sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values()}
     first: int | None = None

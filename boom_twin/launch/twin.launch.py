@@ -87,12 +87,14 @@ def rviz() -> Node:
 
 def recorder(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """The recorder, if a folder is given; beside the node, with all that the node is given."""
-    names = ("record", "scene", "params_file", "mapping", "namespace")
-    given = {name: LaunchConfiguration(name).perform(context) for name in names}
-    files = {"--scene": given["scene"], "--params": given["params_file"], "--mapping": given["mapping"]}
-    options = {"--out": given["record"], **files}
+    given = {
+        "--out": LaunchConfiguration("record").perform(context),
+        "--scene": LaunchConfiguration("scene").perform(context),
+        "--params": LaunchConfiguration("params_file").perform(context),
+        "--mapping": LaunchConfiguration("mapping").perform(context),
+    }
+    namespace = LaunchConfiguration("namespace").perform(context).strip("/")
     command = python_command("boom_twin.cli.main", "record")
-    command += [part for option, value in options.items() if value for part in (option, value)]
-    if given["namespace"]:
-        command += ["--ros-args", "-r", f"__ns:=/{given['namespace'].strip('/')}"]
-    return [ExecuteProcess(cmd=command, name="record", output="screen")] if given["record"] else []
+    command += [part for option, value in given.items() if value for part in (option, value)]
+    command += ["--ros-args", "-r", f"__ns:=/{namespace}"] if namespace else []
+    return [ExecuteProcess(cmd=command, name="record", output="screen")] if given["--out"] else []
