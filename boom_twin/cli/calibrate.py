@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
-from .common import add_json, add_session_scene, open_session_scene, print_json
+from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..calibrate.run import Calibration, Progress
@@ -43,7 +43,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Calibrate, or learn a baseline; write, tell."""
-    return _learn(args) if args.baseline else _calibrate(args)
+    from ..io.reader import scan
+
+    code = _learn(args) if args.baseline else _calibrate(args)
+    for bag in args.bags:
+        warn_incomplete(scan(Path(bag)))
+    return code
 
 
 def _learn(args: Namespace) -> int:

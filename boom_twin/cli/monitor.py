@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .common import add_session_scene, open_scene, open_session_scene
+from .common import add_session_scene, open_scene, open_session_scene, warn_incomplete
 
 if TYPE_CHECKING:
     from ..monitor.feed import Feed
@@ -90,14 +90,13 @@ def _give_way() -> None:
 def _feed(args: Namespace) -> Iterator[Feed]:
     """Of a session, or live."""
     if args.bag is not None:
-        from ..io.incomplete import incompleteness
+        from ..io.reader import scan
         from ..monitor.bag import bag_feed
         from ..settings import load_settings
 
         print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
         settings = load_settings(args.params)
-        if told := incompleteness(args.bag):
-            print(f"warning: {args.bag}: {told}", file=sys.stderr)
+        warn_incomplete(scan(args.bag))
         scene = open_session_scene(args.bag, args.scene)
         with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline)) as feed:
             yield feed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Callable, Sequence
@@ -71,10 +72,13 @@ def check_target(path: Path, sources: Sequence[Path]) -> None:
 
 
 def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
-    """Put the names in a folder on the disk."""
+    """Put the names in a folder on the disk, where its file system can do that."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         sync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
     finally:
         os.close(handle)
 
@@ -86,7 +90,8 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
             stream.flush()
-            os.fchmod(stream.fileno(), _mode(path))
+            with suppress(PermissionError):  # of a file system without permissions
+                os.fchmod(stream.fileno(), _mode(path))
             sync(stream.fileno())
         draft.replace(path)
     except BaseException:

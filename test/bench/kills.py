@@ -214,7 +214,7 @@ class Replay(Target):
             self.references.append(self.result())
 
     def _command(self, name: str) -> list[str]:
-        return ["replay", str(self.sources / name), "--scene", str(self.scene), "--out", str(self.out), "--no-health"]
+        return ["replay", str(self.sources / name), "--scene", str(self.scene), "--out", str(self.out), "--no-health", "--no-pictures"]
 
     def arguments(self) -> list[str]:
         self.number += 1
@@ -227,7 +227,7 @@ class Replay(Target):
         require(self.out.is_dir(), "neither the earlier result nor the new one is there")
         listed = json.loads((self.out / "manifest.json").read_text())["files"]
         found = {name: digest for name, digest in sums(self.out).items() if name not in ("manifest.json", "unfinished.json")}
-        require(found == listed and {"quantities.json", "tip.png", "bag/metadata.yaml"} <= set(found), "OUT is not whole")
+        require(found == listed and {"quantities.json", "bag/metadata.yaml"} <= set(found), "OUT is not whole")
         require(self.result() in self.references and found["bag/session_0.mcap"] == self.result(), "OUT is another result")
         require(said("info", self.out / "bag")[0] == 0 and not incompleteness(self.out), "a whole result is called incomplete")
         new = self.result() == self.references[self.number % 2]

@@ -42,7 +42,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def killed(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder beside its result that a replay leaves when it is killed while its writer writes."""
+    """The folder beside its result that a replay leaves when it is killed while its writer writes.
+
+    Before that, a second replay into the same folder is refused at once.
+    """
     out = tmp_path_factory.mktemp("killed") / "out"
     command = [sys.executable, "-m", "boom_twin.cli.main", "replay", str(session), "--out", str(out)]
     with (out.parent / "log").open("w") as log:
@@ -51,7 +54,11 @@ def killed(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     while not file.exists() or file.stat().st_size < 200_000:
         assert child.poll() is None and time.monotonic() < end, (out.parent / "log").read_text()
         time.sleep(0.01)
+    os.killpg(child.pid, signal.SIGSTOP)
+    second = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert second.returncode == 1 and "out.unfinished: another `boom_twin replay` is at work there" in second.stderr
     child.kill()
+    os.killpg(child.pid, signal.SIGCONT)  # its children
     child.wait()
     wait_for_group(child.pid)
     assert not out.exists()
