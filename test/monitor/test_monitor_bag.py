@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 from monitor.conftest import read_all
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from boom_twin.errors import BagError, UsageError
+from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.reader import read, scan
 from boom_twin.io.session import write_session
 from boom_twin.io.topics import TYPES, Output, load_topics
+from boom_twin.io.typestore import jazzy
 from boom_twin.monitor.alarms import Alarm
-from boom_twin.monitor.bag import bag_feed
+from boom_twin.monitor.bag import ENOUGH, bag_feed
 from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
 from boom_twin.monitor.playback import Playback
@@ -158,3 +161,24 @@ def test_a_session_whose_strokes_cannot_be_used_says_so(tmp_path: Path) -> None:
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
     assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble
+
+
+def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) -> None:
+    """A result bag of a few rows; one of its joint_states has no effort."""
+    displacement, states = (load_topics().outputs[role] for role in (ENOUGH, Output.JOINT_STATES))
+    types = RosbagsTypes()
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in (displacement, states)}
+        for row in range(10):
+            stamp = 1_700_000_000 * 10**9 + row * 5_000_000
+            for topic, link in links.items():
+                message = types.make(topic.type)
+                message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+                if topic is states:
+                    message.name, message.position = ["cylinder_1"], types.doubles([0.1])
+                    message.effort = types.doubles([] if row == 4 else [1.0])
+                writer.write(link, stamp, jazzy().serialize_cdr(message, topic.type))
+    feed = read_all(bag_feed(tmp_path / "bag", load_scene(), Settings()))
+    assert not feed.trouble and feed.store.tables["acceleration"].count == 10
+    told = {"topic": states.absolute, "count": 1, "reason": "1 names, but 1 of position, 0 of effort"}
+    assert feed.catch.dropped.told() == [told]
