@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from types import SimpleNamespace
@@ -194,7 +195,7 @@ class _Twin:
         self._watch.seen(sample.stream, sample.stamp)
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
-        for key, encoded in self._outlet.fill(report):
+        for key, encoded in chain.from_iterable(map(self._outlet.fill, report.all)):
             if key in self._takers:
                 self._takers[key](jazzy().deserialize_cdr(encoded, TYPES[key]), self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():
