@@ -65,6 +65,11 @@ class Deviations:
             self._refresh(prediction, interval, live, angles)
         return np.sqrt(self._joints + self._slopes2 * variances), self._force
 
+    def rebase(self, shift: int) -> None:
+        """All stamps are later by `shift` (ns) from now on."""
+        self._epoch += shift
+        self._seen += shift
+
     def _refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
         self._seen = prediction.stamp
         moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP

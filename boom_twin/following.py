@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .analysis.statics import outline, settle
@@ -15,6 +17,9 @@ from .scene.kinematics import joint_angles_of_strokes
 from .scene.parts import Scene
 from .settings import Settings
 from .undeflected import Undeflected
+
+PAUSE = 0.1  # s without strokes, after which
+AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
 
 class Following:
@@ -43,6 +48,8 @@ class Following:
         self._tuning = Tuning(
             settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
         )
+        self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
+        self._newest, self._paused = 0.0, -math.inf
         self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
 
     @property
@@ -77,11 +84,22 @@ class Following:
         settle(self.plan, self._anchor, self._work, strokes, angles)
         self._track.angles[:] = angles
         self._track.nodes[0] = 0
+        self._newest, self._paused = 0.0, -math.inf
 
     def step(self, time: float, strokes: Array) -> int:
         """Go on to strokes (m; NaN = missing) measured at `time` (s since the start); a status of `chain.status`."""
+        if time - self._newest > PAUSE:
+            self._paused = time
+        self._newest = time
+        tuning = self._patient if time - self._paused < AFTER_PAUSE else self._tuning
         tables, work = self.plan.tables, self._work
-        return int(follow(tables, self._anchor, self.live, work, self._track, self._tuning, time, strokes, self._row))
+        return int(follow(tables, self._anchor, self.live, work, self._track, tuning, time, strokes, self._row))
+
+    def extrapolated(self, span: float) -> tuple[Array, Array, Array]:
+        """Strokes (m) `span` s after the newest sample, by its estimates; speeds (m/s) then, and their deviations now; (n,)."""
+        x, c = self._track.x[0], self._track.c[0]
+        strokes = x[:, 0] + span * x[:, 1] + 0.5 * span**2 * x[:, 2]
+        return strokes, x[:, 1] + span * x[:, 2], np.sqrt(np.maximum(c[:, 1, 1], 0.0))
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""

@@ -11,13 +11,14 @@ SPAN = 2_000_000_000  # ns
 
 
 class Expected(NamedTuple):
-    """What sensors should read at a stamp (ns): angles (n,) rad, specific force (2,) m/s^2, and their deviations."""
+    """What sensors should read at a stamp (ns): angles (n,) rad, force (2,) m/s^2, deviations of both; strokes (n,) m."""
 
     stamp: int
     angles: Array
     force: Array
     angle_sigmas: Array
     force_sigmas: Array
+    strokes: Array
 
 
 class Memory:
@@ -47,4 +48,5 @@ class Memory:
 def _between(old: Expected, new: Expected, stamp: int) -> Expected:
     share = (stamp - old.stamp) / (new.stamp - old.stamp)
     angles = old.angles + share * (new.angles - old.angles)
-    return Expected(stamp, angles, old.force + share * (new.force - old.force), new.angle_sigmas, new.force_sigmas)
+    force, strokes = old.force + share * (new.force - old.force), old.strokes + share * (new.strokes - old.strokes)
+    return Expected(stamp, angles, force, new.angle_sigmas, new.force_sigmas, strokes)

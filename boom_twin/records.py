@@ -15,6 +15,9 @@ else:
     Array = Any
 
 
+HELD = frozenset({"leap", "late", "second source"})
+"""Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
+
 Mount = Literal["root", "head"]
 """Where on its section an inclinometer sits; between the two lies the bending of the section."""
 
@@ -233,7 +236,8 @@ class Report:
     stamp : int
         Of the sample, nanoseconds.
     accepted : bool
-        False when the sample was not used; `events` says why. A sample with the event ``leap`` is a witness of time only.
+        False when the sample was not used; `events` says why. One that is held (``leap``, ``late``, ``second source``) is
+        a witness of time only, unless a later report gives it `earlier`.
     prediction : Prediction or None
         Set for every stroke sample that the model was stepped to.
     residuals : tuple of Residuals
@@ -248,6 +252,8 @@ class Report:
         Newton passes that the prediction took, with those of what was stepped for good.
     health : Health or None
         Set once a second, and where an alarm began, changed or ended.
+    earlier : tuple of Report
+        Of samples that were held until this one confirmed their stamps, in their order.
     """
 
     stamp: int
@@ -259,3 +265,9 @@ class Report:
     change: Change | None = None
     passes: int = 0
     health: Health | None = None
+    earlier: tuple[Report, ...] = ()
+
+    @property
+    def all(self) -> tuple[Report, ...]:
+        """Those of `earlier`, and this one: everything that this sample caused, in order."""
+        return (*self.earlier, self) if self.earlier else (self,)

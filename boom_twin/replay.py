@@ -33,7 +33,7 @@ from .io.session_model import SessionScene, baseline_of, scene_of
 from .io.sheet import Sheet
 from .io.topics import Topics
 from .io.writer import FILE_NAME
-from .records import Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
+from .records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
 from .scene.parts import Scene
 from .settings import Settings
 from .study.rewrite import anew
@@ -56,20 +56,29 @@ class Recording:
     predictions: list[Prediction] = field(default_factory=list)
     residuals: list[Residuals] = field(default_factory=list)
     gaps: list[tuple[int, int]] = field(default_factory=list)
+    clock_sets: list[tuple[int, int]] = field(default_factory=list)
     health: list[Health] = field(default_factory=list)
     refused: int = 0
 
     def add(self, report: Report) -> None:
         """Keep what one sample caused."""
-        if not report.accepted or "leap" in report.events:
+        self.refused -= len(report.earlier)
+        for each in report.earlier:
+            self.add(each)
+        if not report.accepted or not HELD.isdisjoint(report.events):
             self.refused += 1
         if report.prediction is not None:
-            if "gap" in report.events or "restart" in report.events:
-                self.gaps.append((self.predictions[-1].stamp, report.stamp))
+            self._note_time(report)
             self.predictions.append(report.prediction)
         self.residuals += report.residuals
         if report.health is not None:
             self.health.append(report.health)
+
+    def _note_time(self, report: Report) -> None:
+        """Keep where stamps stepped: the one before, and the one after it."""
+        for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
+            if self.predictions and not set(events).isdisjoint(report.events):
+                found.append((self.predictions[-1].stamp, report.stamp))
 
     def of(self, stream: Stream) -> list[Residuals]:
         """Residuals of one stream."""
@@ -189,7 +198,8 @@ def replay_into(
                 continue
             report = twin.update(sample)
             recording.add(report)
-            behind.put(report)
+            for each in report.all:
+                behind.put(each)
             _refuse(session, taken, other_boom.took(sample, report))
         _refuse(session, taken, other_boom.judge())
         behind.close()
@@ -305,10 +315,14 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
 
 
 def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
-    """Gaps, and all alarms of the rig's health, in the order of their beginning; seconds since the stamp `first`."""
+    """Gaps, clocks set, and alarms of the rig's health, in the order of their beginning; seconds since the stamp `first`."""
     gaps = [
         Alarm(Stream.STROKES.value, "gap", start, end, None, f"no strokes for {(end - start) * NANO:.2f} s")
         for start, end in recording.gaps
+    ]
+    gaps += [
+        Alarm(Stream.STROKES.value, "clock", start, start, None, f"stamps went on at {(end - first) * NANO:.3f} s")
+        for start, end in recording.clock_sets
     ]
     return [
         {

@@ -10,21 +10,23 @@ import numpy as np
 
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
-from .errors import BoomTwinError, UsageError
+from .edge import Edge
+from .errors import BoomTwinError, SolverError, UsageError
 from .following import Following
 from .health.baseline import Baseline
 from .health.judge import Judge
 from .load import loaded
 from .memory import Expected, Memory
 from .mounting import Mounting
-from .plausible import Plausible
+from .plausible import FAR, Plausible
 from .recent import Recent
-from .records import Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from .records import Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .requests import Requests
 from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
-from .stray import Strays
+from .stamps import LASTING, Stamps
+from .time_step import TimeStep, explain, goes_on, is_close
 from .zeros import Zeros
 
 EVENTS = {
@@ -32,12 +34,15 @@ EVENTS = {
     "duplicate": "stamp as the newest one of its stream; sample left out",
     "partial": "some values missing or not finite; the others were used",
     "empty": "no usable value; sample left out",
-    "waiting": "not all strokes known yet; the model has not started",
+    "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
     "gap": "longer pause between strokes, bridged",
-    "restart": "pause too long to bridge; started again from rest",
-    "leap": "stamp far from the newest one of its stream; left out unless the next sample follows it",
-    "jump back": "time was set back; everything started again",
+    "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
+    "leap": "stamp far from where its stream was; left out unless the next sample follows it",
+    "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
+    "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
+    "second source": "samples of another source among those that are followed; left out",
     "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
+    "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
     "held": "a stroke missing for long; taken to stay where it was",
     "model": "the model failed; it starts again with the next full sample",
     "reset": "asked for; the model started again from rest",
@@ -47,7 +52,7 @@ EVENTS = {
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
-TOLD_AT_ONCE = frozenset({"restart", "jump back", "reset", "load", "limits", "zero"})
+TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""
 
 NANO = 1e-9
@@ -63,10 +68,18 @@ class _Run:
     epoch: int
     newest: int
     deviations: Deviations
+    strokes: Array
     interval: float = 0.0
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
     plausible: Plausible = field(default_factory=Plausible)
+
+    def rebase(self, shift: int) -> None:
+        """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
+        self.epoch += shift
+        self.newest += shift
+        self.deviations.rebase(shift)
+        self.memory = Memory()
 
 
 class Twin:
@@ -114,17 +127,19 @@ class Twin:
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
         self._channels = channels_of(self.plan.joints)
-        self._strays = Strays(self.settings)
+        self._lines = {stream: Stamps(self.settings) for stream in Stream}
+        self._travel = [joint.cylinder.max_stroke for joint in scene.joints]
+        self._beyond = FAR * self.settings.stroke_variance**0.5
+        self._edge = Edge(self._channels)
         self._run: _Run | None = None
-        self._newest_measured: dict[Stream, int] = {}
+        self._failed: int | None = None
         self._pending: deque[Sample] = deque()
         self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent(self._channels)
 
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
-        self._strays = Strays(self.settings)
-        self._newest_measured = {}
+        self._lines = {stream: Stamps(self.settings) for stream in Stream}
         self._pending = deque()
 
     def rezero(self, sensor: str) -> dict[str, float]:
@@ -167,7 +182,8 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._strays = Strays(self.settings)
+            for line in self._lines.values():
+                line.tune(self.settings)
         if asked.zeros != self._zeros.values:
             events.append("zero")
             from_rest |= self._zeros.put(stamp, asked.zeros)
@@ -196,7 +212,15 @@ class Twin:
         other.update(Sample(Stream.ANGLES, 0, middle))
 
     def update(self, sample: Sample) -> Report:
-        """Take one sample; see `Report` for what comes back. Never raises on what a sample holds."""
+        """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
+
+        Raises
+        ------
+        UsageError
+            A sample that no rig can give: a stream by another name, stamps that are not nanoseconds, values not one for each
+            channel. Nothing has changed then.
+        """
+        sample = self._edge.checked(sample)
         complete = bool(np.isfinite(sample.values.sum()))
         if not complete and not np.isfinite(sample.values).any():
             return self._refuse(sample, "empty")
@@ -207,33 +231,101 @@ class Twin:
     # -- strokes ----------------------------------------------------------------------------------------------------
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
-        events: list[str] = []
-        if self._strays.hold(sample, None if self._run is None else self._run.newest):
-            return self._hold(sample)
-        if self._run is not None:
-            span = (sample.stamp - self._run.newest) * NANO
-            if -self.settings.jump_back <= span <= 0.0:
-                return self._refuse(sample, "duplicate" if span == 0.0 else "late")
-            if span < 0.0 or span > self.settings.restart_gap:
-                events.append("jump back" if span < 0.0 else "restart")
-                self.reset()
-            elif span > self.settings.gap:
-                events.append("gap")
+        line, run = self._lines[Stream.STROKES], self._run
+        if run is None or line.is_next(sample.stamp):
+            return self._follow(sample, complete, [])
+        span = sample.stamp - run.newest
+        if span == 0:
+            same = is_close(self._zeroed(sample), run.strokes, 0.0, self.settings)
+            return self._refuse(sample, "duplicate" if same else "second source")
+        if 0 < span <= line.longest and goes_on(self._boom, run.strokes, self._zeroed(sample), span * NANO, 0.0, self.settings):
+            return self._follow(sample, complete, [])
+        is_late = self._is_late(run, sample)
+        event = line.hold(sample, "late" if is_late else "leap")
+        if not line.is_confirmed(round(self.settings.gap / NANO) if is_late else 0):
+            return self._hold(sample, event)
+        why = self._explain(run, line)
+        lasted = max(run.newest, sample.stamp) - run.epoch
+        if why is TimeStep.NEITHER and lasted < LASTING and not line.is_confirmed(LASTING):
+            return self._hold(sample, event)
+        return self._step_in_time(run, line, why)
+
+    def _is_late(self, run: _Run, sample: Sample) -> bool:
+        """Whether it is back by little, and its strokes are those of its stamp."""
+        if not -self.settings.jump_back <= (sample.stamp - run.newest) * NANO < 0.0:
+            return False
+        then = run.memory.at(sample.stamp)
+        return then is None or is_close(self._zeroed(sample), then.strokes, run.interval, self.settings)
+
+    def _explain(self, run: _Run, line: Stamps) -> TimeStep:
+        """Why the stamps of what is held are not those that were to come."""
+        (first, _), (later, _) = line.held[:2]
+        values = self._zeroed(first), self._zeroed(later)
+        span, apart = (first.stamp - run.newest) * NANO, (later.stamp - first.stamp) * NANO
+        return explain(self._boom, run.strokes, values, span, apart, line.usual * NANO or apart, self.settings)
+
+    def _step_in_time(self, run: _Run, line: Stamps, why: TimeStep) -> Report:
+        """Follow the samples that were held, now that the newest confirms them."""
+        held, usual = self._released(line), round(line.usual)
+        span = held[0].stamp - run.newest
+        events = ["gap"] if span * NANO > self.settings.gap else []
+        if why is TimeStep.CLOCK:
+            events = ["clock set"]
+            self._rebase(run, span - usual)
+        elif why is TimeStep.NEITHER:
+            events = ["restart" if span > 0 else "jump back"]
+            self.reset()
+        reports = []
+        for sample in held:
+            reports.append(self._follow(sample, bool(np.isfinite(sample.values.sum())), events))
+            events = []
+        return replace(reports[-1], earlier=tuple(reports[:-1]))
+
+    def _released(self, line: Stamps) -> list[Sample]:
+        """Samples that were held; what those before the newest were told to be counts no more."""
+        held = line.release()
+        self.counts.subtract(event for _, event in held[:-1])
+        for event in {event for _, event in held if not self.counts[event]}:
+            del self.counts[event]
+        return [sample for sample, _ in held]
+
+    def _rebase(self, run: _Run, shift: int) -> None:
+        """Stamps are later by `shift` (ns) from now on, and the model goes on."""
+        before = run.newest
+        run.rebase(shift)
+        for line in self._lines.values():
+            line.newest = None
+        self._zeros.forget_past()
+        self._recent.clear()
+        if shift < 0:
+            self._pending = deque(sample for sample in self._pending if sample.stamp <= before)
+        if self.judge is not None:
+            self.judge.begin()
+
+    def _zeroed(self, sample: Sample) -> Array:
+        """Strokes without what their sensors read too much."""
+        zeros = self._zeros.of(Stream.STROKES, sample.stamp)
+        return sample.values if zeros is None else sample.values - zeros
+
+    def _follow(self, sample: Sample, complete: bool, events: list[str]) -> Report:
+        """Go on to a stroke sample; the model starts if it has not."""
         if not complete:
             events.append("partial")
         asked = complete and self.requests.due
         if asked:
             events += self._take_over(sample.stamp)
-        zeros = self._zeros.of(Stream.STROKES, sample.stamp)
-        if zeros is not None:
-            sample = replace(sample, values=sample.values - zeros)
+        told, values = asked or "clock set" in events, self._zeroed(sample)
+        if any(y < -self._beyond or y > most + self._beyond for y, most in zip(values.tolist(), self._travel, strict=True)):
+            events.append("out of range")
+        if values is not sample.values:
+            sample = replace(sample, values=values)
         if self._run is not None:
             report, from_rest = self._step(self._run, sample, events), False
-        elif complete:
+        elif complete and (self._failed is None or asked or abs(sample.stamp - self._failed) >= LASTING):
             report, from_rest = self._start(sample, events), True
         else:
             return self._refuse(sample, "waiting", *events)
-        if asked or (from_rest and report.accepted):
+        if told or (from_rest and report.accepted):
             return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
         return report
 
@@ -241,20 +333,23 @@ class Twin:
         try:
             self._boom.start(sample.values)
         except BoomTwinError as error:
+            self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
-        self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp))
+        self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp), sample.values)
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
-        values, oddities = run.plausible.of(sample.stamp, sample.values, self.settings)
+        self._lines[Stream.STROKES].take(sample.stamp)
+        values, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, self.settings)
         events += oddities
         status = self._boom.step((sample.stamp - run.epoch) * NANO, values)
         if status != OK:
             self.reset()
+            self._failed = sample.stamp
             return self._refuse(sample, "model", *events, status=SENTENCES[status])
         span = (sample.stamp - run.newest) * NANO
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
-        before, run.newest, run.slot = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD
+        before, run.newest, run.slot, run.strokes = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD, sample.values
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         run.plausible.estimate = prediction.strokes
         self._remember(run, prediction)
@@ -273,17 +368,27 @@ class Twin:
         angles = self._mounting.expected(prediction.joints, boom.live)
         angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
         force = specific_force(prediction, self.plan.tables.gravity)
-        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas))
+        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas, run.strokes))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
     def _take_measured(self, sample: Sample, complete: bool) -> Report:
-        newest = self._newest_measured.get(sample.stream)
-        if self._strays.hold(sample, newest):
-            return self._hold(sample)
-        if newest is not None and newest - self.settings.jump_back / NANO <= sample.stamp <= newest:
-            return self._refuse(sample, "duplicate" if sample.stamp == newest else "late")
-        self._newest_measured[sample.stream] = sample.stamp
+        line = self._lines[sample.stream]
+        longest = line.longest if line.usual else self.settings.leap / NANO
+        if line.newest is None or 0 < sample.stamp - line.newest <= longest:
+            return self._compare(sample, complete)
+        span = (sample.stamp - line.newest) * NANO
+        if -self.settings.jump_back <= span <= 0.0:
+            return self._refuse(sample, "duplicate" if span == 0.0 else "late")
+        event = line.hold(sample, "leap")
+        if not line.is_confirmed(0):
+            return self._hold(sample, event)
+        reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in self._released(line)]
+        return replace(reports[-1], earlier=tuple(reports[:-1]))
+
+    def _compare(self, sample: Sample, complete: bool) -> Report:
+        """Residuals of a measured sample, now or when the strokes have come."""
+        self._lines[sample.stream].take(sample.stamp)
         events: tuple[str, ...] = ()
         if not complete:
             events = ("partial",)
@@ -326,10 +431,10 @@ class Twin:
             self.judge.measured(residuals, sample.values)
         return residuals
 
-    def _hold(self, sample: Sample) -> Report:
-        """Taken as a witness of time alone."""
-        self.counts["leap"] += 1
-        return Report(sample.stamp, True, events=("leap",))
+    def _hold(self, sample: Sample, event: str) -> Report:
+        """Taken as a witness of time alone, at first."""
+        self.counts[event] += 1
+        return Report(sample.stamp, True, events=(event,))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)

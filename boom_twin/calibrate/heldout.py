@@ -58,7 +58,7 @@ def judged(
     twin = Twin(scene, settings, mounts)
     found: dict[Stream, list[Residuals]] = {Stream.ANGLES: [], Stream.IMU: []}
     for sample in _samples(session, zeros, len(scene.joints)):
-        for residuals in twin.update(sample).residuals:
+        for residuals in (each for report in twin.update(sample).all for each in report.residuals):
             if residuals.stamp >= start:
                 found[residuals.stream].append(residuals)
     every = [residuals for group in found.values() for residuals in group]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from types import SimpleNamespace
@@ -206,7 +207,7 @@ class _Twin:
         report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))
-        for key, encoded in self._outlet.fill(report):
+        for key, encoded in chain.from_iterable(map(self._outlet.fill, report.all)):
             if key in self._names:
                 self._feed.catch.take_encoded(self._names[key], encoded, self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():

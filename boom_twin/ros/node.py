@@ -199,7 +199,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         began = perf_counter()
         report = self._twin.update(sample)
         self._diagnostics.took(sample, report, perf_counter() - began)
-        if report.change is not None:
-            self._started.tell(report, report.change)
-        for key, encoded in self._outlet.fill(report):
-            self._outputs[key].publish(encoded)
+        for each in report.all:
+            if each.change is not None:
+                self._started.tell(each, each.change)
+            for key, encoded in self._outlet.fill(each):
+                self._outputs[key].publish(encoded)

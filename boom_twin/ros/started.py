@@ -35,5 +35,7 @@ class Started:
             words.insert(0, f"could not start: {report.status}")
         elif change.from_rest:
             words.insert(0, f"started from rest ({', '.join(report.events) or 'first strokes'})")
+        elif "clock set" in report.events:
+            words.insert(0, "clock set; the model goes on")
         self._told = time.monotonic()
         self._logger.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")

@@ -36,7 +36,8 @@ class OtherBoom:
             return ""
         if sample.stream is Stream.ANGLES:
             self._values.append(sample.values)
-        self._residuals += [found.values for found in report.residuals if found.stream is Stream.ANGLES]
+        found = [residuals for each in report.all for residuals in each.residuals]
+        self._residuals += [residuals.values for residuals in found if residuals.stream is Stream.ANGLES]
         self._begin = self._begin or sample.stamp
         return self.judge() if sample.stamp - self._begin > WINDOW else ""
 

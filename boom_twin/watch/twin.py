@@ -74,12 +74,13 @@ class TwinWatch:
     def took(self, sample: Sample, report: Report, duration: float) -> None:
         """The twin made `report` of `sample` in so many seconds."""
         self._streams[sample.stream].took(sample)
-        self._model.took(report, duration)
-        if report.residuals:
-            self._residuals += report.residuals
-        if report.health is not None:
-            self.health = self.health or HealthWatch()
-            self.health.took(report.health)
+        for each in report.all:
+            self._model.took(each, duration if each is report else 0.0)
+            if each.residuals:
+                self._residuals += each.residuals
+            if each.health is not None:
+                self.health = self.health or HealthWatch()
+                self.health.took(each.health)
 
     def broken(self, reason: str) -> None:
         """A message could not be handled at all."""

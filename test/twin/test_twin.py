@@ -42,7 +42,7 @@ def moved(still, t):
 
 
 def follow(twin, still, stop, step=5, first=0):
-    return [twin.update(strokes(ms, moved(still, ms * 1e-3))) for ms in range(first, stop, step)]
+    return [each for ms in range(first, stop, step) for each in twin.update(strokes(ms, moved(still, ms * 1e-3))).all]
 
 
 def equal(one, other):
@@ -79,9 +79,9 @@ def test_late_and_double_samples_are_left_out_and_counted(scene, still):
     got = []
     for ms in range(0, 300, 5):
         got.append(disturbed.update(strokes(ms, moved(still, ms * 1e-3))))
-        assert disturbed.update(strokes(ms, still + 0.1)).events == ("duplicate",)
+        assert disturbed.update(strokes(ms, moved(still, ms * 1e-3))).events == ("duplicate",)
         if ms:
-            assert disturbed.update(strokes(ms - 2, still - 0.1)).events == ("late",)
+            assert disturbed.update(strokes(ms - 2, moved(still, (ms - 2) * 1e-3))).events == ("late",)
     assert all(equal(a.prediction, b.prediction) for a, b in zip(expected, got, strict=True))
     assert disturbed.counts == {"duplicate": 60, "late": 59}
 
@@ -116,15 +116,19 @@ def test_a_gap_is_bridged_and_flagged(scene, still):
         if not 100 < ms < 400:
             report = gappy.update(strokes(ms, moved(still, ms * 1e-3)))
             if ms == 400:
-                assert report.events == ("gap",)
+                assert report.events == ("leap",) and report.prediction is None
+            if ms == 405:
+                assert [each.events for each in report.all] == [("gap",), ()]
+                assert [each.prediction.stamp for each in report.all] == [START + 400 * MS, START + 405 * MS]
     assert gappy.counts == {"gap": 1}
     assert report.prediction.tip_position == pytest.approx(a.tip_position, abs=0.02)
 
 
 def test_a_long_pause_starts_again_from_rest(twin, still):
     follow(twin, still, 300)
-    report = twin.update(strokes(300 + 60_000, still))
-    assert report.events == ("restart",) and np.all(report.prediction.tip_acceleration == 0.0)
+    assert twin.update(strokes(300 + 60_000, still)).events == ("leap",)
+    report = twin.update(strokes(305 + 60_000, still)).earlier[0]
+    assert report.events == ("restart",) and report.change.from_rest and np.all(report.prediction.tip_acceleration == 0.0)
 
 
 def test_time_set_back_starts_everything_again(scene, still):
@@ -132,7 +136,9 @@ def test_time_set_back_starts_everything_again(scene, still):
     follow(looped, still, 2000)
     looped.update(angles(5000, np.zeros(4)))  # would wait for a stroke that never comes
     again, expected = follow(looped, still, 300), follow(fresh, still, 300)
-    assert again[0].events == ("jump back",)
+    assert again[0].events == ("leap",) and again[0].prediction is None
+    again = again[1:]
+    assert again[0].events == ("jump back",) and again[0].change.from_rest
     assert all(equal(a.prediction, b.prediction) for a, b in zip(again, expected, strict=True))
     assert sum(len(report.residuals) for report in again) == 0
 
@@ -154,18 +160,35 @@ def test_a_stray_stamp_changes_nothing(scene, still, stamp, stream):
 
 
 @pytest.mark.parametrize("far", [-1_600_000_000_000, 1_000_000_000_000])
-def test_a_clock_that_was_set_costs_one_sample(scene, still, far):
-    """And of all samples that were accepted the same comes again."""
-    fresh, twin = Twin(scene), Twin(scene)
-    samples = [strokes(ms, moved(still, ms * 1e-3)) for ms in range(0, 100, 5)]
-    samples += [strokes(far + ms, moved(still, ms * 1e-3)) for ms in range(0, 100, 5)]
+@pytest.mark.parametrize("at", [1000, 400], ids=["resting", "moving"])
+def test_a_clock_that_was_set_while_strokes_go_on(scene, still, far, at):
+    """Told, and nothing else: the same predictions by other stamps; of all samples that were accepted the same comes again."""
+    clean, twin, again = Twin(scene), Twin(scene), Twin(scene)
+    times = range(0, at + 300, 5)
+    expected = [clean.update(strokes(ms, moved(still, ms * 1e-3))).prediction for ms in times]
+    samples = [strokes(ms if ms < at else ms + far, moved(still, ms * 1e-3)) for ms in times]
     reports = [twin.update(sample) for sample in samples]
-    assert [report.events for report in reports[20:22]] == [("leap",), ("jump back" if far < 0 else "restart",)]
-    expected = [fresh.update(sample) for sample in samples[21:]]
-    assert all(equal(a.prediction, b.prediction) for a, b in zip(expected, reports[21:], strict=True))
-    again, accepted = Twin(scene), [s for s, report in zip(samples, reports, strict=True) if report.accepted]
-    repeated = [again.update(sample) for sample in accepted]
-    assert [r.stamp for r in repeated if r.prediction] == [r.stamp for r in reports if r.prediction]
+    got = [each.prediction for report in reports for each in report.all if each.prediction is not None]
+    assert [p.stamp for p in got] == [sample.stamp for sample in samples]
+    away = [np.hypot(*(a.tip_position - b.tip_position)) for a, b in zip(expected, got, strict=True)]
+    assert max(away) < 1e-6 and twin.counts == {"clock set": 1}
+    told = [each.change for report in reports for each in report.all if each.change is not None]
+    assert [change.from_rest for change in told] == [True, False]
+    repeated = [again.update(s) for s, report in zip(samples, reports, strict=True) if report.accepted]
+    same = [each.prediction for report in repeated for each in report.all if each.prediction is not None]
+    assert all(equal(a, b) for a, b in zip(got, same, strict=True))
+
+
+@pytest.mark.parametrize("far", [-1_600_000_000_000, 1_000_000_000_000])
+def test_a_clock_that_was_set_with_strokes_elsewhere_starts_from_rest(scene, still, far):
+    fresh, twin = Twin(scene), Twin(scene)
+    follow(twin, still, 1500)
+    samples = [strokes(far + ms, moved(still, ms * 1e-3)) for ms in range(0, 100, 5)]
+    reports = [twin.update(sample) for sample in samples]
+    assert reports[0].events == ("leap",) and reports[1].earlier[0].events == ("jump back" if far < 0 else "restart",)
+    expected = [fresh.update(sample) for sample in samples]
+    got = [each for report in reports for each in report.all if each.prediction is not None]
+    assert all(equal(a.prediction, b.prediction) for a, b in zip(expected, got, strict=True))
 
 
 def test_strokes_out_of_reach_do_not_start_the_model(twin, still):
@@ -258,5 +281,6 @@ def test_shapes_come_10_times_a_second_in_spite_of_jitter(twin, still, seed):
 
 
 def test_a_shape_is_sent_after_time_was_set_back(twin, still):
-    shapes = [twin.update(strokes(ms, still)).prediction.shape for ms in (5000, 5001, 1000)]
-    assert [shape is not None for shape in shapes] == [True, False, True]
+    reports = [each for ms in (5000, 5001, 1000, 1001) for each in twin.update(strokes(ms, still)).all]
+    shapes = [report.prediction.shape for report in reports if report.prediction is not None]
+    assert [shape is not None for shape in shapes] == [True, False, True, False]

@@ -1,0 +1,106 @@
+"""The twin's edge: refuses samples that a program made wrongly, with what to do about it."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .errors import UsageError
+from .records import Array, Sample, Stream
+
+FLOAT = np.dtype(float)
+FIRST = 100  # samples of strokes that differ in their stamps by less than
+SHORTEST = 20_000  # ns from one to the next are no rig's
+LIMIT = 2**63  # ns
+
+
+class Edge:
+    """Looks at samples before anything is done with them.
+
+    Parameters
+    ----------
+    channels : dict of Stream to tuple of str
+        See `boom_twin.records.channels_of`.
+    """
+
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+        self._shapes = {stream: (len(names),) for stream, names in channels.items()}
+        self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
+        self._count, self._low, self._high = 0, LIMIT, -LIMIT
+        self._is_sure = False
+
+    def checked(self, sample: Sample) -> Sample:
+        """The sample, its stamp an int and its values float64, shape (channels,).
+
+        Raises
+        ------
+        UsageError
+            See `boom_twin.twin.Twin.update`.
+        """
+        values = sample.values
+        if (
+            type(sample.stamp) is not int
+            or type(values) is not np.ndarray
+            or values.dtype is not FLOAT
+            or type(sample.stream) is not Stream
+            or not -LIMIT <= sample.stamp < LIMIT
+            or values.shape != self._shapes[sample.stream]
+        ):
+            stream = _stream(sample.stream)
+            sample = Sample(stream, _stamp(sample.stamp), self._values(stream, sample.values))
+        if not self._is_sure and sample.stream is Stream.STROKES:
+            self._look(sample.stamp)
+        return sample
+
+    def _look(self, stamp: int) -> None:
+        """Whether stamps are nanoseconds; those that once were are never doubted, and one alone again and again is no sign."""
+        self._count += 1
+        self._low, self._high = min(self._low, stamp), max(self._high, stamp)
+        if self._count < FIRST or self._low == self._high:
+            return
+        self._is_sure = self._high - self._low >= self._count * SHORTEST
+        if not self._is_sure:
+            first, last, count, self._count = self._low, self._high, self._count, 0
+            raise UsageError(
+                f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST} ns from one to the next. "
+                "A stamp is a whole number of nanoseconds: give round(seconds * 1e9)."
+            )
+
+    def _values(self, stream: Stream, given: Any) -> Array:
+        names, (count,) = self._names[stream], self._shapes[stream]
+        wanted = f"Give {count} numbers, {names} of this boom, NaN where there is none."
+        try:
+            values = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            raise UsageError(f"values of {stream.value} are no numbers: {_short(given)}. {wanted}") from None
+        if values.shape != (count,):
+            raise UsageError(f"values of {stream.value} have shape {values.shape}: {_short(given)}. {wanted}")
+        return values
+
+
+def _stream(stream: Any) -> Stream:
+    if isinstance(stream, Stream):
+        return stream
+    named = next((each for each in Stream if stream in (each.value, each.name)), Stream.STROKES)
+    raise UsageError(f"stream is {_short(stream)}, not a Stream. Give Stream.{named.name}.")
+
+
+def _stamp(stamp: Any) -> int:
+    remedy = "Give a whole number of nanoseconds: round(seconds * 1e9)."
+    if isinstance(stamp, bool | np.bool_):
+        raise UsageError(f"stamp is {stamp}. {remedy}")
+    try:
+        found = operator.index(stamp)
+    except TypeError:
+        raise UsageError(f"stamp is {_short(stamp)}, a {type(stamp).__name__}. {remedy}") from None
+    if not -LIMIT <= found < LIMIT:
+        raise UsageError(f"stamp is {_short(found)}, more than 64 bits. {remedy}")
+    return found
+
+
+def _short(value: Any, width: int = 60) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= width else f"{text[:width]} .."

@@ -1,0 +1,86 @@
+"""Stamps of one stream: what goes on where it was, and what is stray, late, by a clock that was set, of a second source."""
+
+from __future__ import annotations
+
+from .records import Sample
+from .settings import Settings
+
+NANO = 1_000_000_000
+STEP = 1.75  # usual intervals; a longer one is looked at
+SMOOTHING = 0.05  # weight of the newest interval in the usual one
+KEPT = 256  # most samples that wait
+LASTING = 1_000_000_000  # ns that a second line of stamps has to go on alone before it is followed
+
+
+class Stamps:
+    """The line of stamps that is followed, and another one that may take its place.
+
+    A sample whose stamp steps, ahead or back, is held, and does nothing. If the next ones go on where the line was, it was
+    stray. If they follow the one that is held, time has stepped: it and they are released together.
+
+    Attributes
+    ----------
+    newest : int or None
+        Stamp (ns) of the newest sample that was taken.
+    usual : float
+        Time (ns) from one sample to the next; 0 while unknown.
+    held : list of (Sample, str)
+        The newest samples of the other line, and what each was told to be.
+    is_second : bool
+        Whether that line had been met before, and the one that is followed went on since: there are two sources.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.newest: int | None = None
+        self.usual = 0.0
+        self.held: list[tuple[Sample, str]] = []
+        self.is_second = False
+        self._since = 0
+        self._other: int | None = None
+        self.tune(settings)
+
+    def tune(self, settings: Settings) -> None:
+        """Judge by these limits from now on."""
+        self._gap = round(settings.gap * NANO)
+
+    @property
+    def longest(self) -> float:
+        """A longer step (ns) is confirmed by the next sample."""
+        return max(self._gap, STEP * self.usual)
+
+    def is_next(self, stamp: int) -> bool:
+        """Whether a sample comes as it usually does."""
+        return self.newest is None or 0 < stamp - self.newest <= (STEP * self.usual or self._gap)
+
+    def take(self, stamp: int) -> None:
+        """Go on with this stamp; samples that are held were stray."""
+        if self.newest is not None:
+            span = stamp - self.newest
+            self.usual = self.usual + SMOOTHING * (min(span, 2.0 * self.usual) - self.usual) if self.usual else float(span)
+        self.newest = stamp
+        if self.held:
+            self._other, self.held = self.held[-1][0].stamp, []
+
+    def hold(self, sample: Sample, event: str) -> str:
+        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be."""
+        last = self.held[-1][0].stamp if self.held else self._other
+        follows = last is not None and 0 < sample.stamp - last <= self.longest
+        if not (self.held and follows):
+            self.held, self._since, self.is_second = [], sample.stamp, follows
+        if self.is_second and event == "leap":
+            event = "second source"
+        self.held.append((sample, event))
+        if len(self.held) > (2 if self.is_second else KEPT):
+            del self.held[0]
+        return event
+
+    def is_confirmed(self, least: int) -> bool:
+        """Whether what is held goes on by itself, for `least` ns; a second source has to for long."""
+        span = self.held[-1][0].stamp - self._since
+        return span > 0 and span >= (LASTING if self.is_second else least)
+
+    def release(self) -> list[tuple[Sample, str]]:
+        """What is held; it is followed from now on."""
+        held, self.held, self._other = self.held, [], self.newest
+        self.usual = self.usual or float(held[-1][0].stamp - held[0][0].stamp) / (len(held) - 1)
+        return held
