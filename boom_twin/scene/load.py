@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import Fault, SceneError, SceneWarning
 from .checks import CHECKS
 from .parts import Scene
@@ -65,7 +67,8 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
     text = default_text() if source is None else read_text(Path(source))
     document = parse(text, name)
     scene, draft, faults = structure(document)
-    findings = [finding for check in CHECKS for finding in check(draft)]
+    with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
+        findings = [finding for check in CHECKS for finding in check(draft)]
     faults += document.faults + [finding.fault for finding in findings if not finding.odd]
     oddities = _in_order(finding.fault for finding in findings if finding.odd)
     if faults or scene is None:

@@ -37,7 +37,7 @@ from .odd_yaml import odd
 from .verdict import Kind, Verdict, worst
 
 FILE, METADATA, SHEET = "session_0.mcap", "metadata.yaml", "session.yaml"
-ROWS = 40
+ROWS = 16
 SECRET = b"a secret outside of the session"
 REPLAYED = 8
 """One in so many of the cases that can be read is replayed."""

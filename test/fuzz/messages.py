@@ -45,6 +45,7 @@ STRANGE = (
     *(1.7976931348623157e308, -1.7976931348623157e308),
 )
 STAMPS = (0, 1, -1, 2**31 * 10**9, 2**31 * 10**9 - 1, -(2**31) * 10**9, 2**63 - 1, -(2**63), 999_999_999, START // 10**9)
+COUNTS = (0, 1, 5, 2**31, 2**32 - 1)
 NEAR = (1, 1000, 10**6, 10**8, 2 * 10**8, 5 * 10**8, 9 * 10**8, 10**9, 2 * 10**9, 10**10, 10**12, 10**15)
 """Nanoseconds by which a stamp may be off, both ways."""
 
@@ -121,9 +122,7 @@ def _hostile(random: Generator, number: int, stream: Stream) -> list[Any]:
         return [stream.name, random.bytes(int(random.integers(200))).hex()]
     if how < 0.6:
         return [stream.name, _mangled(random, _encoded(true)).hex()]
-    stamp = true.stamp
-    if random.random() < 0.5:
-        stamp = int(pick(random, STAMPS)) if random.random() < 0.3 else stamp + int(pick(random, (-1, 1))) * int(pick(random, NEAR))
+    stamp = _stamp(random, true.stamp)
     values = true.values.copy()
     if random.random() < 0.6:
         values[int(random.integers(len(values)))] = pick(random, STRANGE)
@@ -134,13 +133,21 @@ def _hostile(random: Generator, number: int, stream: Stream) -> list[Any]:
     return [stream.name, stamp, values.tolist()]
 
 
+def _stamp(random: Generator, true: int) -> int:
+    """As it should be, off by a usual error of clocks, or at an edge of what a message can hold."""
+    how = random.random()
+    if how < 0.5:
+        return true
+    return int(pick(random, STAMPS)) if how < 0.65 else true + int(pick(random, (-1, 1))) * int(pick(random, NEAR))
+
+
 def _mangled(random: Generator, data: bytes) -> bytes:
     """Damaged anywhere, or a number of it is strange."""
     if random.random() < 0.5:
         return damaged(random, data)
     size = int(pick(random, (4, 8)))
     at = 4 + size * int(random.integers(max(1, (len(data) - 4) // size)))
-    number = struct.pack("<d", pick(random, STRANGE)) if size == 8 else struct.pack("<I", pick(random, (0, 1, 5, 2**31, 2**32 - 1)))
+    number = struct.pack("<d", pick(random, STRANGE)) if size == 8 else struct.pack("<I", pick(random, COUNTS))
     return data[:at] + number + data[at + size :]
 
 
