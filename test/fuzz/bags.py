@@ -11,9 +11,7 @@ import struct
 import tempfile
 import zlib
 from collections import Counter
-from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
-from io import StringIO
 from pathlib import Path
 
 import lz4.frame
@@ -23,7 +21,6 @@ from mcap.opcode import Opcode
 from numpy.random import Generator
 
 from boom_twin import load_scene, replay
-from boom_twin.cli.main import main
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.io.blocks import heads
 from boom_twin.io.reader import Session, scan
@@ -34,7 +31,7 @@ from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from .mcap_files import PREFIX, VARIANTS, joined, records, rewrite
 from .mutate import DAMAGES, damaged, flipped, pick, rearranged
 from .odd_yaml import odd
-from .verdict import Kind, Verdict, worst
+from .verdict import Kind, Verdict, printed, worst
 
 FILE, METADATA, SHEET = "session_0.mcap", "metadata.yaml", "session.yaml"
 ROWS = 16
@@ -229,7 +226,7 @@ def _read(path: Path) -> Verdict:
         session = scan(path)
         found = Counter(_messages(session))
     except BagError as error:
-        return _clear(str(error))
+        return _refused(str(error))
     if found == _truth():
         return Verdict(Kind.EQUAL)
     if not session.checked:
@@ -238,11 +235,9 @@ def _read(path: Path) -> Verdict:
 
 
 def _told(path: Path) -> Verdict:
-    """The command ``info``; what it prints is for a terminal."""
-    out, told = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(told):
-        code = main(["info", str(path)])
-    verdict = _clear(told.getvalue() if code else out.getvalue())
+    """The command ``info``."""
+    code, words = printed("info", str(path))
+    verdict = _refused(words)
     return verdict if code or verdict.is_finding else Verdict(Kind.EQUAL)
 
 
@@ -253,7 +248,7 @@ def _replayed(path: Path, out: Path) -> Verdict:
     try:
         sha = _sha(path)
     except BoomTwinError as error:
-        return _clear(str(error))
+        return _refused(str(error))
     return Verdict(Kind.EQUAL) if sha == _sha(base()) else Verdict(Kind.SILENT, "the same samples replay to other results")
 
 
@@ -275,7 +270,7 @@ def _recovered(path: Path, out: Path, is_loose: bool) -> Verdict:
     try:
         outcome = recover(path, out, is_loose)
     except BagError as error:
-        return _clear(str(error))
+        return _refused(str(error))
     for file in out.iterdir():
         if SECRET in file.read_bytes():
             return Verdict(Kind.SILENT, f"{file.name} of the rescue holds what stands outside of the session")
@@ -293,9 +288,6 @@ def _recovered(path: Path, out: Path, is_loose: bool) -> Verdict:
     return Verdict(Kind.TOLD, f"{lacking} lacking, {outcome.fault_count} faults told, {unvouched} unvouched for")
 
 
-def _clear(words: str) -> Verdict:
-    """A refusal, if nothing of it steers a terminal."""
-    if SECRET.decode() in words:
-        return Verdict(Kind.SILENT, f"the words tell what stands outside of the session: {words!r}")
-    found = next((letter for letter in words if letter != "\n" and not letter.isprintable()), None)
-    return Verdict(Kind.REFUSED, words) if found is None else Verdict(Kind.SILENT, f"the words hold {found!r}: {words!r}")
+def _refused(words: str) -> Verdict:
+    """A refusal, if it tells nothing from outside of the session."""
+    return Verdict(Kind.SILENT if SECRET.decode() in words else Kind.REFUSED, words)

@@ -213,7 +213,7 @@ class _Listener:
 
     def _show(self, key: Output, data: bytes) -> str:
         name, catch, store = self._topics.outputs[key].absolute, self._feed.catch, self._feed.store
-        if hasattr(catch, 'names') and name in catch.names:
+        if name in catch.names:
             catch.take_encoded(name, data, 0.0)
         for words in (dump(layout(store)), dump(state(store, 0.0, store.newest)), dump(alarms(store.alarms.all))):
             json.loads(words, parse_constant=_refuse_constant)

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
-from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,14 +20,13 @@ from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import YAMLError
 
 from boom_twin import Scene, load_scene, simulate, statics
-from boom_twin.cli.main import main
 from boom_twin.errors import BoomTwinError, SceneError, SceneWarning
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.read import NUMBER
 
 from .mutate import cut, damaged, pick, rearranged
 from .odd_yaml import odd
-from .verdict import Kind, Verdict
+from .verdict import Kind, Verdict, printed
 
 SUFFIX = ".yaml"
 ROWS, SPAN = 6, 0.05  # of the short simulation, s
@@ -38,15 +35,8 @@ ROWS, SPAN = 6, 0.05  # of the short simulation, s
 @cache
 def bases() -> dict[str, str]:
     """Whole scenes: as packaged, with clearance, with five sections."""
-    text = _printed()
-    return {"default": text, "clearance": _printed("--clearance"), "five": _five(text)}
-
-
-def _printed(*options: str) -> str:
-    out = StringIO()
-    with redirect_stdout(out):
-        assert main(["scene", *options]) == 0
-    return out.getvalue()
+    text = printed("scene")[1]
+    return {"default": text, "clearance": printed("scene", "--clearance")[1], "five": _five(text)}
 
 
 def _five(text: str) -> str:
@@ -84,8 +74,11 @@ def judge(path: Path) -> Verdict:
         try:
             scene = load_scene(path)
         except SceneError as error:
-            return _clear(str(error), path)
-    _check(path)
+            scene, verdict = None, _refused(str(error), path)
+    code, words = printed("check", str(path))
+    assert code == (scene is None), f"check ends with {code}: {words}"
+    if scene is None:
+        return verdict
     if any(scene == _base(name) for name in bases()):
         return Verdict(Kind.EQUAL)
     doubt = ("" if told else _start_of_another(path)) or _unlike_file(path, scene) or _wrong_results(scene)
@@ -106,21 +99,10 @@ def _load_text(text: str, path: Path) -> Scene:
         return load_scene(Path(folder) / path.name)
 
 
-def _clear(words: str, path: Path) -> Verdict:
-    """A refusal that names the file and the place, and writes nothing odd to a terminal."""
-    if not words.startswith(str(path)) or not words.splitlines()[1:]:
-        return Verdict(Kind.TRACEBACK, f"refused without place: {words!r}")
-    odd = next((letter for letter in words if letter != "\n" and not letter.isprintable()), None)
-    return Verdict(Kind.REFUSED, words) if odd is None else Verdict(Kind.SILENT, f"the refusal holds {odd!r}: {words!r}")
-
-
-def _check(path: Path) -> None:
-    """The command on the same file; a scene that loads must pass it."""
-    out = StringIO()
-    with redirect_stdout(out), redirect_stderr(out):
-        code = main(["check", str(path)])
-    if code != 0:
-        raise AssertionError(f"loads, but check ends with {code}: {out.getvalue()}")
+def _refused(words: str, path: Path) -> Verdict:
+    """A refusal that names the file and the place."""
+    is_clear = words.startswith(str(path)) and words.splitlines()[1:]
+    return Verdict(Kind.REFUSED, words) if is_clear else Verdict(Kind.TRACEBACK, f"refused without place: {words!r}")
 
 
 def _start_of_another(path: Path) -> str:

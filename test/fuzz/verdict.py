@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from enum import StrEnum
+from io import StringIO
+
+from boom_twin.cli.main import main
 
 
 class Kind(StrEnum):
@@ -39,6 +43,17 @@ class Verdict:
 
 
 ORDER = (Kind.TRACEBACK, Kind.SILENT, Kind.TOLD, Kind.REFUSED, Kind.OTHER, Kind.EQUAL)
+
+
+def printed(*arguments: str) -> tuple[int, str]:
+    """Exit code of a command, and what it writes; AssertionError if that would steer a terminal."""
+    out = StringIO()
+    with redirect_stdout(out), redirect_stderr(out):
+        code = main(arguments)
+    words = out.getvalue()
+    odd = next((letter for letter in words if letter != "\n" and not letter.isprintable()), None)
+    assert odd is None, f"{arguments} writes {odd!r}: {words!r}"
+    return code, words
 
 
 def worst(*verdicts: Verdict) -> Verdict:

@@ -8,9 +8,12 @@ from __future__ import annotations
 import json
 import re
 import resource
+import signal
 import sys
 import tempfile
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +23,8 @@ import numpy as np
 from .verdict import Kind, Verdict
 
 TARGETS = ("scenes", "bags", "messages", "page")
+LONGEST = 10.0
+"""Seconds of a processor that a case may take."""
 MOST = 2**30
 """Bytes by which the memory may grow in one case."""
 GUARD = 4 * 2**30
@@ -43,13 +48,35 @@ def judged(target: str, path: Path) -> Verdict:
     before = _memory("VmRSS")
     _forget_peak()
     try:
-        verdict = module(target).judge(path)
+        with _limited():
+            verdict = module(target).judge(path)
+    except _Hang:
+        return Verdict(Kind.HANG, traceback.format_exc())
     except MemoryError:
         return Verdict(Kind.GROWTH, "MemoryError")
     except Exception:
         return Verdict(Kind.TRACEBACK, traceback.format_exc())
     grown = _memory("VmHWM") - before
     return Verdict(Kind.GROWTH, f"{grown >> 20} MiB") if grown > MOST else verdict
+
+
+class _Hang(BaseException):
+    """The time is over; no handler of exceptions is to take it for one."""
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Raise `_Hang` after `LONGEST`; `fuzz.run` ends a worker that waits, or in which that does not help."""
+
+    def stop(*_: object) -> None:
+        raise _Hang
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _memory(name: str) -> int:
