@@ -10,7 +10,7 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak session figures clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
@@ -19,6 +19,7 @@ help:
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
+	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
 	@echo "make figures     make the pictures of the documentation anew"
 
@@ -63,6 +64,11 @@ soak: warm
 	$(BIN)/boom_twin study stability --soak --out out/soak
 	$(BIN)/python test/bench/contact_energy.py
 	$(BIN)/python test/bench/kills.py
+
+SECONDS ?= 600
+SEED ?= 1
+fuzz: warm
+	PYTHONPATH=test $(BIN)/python -m fuzz.run --seconds $(SECONDS) --seed $(SEED)
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
 $(COLCON_READY): setup.py

@@ -66,6 +66,10 @@ class BoundedComposer(Composer):
 
     nodes = 0
 
+    def __init__(self, loader: Any = None) -> None:
+        super().__init__(loader)
+        self.warn_double_anchors = False  # YAML allows them; the warning is one of Python
+
     def compose_node(self, parent: Any, index: Any) -> Any:
         """The next node."""
         self.nodes += 1

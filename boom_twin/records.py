@@ -39,6 +39,10 @@ def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
     }
 
 
+LIMIT = 1e6
+"""Largest magnitude that is taken for a reading: no stroke (m), angle (rad) or acceleration (m/s^2) comes near it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sample:
     """One message of the rig, mapped to the scene's order and units.
@@ -51,7 +55,7 @@ class Sample:
     values : ndarray
         ``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific
         force along x and z of the tip.
-        NaN where the message had no value.
+        NaN where the message had no value; beyond `LIMIT` is taken for none.
     """
 
     stream: Stream

@@ -20,7 +20,7 @@ from .memory import Expected, Memory
 from .mounting import Mounting
 from .plausible import FAR, Plausible
 from .recent import Recent
-from .records import Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from .records import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .requests import Requests
 from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
@@ -32,7 +32,7 @@ from .zeros import Zeros
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
     "duplicate": "stamp as the newest one of its stream; sample left out",
-    "partial": "some values missing or not finite; the others were used",
+    "partial": "some values missing, not finite or absurd; the others were used",
     "empty": "no usable value; sample left out",
     "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
     "gap": "longer pause between strokes, bridged",
@@ -221,9 +221,12 @@ class Twin:
             channel. Nothing has changed then.
         """
         sample = self._edge.checked(sample)
-        complete = bool(np.isfinite(sample.values.sum()))
-        if not complete and not np.isfinite(sample.values).any():
-            return self._refuse(sample, "empty")
+        complete = bool(np.abs(sample.values).max(initial=0.0) <= LIMIT)
+        if not complete:
+            usable = np.abs(sample.values) <= LIMIT
+            if not usable.any():
+                return self._refuse(sample, "empty")
+            sample = replace(sample, values=np.where(usable, sample.values, np.nan))
         if sample.stream is Stream.STROKES:
             return self._take_strokes(sample, complete)
         return self._take_measured(sample, complete)

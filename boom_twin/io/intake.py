@@ -12,12 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Sample, Stream
+from ..records import LIMIT, Sample, Stream
 from .sensors import factor
 from .topics import Topics, load_topics
-
-LIMIT = 1e6
-"""Largest magnitude that is taken for a reading: no stroke (m), angle (rad) or acceleration (m/s^2) comes near it."""
 
 LATEST = 2**31 * 1_000_000_000
 """Stamps (ns) from here on have no place in a message."""
@@ -90,7 +87,7 @@ class Intake:
         ``not finite``
             NaN or infinity; NaN in the sample.
         ``absurd magnitude``
-            Above `LIMIT`; NaN in the sample.
+            Above `boom_twin.records.LIMIT`; NaN in the sample.
         ``no measurement``
             An Imu that says by ``linear_acceleration_covariance[0] = -1`` that it has none (REP-145); no sample.
         ``no usable value``

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
@@ -13,7 +14,8 @@ from mcap.summary import Summary
 
 from ..errors import BagError
 from ..received import open_received
-from .blocks import chunk_at, records
+from .blocks import records
+from .chunkhead import head_at
 from .content import LARGEST
 from .damage import blame, compare_counts
 from .ends import check_ends
@@ -87,7 +89,7 @@ def survey(path: Path) -> McapFile:
             start=told.message_start_time,
             end=told.message_end_time,
             chunks=tuple(summary.chunk_indexes),
-            checked=chunk_at(file, summary.chunk_indexes[0]).uncompressed_crc != 0,
+            checked=all(_has_checksum(file, index) for index in summary.chunk_indexes),
             notes=_notes(reader.iter_metadata()),
         )
 
@@ -101,6 +103,11 @@ def _is_complete(summary: Summary, told: Statistics) -> bool:
     )
 
 
+def _has_checksum(file: BinaryIO, index: ChunkIndex) -> bool:
+    head = head_at(file, index.chunk_start_offset)
+    return head is not None and head.crc != 0
+
+
 def _walk(path: Path) -> McapFile:
     """Look at all of a file, and compare its statistics, if it has them, with what is there."""
     channels: dict[int, Channel] = {}
@@ -109,7 +116,7 @@ def _walk(path: Path) -> McapFile:
     counts: Counter[int] = Counter()
     start, end = 2**64, 0
     told: Statistics | None = None
-    is_summed = are_chunks_summed = False
+    is_summed, chunks_summed = False, set[bool]()
     for record in records(path):
         match record:
             case Message():
@@ -122,13 +129,13 @@ def _walk(path: Path) -> McapFile:
             case Metadata():
                 notes.append(record)
             case Chunk():
-                are_chunks_summed = record.uncompressed_crc != 0
+                chunks_summed.add(record.uncompressed_crc != 0)
             case DataEnd():
                 is_summed = record.data_section_crc != 0
             case Statistics():
                 told = record
     start = start if counts else 0
-    checked = is_summed or (are_chunks_summed and told is not None)
+    checked = is_summed or (chunks_summed == {True} and told is not None)
     held = McapFile(path, channels, schemas, dict(counts), start, end, (), checked, _notes(notes))
     if told is not None:
         expected = held.by_topic(told.channel_message_counts)

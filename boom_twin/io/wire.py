@@ -49,11 +49,13 @@ class _Layout(NamedTuple):
     end: int
     at: int
     numbers: struct.Struct
+    later: tuple[tuple[int, bytes], ...]
     make: Callable[[tuple[float, ...]], Joints | Force]
 
     def is_of(self, data: bytes) -> bool:
         """Whether `data` is laid out like this."""
-        return len(data) == self.size and data[:2] == _LITTLE and data[_ORIGIN + _TIME : self.end] == self.head
+        is_alike = len(data) == self.size and data[:2] == _LITTLE and data[_ORIGIN + _TIME : self.end] == self.head
+        return is_alike and all(data[at : at + 4] == length for at, length in self.later)
 
 
 class Wire:
@@ -98,14 +100,22 @@ def _joints_layout(data: bytes) -> _Layout:
     end = place + -(place - _ORIGIN) % 4 + 4
     count = int.from_bytes(data[end - 4 : end], "little")
     at = end + -(end - _ORIGIN) % 8
-    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct(f"<{count}d"), lambda row: Joints(names, row))
+    later, place = [], (at + 8 * count) if count else end
+    for _ in ("velocity", "effort"):
+        length = data[place : place + 4]
+        later.append((place, length))
+        size = int.from_bytes(length, "little")
+        place += 4
+        place += -(place - _ORIGIN) % 8 + 8 * size if size else 0
+    head, numbers = data[_ORIGIN + _TIME : end], struct.Struct(f"<{count}d")
+    return _Layout(len(data), head, end, at, numbers, tuple(later), lambda row: Joints(names, row))
 
 
 def _force_layout(data: bytes) -> _Layout:
     """Of an Imu: after the header all has its place."""
     end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
     at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
-    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), _force)
+    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), (), _force)
 
 
 def _force(row: tuple[float, ...]) -> Force:

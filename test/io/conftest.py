@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import CompressionType, IndexType, Writer
+from fuzz.mcap_files import rewrite
+from mcap.writer import IndexType
 
 from boom_twin.io.reader import Session, read
 from boom_twin.io.session import write_session
@@ -67,33 +67,10 @@ def _plain(msg: Any) -> tuple[Any, ...]:
 def rewritten(tmp_path: Path) -> Callable[..., Path]:
     """Writes the messages of a bag into another .mcap file: other options, order, or names."""
 
-    def rewrite(
-        bag: Path,
-        name: str = "other.mcap",
-        *,
-        profile: str = "ros2",
-        encoding: str = "cdr",
-        schema_encoding: str = "ros2msg",
-        change: Callable[[bytes], bytes] = bytes,
-        backwards: bool = False,
-        **options: Any,
-    ) -> Path:
-        path = tmp_path / name
-        options = {"chunk_size": 2048, "compression": CompressionType.NONE, **options}
-        with (bag / FILE_NAME).open("rb") as source, path.open("wb") as target:
-            writer = Writer(target, **options)
-            writer.start(profile=profile, library="test")
-            channels: dict[str, int] = {}
-            found = list(make_reader(source).iter_messages())
-            for schema, channel, message in reversed(found) if backwards else found:
-                if channel.topic not in channels:
-                    kind = writer.register_schema(schema.name, schema_encoding, change(schema.data))
-                    channels[channel.topic] = writer.register_channel(channel.topic, encoding, kind)
-                writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
-            writer.finish()
-        return path
+    def other(bag: Path, name: str = "other.mcap", **options: Any) -> Path:
+        return rewrite(bag / FILE_NAME, tmp_path / name, **options)
 
-    return rewrite
+    return other
 
 
 UNINDEXED = {

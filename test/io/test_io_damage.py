@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fuzz.mcap_files import joined, records
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 
@@ -183,3 +184,16 @@ def test_a_message_that_cannot_be_decoded_is_named(tmp_path: Path, data: bytes) 
         bag.write_encoded("strokes", 77, data)
     with pytest.raises(BagError, match=r"session_0\.mcap: topic /cylinder_strokes at log time 77 ns"):
         list(read(scan(tmp_path / "bag"), {"cylinder_strokes": JOINT_STATE}))
+
+
+@pytest.mark.parametrize("options", [{}, {"index_types": IndexType.NONE}], ids=["indexed", "unindexed"])
+def test_one_chunk_without_a_checksum_is_told(bag: Path, rewritten: Callable[..., Path], options: dict[str, Any]) -> None:
+    """The others' do not vouch for it."""
+    path = rewritten(bag, **options)
+    assert scan(path).checked
+    found = records(path.read_bytes())
+    place = [number for number, (opcode, _) in enumerate(found) if opcode == Opcode.CHUNK][2]
+    body = found[place][1]
+    found[place] = (int(Opcode.CHUNK), body[:24] + bytes(4) + body[28:])
+    path.write_bytes(joined(found))
+    assert not scan(path).checked

@@ -92,3 +92,16 @@ def test_a_message_that_is_cut_off_is_refused_and_the_next_one_read(cut: int) ->
     with pytest.raises(Exception):  # noqa: B017 - whatever the decoder raises
         wire.read(data[:cut])
     same(wire, Stream.STROKES, data)
+
+
+@pytest.mark.parametrize("length", [0, 1])
+def test_lengths_behind_the_numbers_count_too(length: int) -> None:
+    """Else a message that a full decoder refuses is taken, and the recording of it can never be replayed."""
+    wire = Wire(TYPES[Stream.STROKES], decoder(Stream.STROKES, []))
+    data = joint_state(7, ["cylinder_1", "cylinder_2"], [1.0, 2.0])
+    wire.read(data)
+    velocity = len(data) - 8
+    for place in (velocity, velocity + 4):
+        with pytest.raises(Exception):  # noqa: B017 - whatever the decoder raises
+            wire.read(data[:place] + b"\xff\xff\xff\x7f" + data[place + 4 :])
+    same(wire, Stream.STROKES, joint_state(7, ["cylinder_1", "cylinder_2"], [1.0, 2.0], effort=length))

@@ -168,7 +168,8 @@ def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) ->
     displacement, states = (load_topics().outputs[role] for role in (ENOUGH, Output.JOINT_STATES))
     types = RosbagsTypes()
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in (displacement, states)}
+        topics = displacement, states
+        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in topics}
         for row in range(10):
             stamp = 1_700_000_000 * 10**9 + row * 5_000_000
             for topic, link in links.items():

@@ -284,3 +284,16 @@ def test_a_shape_is_sent_after_time_was_set_back(twin, still):
     reports = [each for ms in (5000, 5001, 1000, 1001) for each in twin.update(strokes(ms, still)).all]
     shapes = [report.prediction.shape for report in reports if report.prediction is not None]
     assert [shape is not None for shape in shapes] == [True, False, True, False]
+
+
+@pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e7])
+def test_what_no_sensor_reads_is_taken_for_missing(scene, twin, still, absurd):
+    clean = Twin(scene)
+    follow(clean, still, 100), follow(twin, still, 100)
+    values = moved(still, 0.1)
+    values[2] = absurd
+    expected, report = clean.update(strokes(100, np.where(values == absurd, np.nan, values))), twin.update(strokes(100, values))
+    assert report.events == ("partial",) and equal(report.prediction, expected.prediction)
+    report = twin.update(angles(100, np.array([0.0, absurd, 0.0, 0.0])))
+    assert report.events == ("partial",) and np.isnan(report.residuals[0].values[1])
+    assert twin.update(angles(101, np.full(4, absurd))).events == ("empty",)

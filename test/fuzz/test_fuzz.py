@@ -1,0 +1,35 @@
+"""Every case of the corpus, and a minute of new ones."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from . import worker
+from .run import ROOT
+from .verdict import Kind
+
+CORPUS = Path(__file__).parent / "corpus"
+CASES = [(target, path) for target in worker.TARGETS for path in sorted((CORPUS / target).iterdir())]
+SECONDS = 60
+
+
+@pytest.mark.parametrize(("target", "path"), CASES, ids=[f"{target}-{path.stem}" for target, path in CASES])
+def test_the_corpus(target: str, path: Path) -> None:
+    """What was once a finding, or nearly so; what is cut off is refused, or told."""
+    worker.module(target).begin()
+    verdict = worker.judged(target, path)
+    assert not verdict.is_finding, verdict.words
+    if path.name.startswith("cut_"):
+        assert verdict.kind in (Kind.REFUSED, Kind.TOLD)
+
+
+def test_a_minute_of_new_cases(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "fuzz.run", "--seconds", str(SECONDS), "--out", str(tmp_path / "found")]
+    path = {**os.environ, "PYTHONPATH": str(ROOT / "test")}
+    done = subprocess.run(command, cwd=tmp_path, env=path, capture_output=True, text=True, timeout=1500)
+    assert done.returncode == 0, done.stdout + done.stderr
