@@ -11,12 +11,12 @@ from boom_twin.plain import plain
 from boom_twin.scene.load import default_text, examine
 
 NO_VALUES = [
-    "!!bool maybe", "!!bool ''", "!!bool 1", "!!int ''", "!!int x", "!!int 0x", "!!int _", "!!int 1:30", "!!float ''", "!!float x",
-    "!!float _", "!!float 0x1F", "9" * 5000,
+    "!!bool maybe", "!!bool ''", "!!bool 1", "!!int ''", "!!int x", "!!int 0x", "!!int _", "!!int 1:30", "!!float ''",
+    "!!float x", "!!float _", "!!float 0x1F", "9" * 5000,
 ]  # fmt: skip
 REFUSED = [
-    *NO_VALUES, "!!float 1e400", "1e400", "-1e400", ".inf", ".nan", "1:30", "!!binary aGk=", "!!set {a}", "!!omap [a: 1]", "!!int [1]",
-    "!foo 3", "&a [*a]", "1e-400", "1e31", "yes", '"\\uD800"',
+    *NO_VALUES, "!!float 1e400", "1e400", "-1e400", ".inf", ".nan", "1:30", "!!binary aGk=", "!!set {a}", "!!omap [a: 1]",
+    "!!int [1]", "!foo 3", "&a [*a]", "1e-400", "1e31", "yes", '"\\uD800"',
 ]  # fmt: skip
 READ = {"0x1F": 31.0, "0o17": 15.0, "017": 17.0, "1_000": 1000.0, "0b101": 5.0, "&a 5": 5.0, "!!float 5": 5.0, "!!int 5": 5.0}
 
@@ -29,7 +29,7 @@ def with_modulus(text: str) -> str:
 def test_what_is_no_number_is_refused(bench: Any, text: str) -> None:
     with pytest.raises(SceneError) as caught:
         examine(bench.text(with_modulus(text)))
-    assert {(fault.path, fault.line) for fault in caught.value.faults} == {("material.E", 15)}
+    assert {(fault.path.split("[")[0], fault.line) for fault in caught.value.faults} == {("material.E", 15)}
     str(caught.value).encode()
     assert max(map(len, str(caught.value).splitlines())) < 300
 
