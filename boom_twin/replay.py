@@ -303,6 +303,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         "wall_s": wall,
         "realtime_factor": duration / wall,
         "dropped": recording.refused,
+        "outside_validity": twin.counts["deflected"],
         "events": dict(sorted(twin.counts.items())),
         "joint_residual_rms_rad": _rms(values),
         "joint_residual_normalised_mean": _mean(normalised),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .analysis.validity import SHARE
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
 from .edge import Edge
@@ -49,6 +51,7 @@ EVENTS = {
     "load": "payload or line fill changed; the model started again from rest",
     "limits": "other settings changed while the twin ran",
     "zero": "the zero of a sensor was set anew",
+    "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
@@ -170,7 +173,7 @@ class Twin:
     def _build(self) -> None:
         """The model under the present load."""
         scene = loaded(self.scene, *self.settings.load)
-        self._boom = Following(scene, self.settings)
+        self._boom, self._valid = Following(scene, self.settings), SHARE * scene.reach
         self.plan = self._boom.plan
         self.judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
@@ -356,6 +359,8 @@ class Twin:
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         run.plausible.estimate = prediction.strokes
         self._remember(run, prediction)
+        if math.hypot(*prediction.tip_displacement) > self._valid:
+            events.append("deflected")
         if events:
             self.counts.update(events)
         if self.judge is not None:

@@ -1,7 +1,8 @@
 """Errors of a simulated motion, estimated from the same motion run again, otherwise resolved (Richardson's extrapolation).
 
-Half the step tells what stepping adds; every second row of the drive what the curve between the rows adds. (Hairer, Norsett
-and Wanner, Solving Ordinary Differential Equations I, 1993, section II.4.)
+A finer step tells what stepping adds; every second row of the drive what the curve between the rows adds. (Hairer, Norsett
+and Wanner, Solving Ordinary Differential Equations I, 1993, section II.4.) The step is halved, but with clearance divided by
+eight: a journal swings in its bush at some hundred Hz to some kHz, which half a step of 1 ms knows as little of as a whole one.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from .rows import Rows
 ACCELERATION, FORCE = 0.05, 0.02  # bounds of the error of acceleration and force, as shares of the largest
 LEAST_ACCELERATION = 0.02  # m/s^2 that an error is measured against at least
 LEAST_FORCE = 0.01  # likewise, of the largest force of all cylinders
-BY_STEPS = 2.0  # error over the change that half the step makes: 4/3 for smooth motions, 2 for impacts and kinks
+BY_STEPS = 2.0  # error over the change that a finer step makes; by halves 4/3 for smooth motions, 2 for impacts and kinks
 BY_ROWS = 1.5  # error over the change that every second row makes: 1/3 for smooth drives, 1 and more at kinks
 
 
 def step_errors(course: Course, own: Run, dt: float) -> tuple[EstimatedError, ...]:
     """What steps of at most `dt` (s) added to the motion `own`; `differences` tells of what."""
-    rows = np.arange(len(course.times))
-    return _compared(course.times, own.rows, course.stepped(rows, dt, finer=2), BY_STEPS)
+    rows, finer = np.arange(len(course.times)), 8 if course.plan.pins else 2
+    return _compared(course.times, own.rows, course.stepped(rows, dt, finer), BY_STEPS)
 
 
 def row_errors(course: Course, own: Run) -> tuple[EstimatedError, ...]:

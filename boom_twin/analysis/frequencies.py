@@ -17,9 +17,10 @@ import numpy as np
 from ..chain.clearance import load_pins
 from ..chain.place import place
 from ..chain.program import Motion, State, Work
-from ..chain.status import OK
+from ..chain.status import OK, SENTENCES
 from ..chain.step import observe
 from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from ..errors import SolverError
 from ..plan.plan import Plan
 from ..records import Array
 
@@ -27,6 +28,8 @@ HIGHEST = 1e7  # rad/s; no mode is looked for above
 RELATIVE_WIDTH = 1e-11  # of the last bracket
 SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
 LOAD = 1e-9  # m, displacement whose inertia forces load the boom for that
+TRIES = 20  # frequencies, each a little beside the last, where one meets a pivot that is zero
+ABSURD = "Look for values in the scene that are too large or too small by many orders of magnitude."
 NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
 
 
@@ -55,14 +58,16 @@ def constraints(plan: Plan) -> int:
 
 
 def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
-    """Negative pivots of K - omega^2 M at the present state."""
+    """Negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
     place(plan.tables, state, work)
-    motion = Motion(-omega * omega, 0.0, work.position.copy(), np.zeros_like(work.position))
+    position, still = work.position.copy(), np.zeros_like(work.position)
     drive = _drive(plan, state, work)
-    status, negative = _condense(plan, state, work, motion, drive)
-    if status != OK:
-        return negative_pivots(plan, state, work, omega * (1.0 + 1e-12) + 1e-12)
-    return int(negative) + _negative_eigenvalues(work.blocks) + _negative_eigenvalues(work.ends)
+    for _ in range(TRIES):
+        status, negative = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
+        if status == OK:
+            return int(negative) + _negative_eigenvalues(work.blocks) + _negative_eigenvalues(work.ends)
+        omega = omega * (1.0 + 1e-12) + 1e-12
+    raise SolverError(f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed: {SENTENCES[status]}. {ABSURD}")
 
 
 def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int]:
@@ -82,10 +87,13 @@ def _drive(plan: Plan, state: State, work: Work) -> Array:
 
 def _negative_eigenvalues(blocks: Array) -> int:
     """Of small symmetric matrices (k, m, m) whose rows differ by many orders of magnitude: balanced first, signs stay."""
-    for _ in range(6 if len(blocks) else 0):
-        size = np.sqrt(np.abs(blocks).max(axis=2))
-        size[size == 0.0] = 1.0
-        blocks = blocks / (size[:, :, None] * size[:, None, :])
+    with np.errstate(all="ignore"):
+        for _ in range(6 if len(blocks) else 0):
+            size = np.sqrt(np.abs(blocks).max(axis=2))
+            size[size == 0.0] = 1.0
+            blocks = blocks / (size[:, :, None] * size[:, None, :])
+    if not np.isfinite(blocks).all():
+        raise SolverError(f"the stiffness of the boom is not finite. {ABSURD}")
     return int(np.sum(np.linalg.eigvalsh(blocks) < 0.0))
 
 
@@ -136,6 +144,8 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
         increments = _response(plan, state, work, omega * (1.0 - SHIFT), motion)
         motion = _moved(plan, state, work, increments)
         size = math.sqrt(float(plan.masses @ motion**2))
+        if not 0.0 < size < math.inf:
+            raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
         motion, increments = motion / size, increments / size
     return Mode(omega / (2.0 * math.pi), increments, motion)
 

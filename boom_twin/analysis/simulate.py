@@ -18,6 +18,7 @@ from .course import Course
 from .doubt import EstimatedError, ringing, told, too_fast
 from .estimated_errors import row_errors, step_errors
 from .statics import checked_strokes, settle
+from .validity import motion_beyond_validity
 
 RHO = 0.8
 
@@ -41,7 +42,8 @@ class Simulation:
     step_errors, row_errors : tuple of EstimatedError
         Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive.
     doubts : tuple of str
-        What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast.
+        What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast,
+        deflections that the model is not meant for.
     pin_names : tuple of str
         Pins with clearance.
     pins : ndarray, shape (m, k, 4)
@@ -129,6 +131,7 @@ def simulate(
         *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
         *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
         *too_fast(times, own.rates),
+        *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
     ]
     return Simulation(
         times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],

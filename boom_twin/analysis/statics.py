@@ -20,6 +20,7 @@ from ..scene.parts import Scene
 from .frequencies import Mode, constraints, natural_modes, negative_pivots
 from .posture import rigid_tip, set_undeformed
 from .seating import clamp_pins, linearise_pins, loosen_pins, release_pins
+from .validity import beyond_validity
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
@@ -46,6 +47,8 @@ class Equilibrium:
         Undamped, about this equilibrium, ascending.
     outline : ndarray, shape (k, 2)
         Points of the deflected centre line from base to tip, m.
+    doubts : tuple of str
+        A sentence if it is outside the model's validity, see `analysis.validity`.
     """
 
     strokes: Array
@@ -55,6 +58,7 @@ class Equilibrium:
     cylinder_forces: Array
     modes: tuple[Mode, ...]
     outline: Array
+    doubts: tuple[str, ...] = ()
 
     @property
     def frequencies(self) -> Array:
@@ -86,14 +90,16 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
     row = np.empty(2 * plan.joints + 9)
     observe(plan.tables, state, row)
     n = plan.joints
+    undeformed, tip = rigid_tip(scene, angles), state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
-        tip_rigid=rigid_tip(scene, angles),
-        tip=state.frames[-1, :2].copy(),
+        tip_rigid=undeformed,
+        tip=tip,
         joints=row[:n],
         cylinder_forces=row[n : 2 * n],
         modes=natural_modes(plan, state, work, modes),
         outline=outline(plan, state, work.position),
+        doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),
     )
 
 
@@ -176,7 +182,10 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
 
 def is_stable(plan: Plan, state: State, work: Work) -> bool:
     """Whether energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
-    return negative_pivots(plan, state, work, 0.0) == constraints(plan)
+    try:
+        return negative_pivots(plan, state, work, 0.0) == constraints(plan)
+    except SolverError:
+        return False
 
 
 def outline(plan: Plan, state: State, position: Array) -> Array:

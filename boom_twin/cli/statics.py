@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,8 @@ def run(args: Namespace) -> int:
 
     scene = open_scene(args.scene)
     found = statics(scene, strokes=args.strokes, posture=args.posture)
+    for doubt in found.doubts:
+        print(f"boom_twin statics: warning: {doubt}.", file=sys.stderr)
     if args.json:
         print_json(as_json(found))
     else:
@@ -43,7 +46,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(found: Equilibrium) -> dict[str, object]:
-    """The contract's keys."""
+    """The contract's keys, and warnings."""
     return {
         "stroke_m": found.strokes,
         "tip_rigid_m": found.tip_rigid,
@@ -51,6 +54,7 @@ def as_json(found: Equilibrium) -> dict[str, object]:
         "joint_rad": found.joints,
         "cylinder_force_N": found.cylinder_forces,
         "frequencies_Hz": found.frequencies,
+        "warnings": found.doubts,
     }
 
 

@@ -12,9 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..physics.contact import LAWS, restitution_of
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+LARGEST = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
+Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Modes = Annotated[int, Field(ge=0, le=10)]
 
@@ -170,6 +171,11 @@ class Scene(Part):
     line_fill: NotNegative | None = None
     clearance: Clearance | None = None
     postures: dict[str, tuple[Finite, ...]] = {}
+
+    @property
+    def reach(self) -> float:
+        """Length of the straight boom, pivot of section 1 to the tip, m."""
+        return sum(section.length for section in self.sections)
 
     def pins_of(self, owner: str) -> tuple[Pin, ...]:
         """Pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""

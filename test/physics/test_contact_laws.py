@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms
-from oracle.clearance.drop import restitution
+from oracle.clearance.drop import rebound, restitution
 from oracle.clearance.scenes import RODS, with_pins
 from scipy.integrate import solve_ivp
 
+from boom_twin.peers.play.contact import HYSTERESIS, Contact
 from boom_twin.physics.contact import (
     APPROACH,
     CLOSED,
@@ -21,6 +22,7 @@ from boom_twin.physics.contact import (
     bearing,
     contact_stiffness,
     limited,
+    restitution_of,
 )  # fmt: skip
 from boom_twin.plan.compile import compile_scene
 
@@ -70,6 +72,23 @@ def test_restitution_is_that_of_the_closed_form_whatever_the_speed(law, e):
     row, memory = pin(law, e)
     expected = restitution(LAWS[law](e))
     assert [kept(row, memory, 0.02), kept(row, memory, 0.5)] == pytest.approx([expected, expected], abs=2e-3)
+
+
+@pytest.mark.parametrize("e", [0.05, 0.2, 0.5, 0.7, 0.9, 0.99])
+def test_the_exact_law_keeps_what_it_is_asked_for(e):
+    """By the kernel's own ball, by the peer's, and by the closed form with the peer's own chi."""
+    row, memory = pin("hunt-crossley-exact", e)
+    assert kept(row, memory, 0.2) == pytest.approx(e, abs=0.01)
+    chi = HYSTERESIS["hunt-crossley-exact"](e)
+    assert rebound(Contact(row.stiffness, chi, row.gap, smoothing=SMOOTH), MASS, 0.2) == pytest.approx(e, abs=0.01)
+    assert restitution(chi) == pytest.approx(e, abs=1e-6)
+    assert restitution_of(row.loss) == pytest.approx(e, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("e", [0.95, 0.7, 0.4])
+def test_check_states_the_restitution_that_a_law_really_gives(law, e):
+    assert restitution_of(LAWS[law](e)) == pytest.approx(restitution(LAWS[law](e)), abs=1e-5)
 
 
 def test_the_tangent_is_the_derivative_of_the_force():

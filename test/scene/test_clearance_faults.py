@@ -66,6 +66,15 @@ def test_all_pins_of_a_boom_may_be_listed(bench: Any) -> None:
     assert bench.faults(lambda values: values.update(clearance={"pins": [PIN | {"at": at} for at in places]})) == ()
 
 
+@pytest.mark.parametrize(("law", "asked", "given"), [("lankarani-nikravesh", 0.5, "0.725"), ("flores", 0.5, "0.470")])
+def test_a_law_that_does_not_keep_its_restitution_is_odd(bench: Any, law: str, asked: float, given: str) -> None:
+    block = {"contact": {"law": law, "restitution": asked}, **pin()}
+    (fault,) = bench.oddities(lambda values: values.update(clearance=block))
+    assert fault.path == "clearance.contact.restitution" and given in fault.bound and "hunt-crossley-exact" in fault.remedy
+    block["contact"]["law"] = "hunt-crossley-exact"
+    assert bench.oddities(lambda values: values.update(clearance=block)) == []
+
+
 def test_a_clearance_wide_for_its_pin_is_odd(bench: Any) -> None:
     (fault,) = bench.oddities(lambda values: values.update(clearance=pin(radial_clearance=0.004)))
     assert fault.path == "clearance.pins[0].radial_clearance" and "more than a tenth of pin_radius" in fault.bound

@@ -130,3 +130,10 @@ def test_oddities_come_in_the_order_of_the_file(bench: Any) -> None:
 
     lines = [oddity.line for oddity in bench.oddities(edit)]
     assert len(lines) == 3 and lines == sorted(lines)
+
+
+@pytest.mark.parametrize(("place", "path"), [(("modes",), "modes"), (("sections", 1, "modes"), "sections[1].modes")])
+def test_a_single_bending_coordinate_warns_of_what_it_costs(bench: Any, place: Any, path: str) -> None:
+    (oddity,) = bench.oddities(lambda values: put(values, place, 1))
+    assert oddity.path == path and "21 %" in oddity.bound and "Take 2 or 3" in oddity.remedy
+    assert bench.oddities(lambda values: put(values, place, 2)) == []
