@@ -23,6 +23,7 @@ from numpy.random import Generator
 from boom_twin import load_scene, replay
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.io.blocks import heads
+from boom_twin.io.damage import blame
 from boom_twin.io.reader import Session, scan
 from boom_twin.io.recover import recover
 from boom_twin.io.session import write_session
@@ -77,17 +78,19 @@ def _messages(session: Session) -> list[Message]:
     """Topic, log time and bytes of all messages."""
     found = []
     for file in session.files:
-        for channel, time, data in heads(file.path, file.chunks):
-            found.append((file.channels[channel].topic, time, data))
+        with blame(file.path):
+            for channel, time, data in heads(file.path, file.chunks):
+                found.append((file.channels[channel].topic, time, data))
     return found
 
 
+@cache
 def begin() -> None:
     """Make the whole sessions, and replay one."""
     for name in VARIANTS:
         _variant(name)
     _truth()
-    _sha(base())
+    _base_sha()
 
 
 # -- making ---------------------------------------------------------------------------------------------------------------
@@ -249,7 +252,12 @@ def _replayed(path: Path, out: Path) -> Verdict:
         sha = _sha(path)
     except BoomTwinError as error:
         return _refused(str(error))
-    return Verdict(Kind.EQUAL) if sha == _sha(base()) else Verdict(Kind.SILENT, "the same samples replay to other results")
+    return Verdict(Kind.EQUAL) if sha == _base_sha() else Verdict(Kind.SILENT, "the same samples replay to other results")
+
+
+@cache
+def _base_sha() -> str:
+    return _sha(base())
 
 
 def _of_content(path: Path) -> int:

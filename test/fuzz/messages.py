@@ -88,6 +88,7 @@ def _outputs() -> dict[str, list[bytes]]:
     return found
 
 
+@cache
 def begin() -> None:
     """Compile, and make the messages that are mutated."""
     _outputs()

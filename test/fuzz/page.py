@@ -80,6 +80,7 @@ def _memory(process: int) -> int:
     return int(found[1]) * 1024 if found else 0
 
 
+@cache
 def begin() -> None:
     """Start the monitor."""
     _server()

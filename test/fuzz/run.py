@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
+from shutil import rmtree
 
 from .verdict import Kind, Verdict, table
 from .worker import LONGEST, TARGETS, judged, make, module
@@ -26,7 +27,7 @@ from .worker import LONGEST, TARGETS, judged, make, module
 ROOT = Path(__file__).parents[2]
 SHARES = {"scenes": 0.35, "bags": 0.3, "messages": 0.25, "page": 0.1}
 WORKERS = 2
-LONGEST_WAIT = 60.0
+LONGEST_WAIT = 180.0
 """Seconds of the clock: a case that waits for nothing takes no processor. The machine may have other work."""
 START = 300.0
 """Seconds in which a worker begins: it may compile."""
@@ -49,10 +50,11 @@ class Findings:
         if not verdict.is_finding:
             return
         self.cases.append((target, number, verdict))
-        self.out.mkdir(parents=True, exist_ok=True)
-        case = make(target, self.seed, number, self.out)
-        command = f"PYTHONPATH=test python -m fuzz.run --target {target} --case {case}"
-        (self.out / f"{case.name}.txt").write_text(f"{verdict.kind}\n{command}\n{verdict.words}\n", encoding="utf-8")
+        folder = self.out / f"{target}_{self.seed}_{number}"
+        rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        command = f"PYTHONPATH=test python -m fuzz.run --target {target} --case {make(target, self.seed, number, folder)}"
+        (folder / "finding.txt").write_text(f"{verdict.kind}\n{command}\n{verdict.words}\n", encoding="utf-8")
         print(f"{verdict.kind}: {command}\n  {_last_line(verdict.words)}", file=sys.stderr)
 
 

@@ -156,6 +156,7 @@ def _wrong_results(scene: Scene) -> str:
     return "" if all(np.isfinite(each).all() for each in numbers) else "results hold what is not a number, without a word"
 
 
+@cache
 def begin() -> None:
     """Compile, and make what all cases are compared with."""
     for name in bases():

@@ -15,7 +15,8 @@ from .verdict import Kind
 
 CORPUS = Path(__file__).parent / "corpus"
 CASES = [(target, path) for target in worker.TARGETS for path in sorted((CORPUS / target).iterdir())]
-SECONDS = 60
+SECONDS = 40
+"""The workers take some 20 more to start."""
 
 
 @pytest.mark.parametrize(("target", "path"), CASES, ids=[f"{target}-{path.stem}" for target, path in CASES])
