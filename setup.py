@@ -36,7 +36,7 @@ setup(
         "pydantic>=2.7,<3",
         "ruamel.yaml>=0.18,<1",
         "mcap>=1.5,<2",
-        "rosbags>=0.11,<0.12",
+        "rosbags>=0.11.9,<0.12",
         "zstandard>=0.22,<1",
         "lz4>=4.3.3,<5",
         "matplotlib>=3.9.1,<4",

@@ -29,7 +29,7 @@ PACK = {
 MEASURED = """
 import sys
 from boom_twin.cli.main import main
-import resource, boom_twin.cli.%s, boom_twin.replay, boom_twin.twin, boom_twin.monitor.bag, boom_twin.monitor.server
+import resource, boom_twin.cli.%s
 def used():
     each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in each)
@@ -41,6 +41,11 @@ finally:
     peak = int(re.search(r"VmHWM:\\s*(\\d+)", open("/proc/self/status").read())[1]) // 1024
     print(json.dumps({"code": code, "seconds": used() - before, "peak": peak}))
 """
+
+IMPORTS = {
+    "replay": "replay, boom_twin.replay, boom_twin.twin, boom_twin.view",
+    "monitor": "monitor, boom_twin.monitor.bag, boom_twin.monitor.server, boom_twin.twin",
+}
 
 
 def text(value: str) -> bytes:
@@ -81,7 +86,7 @@ def bombs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def measured(command: str, *arguments: object) -> tuple[dict[str, float], str]:
     """What a command used, its imports aside, and what it said."""
-    program = [sys.executable, "-c", MEASURED % command, command, *map(str, arguments)]
+    program = [sys.executable, "-c", MEASURED % IMPORTS.get(command, command), command, *map(str, arguments)]
     done = subprocess.run(program, capture_output=True, text=True, timeout=200, check=False)
     assert "Traceback" not in done.stderr, done.stderr
     return json.loads(done.stdout.splitlines()[-1]), done.stderr
