@@ -30,6 +30,7 @@ from boom_twin.settings import Settings
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
+    assert not feed.catch.dropped.told()
     topic = load_topics().outputs[Output.TIP_ACCELERATION].absolute
     messages = [message for _, _, message in read(scan(replayed / "bag"), {topic: TYPES[Output.TIP_ACCELERATION]})]
     times, values = feed.store.tables["acceleration"].rows(0, len(messages))
@@ -168,8 +169,8 @@ def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) ->
     displacement, states = (load_topics().outputs[role] for role in (ENOUGH, Output.JOINT_STATES))
     types = RosbagsTypes()
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        topics = displacement, states
-        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in topics}
+        kinds = (displacement, states)
+        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in kinds}
         for row in range(10):
             stamp = 1_700_000_000 * 10**9 + row * 5_000_000
             for topic, link in links.items():

@@ -103,6 +103,7 @@ def cells(page: Any, selector: str) -> list[list[str]]:
 
 def test_the_first_glance_says_what_is_wrong_in_word_shape_and_reason(page: Any) -> None:
     overall = page.locator("#overall")
+    assert page.locator("#dropped").is_hidden()
     assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "FAULT"
     assert overall.locator(".reason").inner_text().startswith("joint_3: joint_3.sensor jumped")
     assert overall.locator(".sign").inner_text() == "✖" and "joint_3" in overall.locator(".reason").inner_text()
