@@ -30,10 +30,19 @@ class Services:
         Lets go of alarms that ended; says which.
     is_active : callable
         Whether the node is.
+    catch_up : callable
+        Lets the twin take what arrived before a request.
     """
 
-    def __init__(self, node: Node, twin: Twin, acknowledge: Callable[[], str], is_active: Callable[[], bool]) -> None:
-        self._node, self._twin, self._is_active = node, twin, is_active
+    def __init__(
+        self,
+        node: Node,
+        twin: Twin,
+        acknowledge: Callable[[], str],
+        is_active: Callable[[], bool],
+        catch_up: Callable[[], None],
+    ) -> None:
+        self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
         sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
@@ -51,6 +60,7 @@ class Services:
         try:
             if not self._is_active():
                 raise UsageError(INACTIVE)
+            self._catch_up()
             response.success, response.message = True, act()
         except UsageError as error:
             response.success, response.message = False, str(error)
