@@ -110,6 +110,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen no more."""
+        self.queue.catch_up()
         self._go_quiet()
         return super().on_deactivate(state)
 
@@ -150,7 +151,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin, self._intake = twin, Intake(joints, topics)
         self._outlet = Outlet(scene, settings)
         texts = {"scene": found.text} | baseline_text(self)
-        self._asked = Services(self, twin, self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in), texts)
+        acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
+        self._asked = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
         self._started = Started(self.get_logger())
         self._diagnostics.watch(twin, self._intake, name)
         self.get_logger().info("model ready")
@@ -160,6 +162,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._diagnostics.tune(thresholds_of(self))
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
+            self.queue.catch_up()
             self._twin.requests.tune(asked)
 
     def _go_quiet(self) -> None:

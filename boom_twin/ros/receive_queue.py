@@ -18,6 +18,8 @@ from ..watch.reception import Reception
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
+CATCH_UP = 0.5
+"""Most time (s) for reading what arrived before a request, where the answer depends on it."""
 NANO = 1e-9
 
 
@@ -124,6 +126,10 @@ class ReceiveQueue:
             topic.read(data)
             if time.monotonic() >= end:
                 return
+
+    def catch_up(self) -> None:
+        """Read what arrived before a request that is about to be answered, so far as there is time for it."""
+        self.work(CATCH_UP)
 
     def look(self) -> Mapping[str, Reception]:
         """What is known of every topic, by name; begins a new span of time."""

@@ -30,6 +30,8 @@ class Services:
         Lets go of alarms that ended; says which.
     is_active : callable
         Whether the node is.
+    catch_up : callable
+        Lets the twin take what arrived before a request.
     texts : dict of str to str
         Of what the model was built from: scene and, unless it is the package's own, baseline.
     """
@@ -40,9 +42,10 @@ class Services:
         twin: Twin,
         acknowledge: Callable[[], str],
         is_active: Callable[[], bool],
+        catch_up: Callable[[], None],
         texts: Mapping[str, str],
     ) -> None:
-        self._node, self._twin, self._is_active = node, twin, is_active
+        self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
         sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
@@ -61,6 +64,7 @@ class Services:
         try:
             if not self._is_active():
                 raise UsageError(INACTIVE)
+            self._catch_up()
             response.success, response.message = True, act()
         except UsageError as error:
             response.success, response.message = False, str(error)

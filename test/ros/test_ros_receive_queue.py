@@ -67,6 +67,13 @@ def test_work_ends_when_its_time_is_over_and_goes_on_later() -> None:
     assert len(read) == 5 and not queue
 
 
+def test_what_arrived_before_a_request_is_read_before_it_is_answered(bus: Bus) -> None:
+    for number in range(60):
+        bus.send("b", bytes([number]))
+    bus.queue.catch_up()
+    assert len(bus.read) == 60 and not bus.queue
+
+
 def test_numbers_tell_what_never_arrived(bus: Bus) -> None:
     for number in (5, 6, 9, 10):
         bus.send("b", b"", number)
