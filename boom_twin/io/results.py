@@ -154,10 +154,12 @@ def _check_earlier(folder: Path, kind: Kind) -> None:
     entries = _entries(folder)
     if not entries:
         return
-    remedy = "Choose a new folder, or move it away: nothing else than an earlier result of the same command is replaced"
+    if not kind.is_replaced:
+        raise BagError(f"{folder}: holds {entries[0]} already, and nothing is written over. Choose a new folder.")
+    remedy = f"Choose a new folder, or move it away: only an earlier {kind.command} is replaced, and as it was written"
     command, listed = _manifest(folder)
-    if not kind.is_replaced or command != kind.command:
-        raise BagError(f"{folder}: holds {entries[0]}. {remedy}; a result of version 0.1.0 does not say that it is one.")
+    if command != kind.command:
+        raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
     folders = {str(parent) + "/" for name in listed for parent in Path(name).parents}
     for name in entries:
         if name not in listed and name not in folders and name not in (MANIFEST, UNFINISHED):

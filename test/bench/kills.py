@@ -214,8 +214,8 @@ class Replay(Target):
             self.references.append(self.result())
 
     def _command(self, name: str) -> list[str]:
-        options = ["--scene", str(self.scene), "--out", str(self.out), "--no-health", "--no-pictures"]
-        return ["replay", str(self.sources / name), *options]
+        lean = ["--no-health", "--no-pictures"]
+        return ["replay", str(self.sources / name), "--scene", str(self.scene), "--out", str(self.out), *lean]
 
     def arguments(self) -> list[str]:
         self.number += 1

@@ -9,7 +9,7 @@ import pytest
 from bench.kills import kills
 
 
-@pytest.mark.parametrize(("command", "count", "needs"), [("replay", 8, "numpy"), ("rig", 4, "exudyn"), ("record", 8, "rclpy")])
+@pytest.mark.parametrize(("command", "count", "needs"), [("replay", 4, "numpy"), ("rig", 4, "exudyn"), ("record", 12, "rclpy")])
 def test_kills(command: str, count: int, needs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip(needs)
     monkeypatch.setenv("ROS_DOMAIN_ID", "158")

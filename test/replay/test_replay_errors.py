@@ -116,7 +116,7 @@ def test_a_recording_in_the_folder_is_kept(tmp_path):
     """Also one that is named as the bag of a replay is."""
     session(tmp_path / "out" / "bag")
     before = content_of(tmp_path / "out")
-    with pytest.raises(BagError, match=r"out: holds bag/\. Choose a new folder"):
+    with pytest.raises(BagError, match=r"out: holds bag/, and no manifest of a replay.*Choose a new folder"):
         replay(session(tmp_path / "bag"), load_scene(), tmp_path / "out")
     assert content_of(tmp_path / "out") == before
 
