@@ -119,7 +119,8 @@ def test_two_rows_say_nothing_of_what_lies_between():
 def test_strokes_faster_than_a_cylinder_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     times = np.arange(0.0, 0.3, 0.01)
     rows = np.column_stack([times, strokes(times, 0.7 * np.clip(times - 0.1, 0.0, 0.1))])
-    np.savetxt(tmp_path / "in.csv", rows, delimiter=",", header="t_s," + ",".join(f"stroke_{i}_m" for i in range(1, 5)), comments="")
+    header = "t_s," + ",".join(f"stroke_{i}_m" for i in range(1, 5))
+    np.savetxt(tmp_path / "in.csv", rows, delimiter=",", header=header, comments="")
     given = ["--posture", "arch", "--drive", str(tmp_path / "in.csv"), "--out", str(tmp_path / "out.csv")]
     assert main(["simulate", *given]) == 0
     said = capsys.readouterr().err

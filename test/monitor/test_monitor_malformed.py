@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.health import encode
+from boom_twin.io.health import encode_health
 from boom_twin.io.topics import TYPES, Output, Topic, load_topics
 from boom_twin.io.typestore import jazzy
 from boom_twin.monitor import catch as catching
@@ -89,7 +89,7 @@ def statuses(*names: str, role: Output = Output.DIAGNOSTICS, text: str = "well",
 
 
 def health(**changes: str) -> Any:
-    message = jazzy().deserialize_cdr(encode(Health(EPOCH, (ALARM,), (), np.zeros(0), np.zeros(2))), TYPES[Output.HEALTH])
+    message = jazzy().deserialize_cdr(encode_health(Health(EPOCH, (ALARM,), (), np.zeros(0), np.zeros(2))), TYPES[Output.HEALTH])
     for pair in message.status[0].values:
         pair.value = changes.get(pair.key, pair.value)
     return message
