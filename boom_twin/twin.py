@@ -69,6 +69,7 @@ class _Run:
     newest: int
     deviations: Deviations
     strokes: Array
+    is_again: bool
     interval: float = 0.0
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
@@ -248,15 +249,16 @@ class Twin:
         if 0 < span <= line.longest and goes_on(self._boom, run.strokes, self._zeroed(sample), span * NANO, 0.0, self.settings):
             return self._follow(sample, complete, [])
         then = run.memory.at(sample.stamp)
-        if then is not None and np.array_equal(then.strokes, self._zeroed(sample)):
+        back = (run.newest - sample.stamp) * NANO
+        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, self._zeroed(sample)):
             return self._refuse(sample, "late")
         is_late = self._is_late(run, sample)
         event = line.hold(sample, "late" if is_late else "leap")
         if not line.is_confirmed(round(self.settings.gap / NANO) if is_late else 0):
             return self._hold(sample, event)
         why = self._explain(run, line)
-        lasted = max(run.newest, sample.stamp) - run.epoch
-        if why is TimeStep.NEITHER and lasted < LASTING and not line.is_confirmed(LASTING):
+        is_young = run.is_again and run.newest - run.epoch < LASTING
+        if why is TimeStep.NEITHER and is_young and not line.is_confirmed(LASTING):
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
 
@@ -355,7 +357,7 @@ class Twin:
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
         deviations = Deviations(self.plan, self.settings, sample.stamp, speeds)
-        self._run = _Run(sample.stamp, sample.stamp, deviations, sample.values)
+        self._run = _Run(sample.stamp, sample.stamp, deviations, sample.values, speeds is not None)
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
