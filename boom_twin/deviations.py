@@ -28,17 +28,21 @@ class Deviations:
     settings : Settings
     epoch : int
         Stamp (ns) of the first one, when the boom was at rest.
+    speeds : ndarray, shape (n,), or None
+        Of the strokes (m/s) where the boom was at work when the model started at rest; None if it was at rest.
 
     Attributes
     ----------
+    tip : ndarray, shape (2,)
+        Deviation of the tip (m) by vibration that a start from rest while the boom was at work leaves out; it decays.
     noise : StrokeNoise or None
         As propagated last; None before the first prediction.
     """
 
-    def __init__(self, plan: Plan, settings: Settings, epoch: int) -> None:
+    def __init__(self, plan: Plan, settings: Settings, epoch: int, speeds: Array | None = None) -> None:
         self._plan, self._settings, self._epoch = plan, settings, epoch
         self.noise: StrokeNoise | None = None
-        self._interval = 0.0
+        self._interval, self._speeds, self.tip = 0.0, speeds, np.zeros(2)
         self._at = np.zeros(plan.joints)
         self._seen = epoch
         self._slopes2 = np.zeros(plan.joints)
@@ -80,6 +84,10 @@ class Deviations:
             self._slopes2 = 1.0 / np.square(slopes)
         time = (prediction.stamp - self._epoch) * 1e-9
         joints, acceleration = self.noise.after(time, prediction.tip_angle)
+        if self._speeds is not None:
+            left = self.noise.left(self._plan, time, self._speeds, prediction.tip_displacement)
+            more, swing, tip = self.noise.of(left, self._plan, prediction.tip_angle)
+            joints, acceleration, self.tip = joints + more, acceleration + swing, np.sqrt(tip)
         self._joints = self._settings.angle_variance + joints
         self._force = np.sqrt(self._settings.imu_sigma**2 + acceleration)
 

@@ -12,7 +12,7 @@ import numpy as np
 from .analysis.validity import SHARE
 from .chain.status import OK, SENTENCES
 from .deviations import Deviations, specific_force
-from .edge import Edge
+from .edge import SHORTEST, Edge
 from .errors import BoomTwinError, SolverError, UsageError
 from .following import Following
 from .health.baseline import Baseline
@@ -33,7 +33,7 @@ from .zeros import Zeros
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
-    "duplicate": "stamp as the newest one of its stream; sample left out",
+    "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
     "partial": "some values missing, not finite or absurd; the others were used",
     "empty": "no usable value; sample left out",
     "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
@@ -72,6 +72,7 @@ class _Run:
     newest: int
     deviations: Deviations
     strokes: Array
+    is_again: bool
     interval: float = 0.0
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
@@ -136,12 +137,14 @@ class Twin:
         self._edge = Edge(self._channels)
         self._run: _Run | None = None
         self._failed: int | None = None
+        self._speeds: Array | None = None
         self._pending: deque[Sample] = deque()
         self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent(self._channels)
 
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
+        self._speeds = None
         self._lines = {stream: Stamps(self.settings) for stream in Stream}
         self._pending = deque()
 
@@ -238,21 +241,30 @@ class Twin:
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
         line, run = self._lines[Stream.STROKES], self._run
-        if run is None or line.is_next(sample.stamp):
+        if run is None:
             return self._follow(sample, complete, [])
         span = sample.stamp - run.newest
-        if span == 0:
+        if line.is_next(sample.stamp) and span >= SHORTEST:
+            if run.plausible.is_of_others(sample.stamp - run.epoch, self._zeroed(sample), self.settings):
+                self.counts["implausible"] += 1
+                return Report(sample.stamp, True, events=("implausible",))
+            return self._follow(sample, complete, [])
+        if 0 <= span < SHORTEST:
             same = is_close(self._zeroed(sample), run.strokes, 0.0, self.settings)
             return self._refuse(sample, "duplicate" if same else "second source")
         if 0 < span <= line.longest and goes_on(self._boom, run.strokes, self._zeroed(sample), span * NANO, 0.0, self.settings):
             return self._follow(sample, complete, [])
+        then = run.memory.at(sample.stamp)
+        back = (run.newest - sample.stamp) * NANO
+        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, self._zeroed(sample)):
+            return self._refuse(sample, "late")
         is_late = self._is_late(run, sample)
         event = line.hold(sample, "late" if is_late else "leap")
         if not line.is_confirmed(round(self.settings.gap / NANO) if is_late else 0):
             return self._hold(sample, event)
         why = self._explain(run, line)
-        lasted = max(run.newest, sample.stamp) - run.epoch
-        if why is TimeStep.NEITHER and lasted < LASTING and not line.is_confirmed(LASTING):
+        is_young = run.is_again and run.newest - run.epoch < LASTING
+        if why is TimeStep.NEITHER and is_young and not line.is_confirmed(LASTING):
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
 
@@ -280,12 +292,20 @@ class Twin:
             self._rebase(run, span - usual)
         elif why is TimeStep.NEITHER:
             events = ["restart" if span > 0 else "jump back"]
+            speeds = self._speeds_of(held)
             self.reset()
+            self._speeds = speeds
         reports = []
         for sample in held:
             reports.append(self._follow(sample, bool(np.isfinite(sample.values.sum())), events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
+
+    def _speeds_of(self, held: list[Sample]) -> Array:
+        """Of strokes (m/s) around a start from rest: before it as estimated, after it as measured, whichever is larger."""
+        before, (first, last) = np.abs(self._boom.extrapolated(0.0)[1]), (held[0], held[-1])
+        after = np.abs(last.values - first.values) / ((last.stamp - first.stamp) * NANO)
+        return np.asarray(np.fmin(np.fmax(before, after), self.settings.stroke_rate))
 
     def _released(self, line: Stamps) -> list[Sample]:
         """Samples that were held; what those before the newest were told to be counts no more."""
@@ -341,7 +361,9 @@ class Twin:
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
-        self._run = _Run(sample.stamp, sample.stamp, Deviations(self.plan, self.settings, sample.stamp), sample.values)
+        speeds, self._speeds = self._speeds, None
+        deviations = Deviations(self.plan, self.settings, sample.stamp, speeds)
+        self._run = _Run(sample.stamp, sample.stamp, deviations, sample.values, speeds is not None)
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
@@ -364,7 +386,7 @@ class Twin:
         if events:
             self.counts.update(events)
         if self.judge is not None:
-            self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise)
+            self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise, run.deviations.tip)
         residuals = self._settle_pending(run)
         health = None if self.judge is None else self.judge.judge(sample.stamp)
         return Report(sample.stamp, True, prediction, residuals, tuple(events), passes=self._boom.passes, health=health)

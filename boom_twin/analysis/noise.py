@@ -24,6 +24,8 @@ from ..records import Array
 from .frequencies import Mode, joint_increments, natural_modes
 
 BAND = 2.5  # modes are looked at up to this multiple of the smoother's own frequency
+SWUNG = 0.3  # of the tip's deflection: how far a boom at work swings
+TINY = 1e-300
 WIDTH = 1e-3  # relative accuracy of their frequencies
 
 
@@ -55,6 +57,30 @@ class StrokeNoise:
         grown = 1.0 - np.exp(-self.decay * time)
         c, s = np.cos(angle), np.sin(angle)
         return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2
+
+
+    def left(self, plan: Plan, time: float, speeds: Array, sag: Array) -> Array:
+        """Variances (modes,), m^2 kg, of vibration that a model started at rest lacks, `time` s after that.
+
+        Strokes that went with `speeds` (n,) in m/s set off N_ij v_i / omega_j^3; and the first mode may have swung by
+        `SWUNG` of the tip's deflection `sag` (2,) in m. Both decay with the damping of the mode.
+        """
+        found = np.zeros(len(self.modes))
+        for j, mode in enumerate(self.modes):
+            set_off = mode.increments[plan.tables.cylinders.z] * speeds / (2.0 * np.pi * mode.frequency) ** 3
+            found[j] = float(set_off @ set_off)
+        if self.modes:
+            motion = float(np.hypot(*self.modes[0].motion[plan.tables.tip : plan.tables.tip + 2]))
+            found[0] += (SWUNG * float(np.hypot(*sag)) / max(motion, TINY)) ** 2
+        return np.asarray(found * np.exp(-self.decay * time))
+
+    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array]:
+        """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, tip (2,)."""
+        share = variances / np.maximum(self.collected, TINY)
+        c, s = np.cos(angle), np.sin(angle)
+        swing = (self.swing @ np.array([[c, -s], [s, c]])) ** 2
+        motions = np.array([mode.motion[plan.tables.tip : plan.tables.tip + 2] for mode in self.modes]).reshape(-1, 2)
+        return share @ self.joints, share @ swing, variances @ motions**2
 
 
 def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval: float, density: float) -> StrokeNoise:

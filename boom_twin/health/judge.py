@@ -61,10 +61,15 @@ class Judge:
             self._ended.append(ended)
         self.residuals.begin()
 
-    def predicted(self, prediction: Prediction, strokes: Array, variances: Array, noise: StrokeNoise | None) -> None:
-        """A prediction, with the strokes (m) as measured, the variances (m^2) of their estimates, and the modes there."""
+    def predicted(
+        self, prediction: Prediction, strokes: Array, variances: Array, noise: StrokeNoise | None, tip: Array
+    ) -> None:
+        """A prediction, with the strokes (m) as measured, the variances (m^2) of their estimates, the modes there.
+
+        And with the deviation (m) of the tip (2,) that a start from rest leaves.
+        """
         self._blocks.predicted(prediction, strokes)
-        self._variances, self._noise = variances, noise
+        self._variances, self._noise, self._tip = variances, noise, tip
 
     def measured(self, residuals: Residuals, values: Array) -> None:
         """Residuals of a sample with its values (rad, m/s^2)."""
@@ -131,5 +136,5 @@ class Judge:
         signature, watch = self.residuals.signature, self.residuals
         if signature is None:
             return np.full(2, np.nan)
-        by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip)
+        by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + self._tip**2
         return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))

@@ -199,9 +199,9 @@ def test_strokes_out_of_reach_do_not_start_the_model(twin, still):
 
 def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
     follow(twin, still, 300)
-    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(12)]
+    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(30)]
     assert any(not report.accepted and report.status != "ok" for report in wild)
-    recovered = [twin.update(strokes(400 + 5 * k, still)) for k in range(200)][-1]
+    recovered = [twin.update(strokes(500 + 5 * k, still)) for k in range(400)][-1]
     assert recovered.accepted and np.isfinite(recovered.prediction.tip_position).all()
 
 

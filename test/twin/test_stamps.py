@@ -1,0 +1,185 @@
+"""Stamps that step: stray ones, pauses, clocks that are set, second sources; and samples that a program made wrongly."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from twin.hostile import AFTER, MS, phases, session
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.errors import UsageError
+
+SEED = 3
+ROWS = np.array([sample.values for sample in session(SEED)])
+AT = 250 + int(np.argmax(np.abs(ROWS[250:1100] - ROWS[230:1080]).max(axis=1)))
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return session(SEED)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene()
+
+
+@pytest.fixture(scope="module")
+def clean(scene, samples):
+    """Predictions of an undisturbed twin, and twins as they are before some samples, in motion and at rest."""
+    twin, predictions, before = Twin(scene), [], {}
+    for k, sample in enumerate(samples):
+        if k in (AT, 700, 1100):
+            before[k] = copy.deepcopy(twin)
+        predictions.append(twin.update(sample).prediction)
+    return predictions, before
+
+
+def tips(twin, samples):
+    """Predicted tips by stamp."""
+    every = [each.prediction for sample in samples for each in twin.update(sample).all]
+    return {p.stamp: p.tip_position for p in every if p is not None}
+
+
+def misses(clean, found, first, last, shift=0):
+    """Distance (m) of tips from the clean ones, by number of the sample."""
+    stamps = {p.stamp + shift: p.tip_position for p in clean[0][first:last]}
+    return [float(np.hypot(*(found[stamp] - tip))) for stamp, tip in stamps.items() if stamp in found]
+
+
+@pytest.mark.parametrize("at", [AT, 700, 1100])
+@pytest.mark.parametrize("shift", [1, 3, 7, 40, 90, 200, 500, 900, 3000, 10**9, -1, -40, -500, -900, -5000, -(10**9)])
+def test_one_stray_stamp_moves_nothing(samples, clean, at, shift):
+    twin, stray = copy.deepcopy(clean[1][at]), samples[at]
+    stray = Sample(stray.stream, stray.stamp + shift * MS, stray.values)
+    found = tips(twin, [stray, *samples[at + 1 : at + AFTER]])
+    away = misses(clean, found, at + 1, at + AFTER)
+    assert len(away) > AFTER - 25 and max(away) < 0.005
+
+
+@pytest.mark.parametrize("shift", [-5_000_000, -900, -300, 300, 900, 5_000_000])
+def test_a_clock_set_in_motion_is_followed(samples, clean, shift):
+    at = max(clean[1], key=lambda k: _speed(clean, k))
+    later = [Sample(s.stream, s.stamp + shift * MS, s.values) for s in samples[at : at + AFTER]]
+    twin = copy.deepcopy(clean[1][at])
+    away = misses(clean, tips(twin, later), at, at + AFTER, shift * MS)
+    assert len(away) == AFTER and max(away) < 0.020 and twin.counts == {"clock set": 1}
+
+
+def _speed(clean, k):
+    return float(np.abs(clean[0][k].strokes - clean[0][k - 20].strokes).max())
+
+
+@pytest.mark.parametrize("at", [AT, 700, 1100])
+@pytest.mark.parametrize("pause", [30, 100, 180])
+def test_a_pause_is_caught_up(samples, clean, at, pause):
+    twin = copy.deepcopy(clean[1][at])
+    found = tips(twin, samples[at + pause : at + pause + AFTER + 1])
+    away = misses(clean, found, at + pause, at + pause + AFTER + 1)
+    assert len(away) == AFTER + 1 and away[-1] < 0.010 and twin.counts == {"gap": 1}
+
+
+@pytest.mark.parametrize("shift", [7200_000, -7200_000, 2500, -2500])
+def test_a_second_source_is_refused_and_told(samples, clean, shift):
+    """It begins at once, beside the first, with the same stamps but hours or seconds apart, and strokes of its own."""
+    twin, mixed = copy.deepcopy(clean[1][700]), []
+    for s in samples[700:1100]:
+        mixed += [s, Sample(s.stream, s.stamp + shift * MS, s.values + 0.05)]
+    reports = [twin.update(sample) for sample in mixed]
+    assert all(report.change is None for report in reports)
+    assert twin.counts["second source"] > 390 and twin.counts["leap"] <= 3
+    got = [report.prediction.tip_position for report in reports if report.prediction is not None]
+    expected = [prediction.tip_position for prediction in clean[0][700:1100]]
+    assert all(np.array_equal(a, b) for a, b in zip(got, expected, strict=True))
+
+
+def test_equal_stamps_with_other_values_are_a_second_source(samples, clean):
+    twin = copy.deepcopy(clean[1][700])
+    for s in samples[700:720]:
+        assert twin.update(s).accepted
+        assert twin.update(s).events == ("duplicate",)
+        assert twin.update(Sample(s.stream, s.stamp, s.values + 0.05)).events == ("second source",)
+
+
+def test_starts_from_rest_are_limited_in_rate(samples, scene):
+    """Time is set back by an hour, and strokes elsewhere, at every third sample."""
+    twin, starts = Twin(scene), []
+    for k, s in enumerate(samples):
+        back = k // 3 % 5 * 3600 * 1000 * MS
+        report = twin.update(Sample(s.stream, s.stamp - back, s.values + 0.01 * (k // 3 % 5)))
+        starts += [k for each in report.all if each.change is not None and each.change.from_rest]
+    assert len(starts) <= 1 + len(samples) // 200
+
+
+def test_the_stated_deviation_of_a_start_from_rest_is_true(samples, clean, scene):
+    """The boom moves, time is set back, strokes go on elsewhere: what the angles are off by is stated, and decays."""
+    at = max(clean[1], key=lambda k: _speed(clean, k))
+    for jump in (0, -200):
+        twin, found = copy.deepcopy(clean[1][at]), []
+        shift = -7200_000 * MS
+        for k in range(at + 60 + jump, len(samples)):
+            s, true = samples[k], clean[0][k].joints
+            twin.update(Sample(s.stream, s.stamp + shift, s.values))
+            for residuals in twin.update(Sample(Stream.ANGLES, s.stamp + shift, true)).residuals:
+                found.append((k, residuals.normalised, residuals.sigmas))
+        assert twin.counts["jump back"] == 1
+        normalised = np.array([row for k, row, _ in found if k > found[0][0] + 100])
+        assert np.abs(normalised).max() < 4.0
+        assert np.all(found[-1][2] < found[0][2]) and np.any(found[0][2] > 3.0 * 1.76e-4)
+
+
+def test_strokes_out_of_their_range_are_told(scene, samples):
+    twin, far = Twin(scene), samples[0].values.copy()
+    far[1] = scene.joints[1].cylinder.max_stroke + 0.001
+    twin.update(samples[0])
+    twin.update(Sample(Stream.STROKES, samples[1].stamp, far))
+    assert twin.counts["out of range"] == 1
+
+
+@pytest.mark.parametrize(
+    ("sample", "words"),
+    [
+        (("cylinder_strokes", 1, np.zeros(4)), "Stream.STROKES"),
+        (("tip_imu", 1, np.zeros(2)), "Stream.IMU"),
+        ((Stream.STROKES, 1.7e9, np.zeros(4)), r"round\(seconds \* 1e9\)"),
+        ((Stream.STROKES, True, np.zeros(4)), "nanoseconds"),
+        ((Stream.STROKES, 2**64, np.zeros(4)), "64 bits"),
+        ((Stream.STROKES, 1, np.zeros(3)), r"shape \(3,\).*4 numbers, cylinder_1..cylinder_4"),
+        ((Stream.IMU, 1, [0.0]), "2 numbers"),
+        ((Stream.ANGLES, 1, ["a", "b", "c", "d"]), "joint_1..joint_4"),
+        ((Stream.ANGLES, 1, None), "joint_1..joint_4"),
+    ],
+)
+def test_samples_made_wrongly_are_refused_with_the_remedy(scene, sample, words):
+    with pytest.raises(UsageError, match=words):
+        Twin(scene).update(Sample(*sample))
+
+
+def test_lists_and_integers_of_numpy_are_taken(scene, samples):
+    one, other = Twin(scene), Twin(scene)
+    for s in samples[:5]:
+        a = one.update(s).prediction
+        b = other.update(Sample(s.stream, np.int64(s.stamp), s.values.tolist())).prediction
+        assert a.tip_position.tobytes() == b.tip_position.tobytes() and type(b.stamp) is int
+
+
+@pytest.mark.parametrize("unit", [1, 10**3, 10**6], ids=["s", "ms", "us"])
+def test_stamps_in_another_unit_are_refused(scene, samples, unit):
+    twin = Twin(scene)
+    with pytest.raises(UsageError, match=r"round\(seconds \* 1e9\)"):
+        for k, s in enumerate(samples[:400]):
+            twin.update(Sample(s.stream, int(k * 0.005 * unit), s.values))
+
+
+def test_hostile_phases_leave_no_trace():
+    """50 of them; ``python test/twin/hostile.py`` has the distribution over 1000."""
+    errors = np.array([error for _, error in phases(50, 1000)])
+    assert np.mean(errors < 0.005) >= 0.96
+
+
+@pytest.mark.slow
+def test_a_thousand_hostile_phases():
+    errors = np.array([error for _, error in phases(1000, 0)])
+    assert np.mean(errors < 0.005) >= 0.99
