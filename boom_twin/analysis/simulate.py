@@ -40,7 +40,8 @@ class Simulation:
         Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
         |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     step_errors, row_errors : tuple of EstimatedError
-        Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive.
+        Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive; empty
+        where they were not asked for.
     doubts : tuple of str
         What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast,
         deflections that the model is not meant for.
@@ -90,11 +91,15 @@ class Simulation:
 
 
 def simulate(
-    scene: Scene, times: Array, strokes: Array, dt: float = 1e-3, angles: Array | None = None, rho: float = RHO
+    scene: Scene,
+    times: Array,
+    strokes: Array,
+    dt: float = 1e-3,
+    angles: Array | None = None,
+    rho: float = RHO,
+    estimate_errors: bool = True,
 ) -> Simulation:
     """Start at rest in the equilibrium of the first row and follow the strokes.
-
-    The motion is stepped again with half the step and by every second row, to tell how far it can be trusted.
 
     Parameters
     ----------
@@ -108,6 +113,9 @@ def simulate(
         Joint angles (rad) next to which the first equilibrium is looked for.
     rho : float
         Spectral radius of generalised-alpha at infinite frequency.
+    estimate_errors : bool
+        Step the motion again with half the step and by every second row, to tell how far it can be trusted; takes four to
+        seven times as long as stepping once.
 
     Raises
     ------
@@ -124,7 +132,8 @@ def simulate(
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
-    by_steps, by_rows, tip = step_errors(course, own, dt), row_errors(course, own), own.rows.tip
+    by_steps, by_rows = (step_errors(course, own, dt), row_errors(course, own)) if estimate_errors else ((), ())
+    tip = own.rows.tip
     apart = float(np.diff(times, prepend=times[0]).max())
     doubts = [
         *ringing(own.jolt, own.shake, own.square),

@@ -125,3 +125,10 @@ def test_strokes_faster_than_a_cylinder_are_told(tmp_path: Path, capsys: pytest.
     assert main(["simulate", *given]) == 0
     said = capsys.readouterr().err
     assert "stroke_1 moves at 0.7 m/s" in said and "0.5 m/s (stroke_rate)" in said
+
+
+def test_errors_are_not_estimated_where_nobody_asks():
+    times = np.arange(0.0, 0.5, 0.05)
+    told, silent = (simulate(SCENE, times, strokes(times, stop(times)), estimate_errors=asked) for asked in (True, False))
+    assert told.row_errors and not silent.row_errors and not silent.step_errors
+    assert len(silent.doubts) < len(told.doubts) and np.array_equal(silent.tip, told.tip)
