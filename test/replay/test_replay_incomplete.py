@@ -177,7 +177,7 @@ def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path,
 
 def unended(bag: Path) -> Path:
     """The session as a recorder leaves it that was killed after its last file was complete."""
-    (bag / "session.yaml").write_text("boom_twin: 0.1.0\nstarted: 2026-01-02T03:04:05+00:00\nscene: |\n  ended: no\n")
+    (bag / "session.yaml").write_text("boom_twin: 0.1.0\nstarted: 2026-01-02T03:04:05+00:00\nnote: |\n  ended: no\n")
     return bag
 
 

@@ -18,6 +18,7 @@ pytest.importorskip("rclpy")
 from boom_twin.io.reader import scan
 from boom_twin.io.session import write_session
 from boom_twin.ros.company import company
+from boom_twin.scene.load import default_text
 
 
 def test_a_short_demonstration(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
@@ -74,11 +75,10 @@ def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[.
 
 def test_recordings_of_earlier_demonstrations_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also one that somebody else put there."""
-    for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"):
-        monkeypatch.setenv(name, os.environ.get(name, ""))  # set anew by it, and put back after the test
+    monkeypatch.setattr("boom_twin.ros.isolation.refuse_foreign", lambda topics: None)  # nobody else runs here
     (tmp_path / "recorded").mkdir()
     (tmp_path / "recorded" / "session_0.mcap").write_bytes(b"a recording")
     (tmp_path / "recorded_2").mkdir()
-    with company(tmp_path, "a test") as running:
+    with company(tmp_path, "a test", default_text()) as running:
         assert running.recorded == tmp_path / "recorded_3"
     assert (tmp_path / "recorded" / "session_0.mcap").read_bytes() == b"a recording"
