@@ -106,7 +106,8 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
     for command in commands:
         assert main(command) == 1
         words = capsys.readouterr().err
-        assert re.search("holds metadata.yaml already|no manifest|source|file of a recording|this file is read", words), (command, words)
+        refused = "holds metadata.yaml already|no manifest|source|file of a recording|this file is read"
+        assert re.search(refused, words), (command, words)
     assert {path.name: path.read_bytes() for path in bag.iterdir()} == dict.fromkeys(
         ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), b"recorded"
     )
