@@ -37,7 +37,10 @@ class Plausible:
             self._others = 0
             return False
         self._others += 1
-        return self._others <= MOST
+        if self._others <= MOST:
+            return True
+        self._strange[:], self._before = MOST, self._trusted  # they were doubted enough
+        return False
 
     def _distances(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, float]:
         """From the estimates (n,), and how far strokes may be from them, m; once for a sample."""
