@@ -37,10 +37,7 @@ class Plausible:
             self._others = 0
             return False
         self._others += 1
-        if self._others <= MOST:
-            return True
-        self._strange[:], self._before = MOST, self._trusted  # they were doubted enough
-        return False
+        return self._others <= MOST
 
     def _distances(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, float]:
         """From the estimates (n,), and how far strokes may be from them, m; once for a sample."""

@@ -66,10 +66,13 @@ class Stamps:
         if self.held:
             self._other, self.held = self.held[-1][0].stamp, []
 
-    def hold(self, sample: Sample, event: str) -> str:
-        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be."""
+    def hold(self, sample: Sample, event: str, is_apart: bool = False) -> str:
+        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be.
+
+        One that `is_apart` has values that those that are held do not lead to: it does not follow them.
+        """
         last = self.held[-1][0].stamp if self.held else self._other
-        follows = last is not None and 0 < sample.stamp - last <= self.longest
+        follows = last is not None and 0 < sample.stamp - last <= self.longest and not is_apart
         if not (self.held and follows):
             self.held, self._since, self.is_second = [], sample.stamp, follows
         if self.is_second and event == "leap":

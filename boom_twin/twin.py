@@ -28,7 +28,7 @@ from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
 from .stamps import LASTING, Stamps
-from .time_step import TimeStep, explain, goes_on, is_close, jerk_densities
+from .time_step import TimeStep, explain, goes_on, is_close, jerk_densities, surprise
 from .zeros import Zeros
 
 EVENTS = {
@@ -260,7 +260,7 @@ class Twin:
         if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, self._zeroed(sample)):
             return self._refuse(sample, "late")
         is_late = self._is_late(run, sample)
-        event = line.hold(sample, "late" if is_late else "leap")
+        event = line.hold(sample, "late" if is_late else "leap", self._is_apart(line, sample))
         gap = self.settings.gap / NANO
         if not line.is_confirmed(gap if is_late or line.is_second else 0.0):
             return self._hold(sample, event)
@@ -269,6 +269,14 @@ class Twin:
         if why is TimeStep.NEITHER and not line.is_confirmed(LASTING if is_young or line.is_second else gap):
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
+
+    def _is_apart(self, line: Stamps, sample: Sample) -> bool:
+        """Whether no cylinder is so fast as to come here from the strokes that are held."""
+        if not line.held:
+            return False
+        last = line.held[-1][0]
+        way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
+        return surprise(sample.values, last.values) > way
 
     def _is_late(self, run: _Run, sample: Sample) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""

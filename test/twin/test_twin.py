@@ -199,11 +199,19 @@ def test_strokes_out_of_reach_do_not_start_the_model(twin, still):
     assert twin.update(strokes(5, still)).accepted
 
 
-def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
+def test_wild_strokes_for_less_than_a_gap_do_not_reach_the_model(twin, still):
     follow(twin, still, 300)
-    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(12)]
+    assert all(twin.update(strokes(300 + 5 * k, still + 1e5)).prediction is None for k in range(12))
+    recovered = [twin.update(strokes(360 + 5 * k, moved(still, 0.295))) for k in range(3)]
+    assert recovered[-1].prediction is not None and "model" not in twin.counts
+
+
+def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
+    """Wild strokes are followed once they have gone on for `gap`."""
+    follow(twin, still, 300)
+    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(30)]
     assert any(not report.accepted and report.status != "ok" for report in wild)
-    recovered = [twin.update(strokes(400 + 5 * k, still)) for k in range(200)][-1]
+    recovered = [twin.update(strokes(450 + 5 * k, still)) for k in range(200)][-1]
     assert recovered.accepted and np.isfinite(recovered.prediction.tip_position).all()
 
 
