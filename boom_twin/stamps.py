@@ -7,7 +7,7 @@ from .settings import Settings
 
 NANO = 1_000_000_000
 STEP = 1.75  # usual intervals; a longer one is looked at
-FEW = 4.0  # usual intervals; where strokes are as expected after a step up to that, it need not be confirmed
+FEW = 8.0  # usual intervals; where strokes are as expected after a step up to that, it need not be confirmed
 SMOOTHING = 0.05  # weight of the newest interval in the usual one
 KEPT = 1024  # most samples that wait
 LASTING = 1_000_000_000  # ns that a second line of stamps has to go on alone before it is followed

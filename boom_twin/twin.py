@@ -228,7 +228,7 @@ class Twin:
             channel. Nothing has changed then.
         """
         sample = self._edge.checked(sample)
-        complete = bool(np.abs(sample.values).max(initial=0.0) <= LIMIT)
+        complete = all(-LIMIT <= value <= LIMIT for value in sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
             if not usable.any():
