@@ -104,7 +104,7 @@ class Following:
     @property
     def speeds(self) -> Array:
         """Of the strokes at the newest sample, as estimated, m/s, shape (n,)."""
-        return self._track.x[0][:, 1]
+        return np.asarray(self._track.x[0][:, 1])
 
     def least_way(self, span: float, sure: float) -> float:
         """How far (m) the fastest stroke goes on for `span` s at least, unless it brakes harder than it now does.

@@ -86,6 +86,6 @@ def explain(
 
 
 def jerk_densities(boom: Following, strokes: Array, span: float, settings: Settings) -> Array:
-    """Of white jerk (n,), m^2/s^5, during a pause of `span` s: as expected, or as `strokes` (m) after it show if that is more."""
+    """Of white jerk (n,), m^2/s^5, during a pause of `span` s: as expected, or more where `strokes` (m) after it show so."""
     shown = 20.0 * (strokes - boom.extrapolated(span)) ** 2 / span**5
     return np.asarray(np.fmax(shown, settings.jerk_density))

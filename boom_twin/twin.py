@@ -253,11 +253,12 @@ class Twin:
         if 0 <= span < SHORTEST:
             same = is_close(self._zeroed(sample), run.strokes, 0.0, self.settings)
             return self._refuse(sample, "duplicate" if same else "second source")
-        if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, self._zeroed(sample), span * NANO, 0.0, self.settings):
+        values = self._zeroed(sample)
+        if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
             return self._follow(sample, complete, [])
         then = run.memory.at(sample.stamp)
         back = (run.newest - sample.stamp) * NANO
-        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, self._zeroed(sample)):
+        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, values):
             return self._refuse(sample, "late")
         is_late = self._is_late(run, sample)
         event = line.hold(sample, "late" if is_late else "leap", self._is_apart(line, sample))
@@ -276,7 +277,7 @@ class Twin:
             return False
         last = line.held[-1][0]
         way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
-        return surprise(sample.values, last.values) > way
+        return bool(surprise(sample.values, last.values) > way)
 
     def _is_late(self, run: _Run, sample: Sample) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""

@@ -187,7 +187,7 @@ def test_a_thousand_hostile_phases():
 
 @pytest.mark.parametrize("set_by", [900, 3000])
 def test_a_clock_set_while_the_boom_swings_at_rest_is_covered_by_the_deviation(samples, clean, scene, set_by):
-    """It looks like a pause at rest: the vibration goes on in another phase, and the stated deviation says how far that may be."""
+    """It looks like a pause at rest: the vibration goes on in another phase, by up to what is stated."""
     kicked, twin = [], Twin(scene)
     still = samples[0].values
     for k in range(900):
