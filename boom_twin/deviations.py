@@ -16,6 +16,7 @@ from .settings import Settings
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 INTERVAL_STEP = 0.2  # of the time between samples, likewise
+NANO = 1e-9
 INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
 
 
@@ -34,7 +35,8 @@ class Deviations:
     Attributes
     ----------
     tip : ndarray, shape (2,)
-        Deviation of the tip (m) by vibration that a start from rest while the boom was at work leaves out; it decays.
+        Deviation of the tip (m) by vibration that the model cannot know of: a start from rest while the boom was at work,
+        what strokes did in a pause, a pause that may have been a clock. It decays with the modes' damping.
     noise : StrokeNoise or None
         As propagated last; None before the first prediction.
     """
@@ -45,6 +47,7 @@ class Deviations:
         self._interval, self._speeds, self.tip = 0.0, speeds, np.zeros(2)
         self._at = np.zeros(plan.joints)
         self._seen = epoch
+        self._unknown, self._since = np.zeros(0), epoch
         self._slopes2 = np.zeros(plan.joints)
         self._joints = np.zeros(plan.joints)
         self._force = np.zeros(2)
@@ -73,6 +76,30 @@ class Deviations:
         """All stamps are later by `shift` (ns) from now on."""
         self._epoch += shift
         self._seen += shift
+        self._since += shift
+
+    def add_pause(self, stamp: int, span: float, densities: Array) -> None:
+        """Strokes were not measured for `span` s up to `stamp` (ns); see `StrokeNoise.of_pause`."""
+        if self.noise is not None:
+            self._add(stamp, self.noise.of_pause(self._plan, span, densities))
+
+    def add_phase(self, stamp: int, prediction: Prediction) -> None:
+        """How much time passed up to `stamp` (ns) is not known, while the boom vibrated as in `prediction`."""
+        if self.noise is not None:
+            self._add(stamp, self.noise.of_phase(self._plan, prediction.tip_velocity, prediction.tip_acceleration))
+
+    def _add(self, stamp: int, variances: Array) -> None:
+        """Vibration with these variances (modes,), from `stamp` on, that the model cannot know of."""
+        self._unknown, self._since = self._left(stamp) + variances, stamp
+        self._seen = stamp - INTERVAL
+
+    def _left(self, stamp: int) -> Array:
+        """What is left of the unknown vibration at `stamp`; of the modes at the present posture."""
+        assert self.noise is not None
+        found = np.zeros(len(self.noise.modes))
+        count = min(len(found), len(self._unknown))
+        found[:count] = self._unknown[:count]
+        return found * np.exp(-self.noise.decay * max(0.0, (stamp - self._since) * NANO))
 
     def _refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
         self._seen = prediction.stamp
@@ -82,11 +109,13 @@ class Deviations:
             self._at, self._interval = prediction.strokes, interval
             slopes = [cylinder_length(self._plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
             self._slopes2 = 1.0 / np.square(slopes)
-        time = (prediction.stamp - self._epoch) * 1e-9
-        joints, acceleration = self.noise.after(time, prediction.tip_angle)
         if self._speeds is not None:
-            left = self.noise.left(self._plan, time, self._speeds, prediction.tip_displacement)
-            more, swing, tip = self.noise.of(left, self._plan, prediction.tip_angle)
+            self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
+            self._speeds, self._seen = None, prediction.stamp
+        time = (prediction.stamp - self._epoch) * NANO
+        joints, acceleration = self.noise.after(time, prediction.tip_angle)
+        if len(self._unknown):
+            more, swing, tip = self.noise.of(self._left(prediction.stamp), self._plan, prediction.tip_angle)
             joints, acceleration, self.tip = joints + more, acceleration + swing, np.sqrt(tip)
         self._joints = self._settings.angle_variance + joints
         self._force = np.sqrt(self._settings.imu_sigma**2 + acceleration)

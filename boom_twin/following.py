@@ -19,6 +19,7 @@ from .settings import Settings
 from .undeflected import Undeflected
 
 PAUSE = 0.1  # s without strokes, after which
+TINY = 1e-12
 AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
 
@@ -95,11 +96,26 @@ class Following:
         tables, work = self.plan.tables, self._work
         return int(follow(tables, self._anchor, self.live, work, self._track, tuning, time, strokes, self._row))
 
-    def extrapolated(self, span: float) -> tuple[Array, Array, Array]:
-        """Strokes (m) `span` s after the newest sample, by its estimates; speeds (m/s) then, and their deviations now; (n,)."""
+    def extrapolated(self, span: float) -> Array:
+        """Strokes (m) `span` s after the newest sample, by its estimates; shape (n,)."""
+        x = self._track.x[0]
+        return np.asarray(x[:, 0] + span * (x[:, 1] + 0.5 * span * x[:, 2]))
+
+    @property
+    def speeds(self) -> Array:
+        """Of the strokes at the newest sample, as estimated, m/s, shape (n,)."""
+        return np.asarray(self._track.x[0][:, 1])
+
+    def least_way(self, span: float, sure: float) -> float:
+        """How far (m) the fastest stroke goes on for `span` s at least, unless it brakes harder than it now does.
+
+        Speeds and braking are taken `sure` deviations to the safe side.
+        """
         x, c = self._track.x[0], self._track.c[0]
-        strokes = x[:, 0] + span * x[:, 1] + 0.5 * span**2 * x[:, 2]
-        return strokes, x[:, 1] + span * x[:, 2], np.sqrt(np.maximum(c[:, 1, 1], 0.0))
+        deviations = np.sqrt(np.maximum(c.diagonal(axis1=1, axis2=2), 0.0))
+        speeds = np.maximum(np.abs(x[:, 1]) - sure * deviations[:, 1], 0.0)
+        braking = np.maximum(-x[:, 2] * np.sign(x[:, 1]), 0.0) + sure * deviations[:, 2]
+        return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, TINY))).max())
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""

@@ -28,24 +28,25 @@ class Plausible:
         self.estimate: Array | None = None
         self._stamp = self._trusted = self._before = 0
         self._others = 0
-        self._away: tuple[Array, Array, float] | None = None
+        self._away: tuple[Array, Array, float, bool] | None = None
 
     def is_of_others(self, stamp: int, values: Array, settings: Settings) -> bool:
         """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
-        away, limit = self._distances(stamp, values, settings)
-        if away.max() <= limit or np.count_nonzero(away > limit) < 2:
+        away, limit, is_near = self._distances(stamp, values, settings)
+        if is_near or np.count_nonzero(away > limit) < 2:
             self._others = 0
             return False
         self._others += 1
         return self._others <= MOST
 
-    def _distances(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, float]:
-        """From the estimates (n,), and how far strokes may be from them, m; once for a sample."""
+    def _distances(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, float, bool]:
+        """From the estimates (n,), how far strokes may be from them, m, and whether all are within; once for a sample."""
         assert self.estimate is not None
         if self._away is None or self._away[0] is not values:
             span = (stamp - self._stamp) * NANO
             limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-            self._away = values, np.abs(values - self.estimate), limit
+            away = np.abs(values - self.estimate)
+            self._away = values, away, limit, bool(np.maximum.reduce(away) <= limit)
         return self._away[1:]
 
     def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
@@ -54,9 +55,9 @@ class Plausible:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
             self._stamp = self._trusted = stamp
             return values, []
-        away, limit = self._distances(stamp, values, settings)
+        away, limit, is_near = self._distances(stamp, values, settings)
         self._stamp, self._away = stamp, None
-        if away.max() <= limit:
+        if is_near:
             self._trusted = stamp
             return values, []
         return self._doubted(stamp, values, away > limit)

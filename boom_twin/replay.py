@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +80,21 @@ class Recording:
         for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
             if self.predictions and not set(events).isdisjoint(report.events):
                 found.append((self.predictions[-1].stamp, report.stamp))
+
+    @property
+    def duration(self) -> float:
+        """From the first prediction to the last, s, by the model's own time: without what clocks were set by."""
+        span = self.predictions[-1].stamp - self.predictions[0].stamp
+        return (span - sum(after - before for before, after in self.clock_sets)) * NANO
+
+    @property
+    def by_first_clock(self) -> list[Prediction]:
+        """The predictions before a clock was set: their stamps tell the time since the first one."""
+        if not self.clock_sets:
+            return self.predictions
+        step = self.clock_sets[0]
+        pairs = enumerate(pairwise(prediction.stamp for prediction in self.predictions), start=1)
+        return self.predictions[: next(k for k, pair in pairs if pair == step)]
 
     def of(self, stream: Stream) -> list[Residuals]:
         """Residuals of one stream."""
@@ -222,7 +238,7 @@ def replay_into(
     if session.incomplete:
         summary["session_incomplete"] = session.incomplete
     if truth is not None:
-        summary |= truth.errors(recording.predictions)
+        summary |= truth.errors(recording.by_first_clock)
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
 
@@ -291,8 +307,7 @@ def _told(twin: Twin) -> str:
 
 def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[str, Any]:
     """The contract's numbers of a replay."""
-    first, last = recording.predictions[0].stamp, recording.predictions[-1].stamp
-    duration = (last - first) * NANO
+    first, duration = recording.predictions[0].stamp, recording.duration
     angles = recording.of(Stream.ANGLES)
     values = _stacked([residuals.values for residuals in angles], twin.plan.joints)
     normalised = _stacked([residuals.normalised for residuals in angles], twin.plan.joints)

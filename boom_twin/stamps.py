@@ -7,8 +7,9 @@ from .settings import Settings
 
 NANO = 1_000_000_000
 STEP = 1.75  # usual intervals; a longer one is looked at
+FEW = 8.0  # usual intervals; where strokes are as expected after a step up to that, it need not be confirmed
 SMOOTHING = 0.05  # weight of the newest interval in the usual one
-KEPT = 256  # most samples that wait
+KEPT = 1024  # most samples that wait
 LASTING = 1_000_000_000  # ns that a second line of stamps has to go on alone before it is followed
 
 
@@ -52,6 +53,10 @@ class Stamps:
         """Whether a sample comes as it usually does."""
         return self.newest is None or 0 < stamp - self.newest <= (STEP * self.usual or self._gap)
 
+    def is_soon(self, stamp: int) -> bool:
+        """Whether a sample comes early, or after few that were lost."""
+        return self.newest is not None and 0 < stamp - self.newest <= min(self.longest, FEW * self.usual or self._gap)
+
     def take(self, stamp: int) -> None:
         """Go on with this stamp; samples that are held were stray."""
         if self.newest is not None:
@@ -61,23 +66,26 @@ class Stamps:
         if self.held:
             self._other, self.held = self.held[-1][0].stamp, []
 
-    def hold(self, sample: Sample, event: str) -> str:
-        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be."""
+    def hold(self, sample: Sample, event: str, is_apart: bool = False) -> str:
+        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be.
+
+        One that `is_apart` has values that those that are held do not lead to: it does not follow them.
+        """
         last = self.held[-1][0].stamp if self.held else self._other
-        follows = last is not None and 0 < sample.stamp - last <= self.longest
+        follows = last is not None and 0 < sample.stamp - last <= self.longest and not is_apart
         if not (self.held and follows):
             self.held, self._since, self.is_second = [], sample.stamp, follows
         if self.is_second and event == "leap":
             event = "second source"
         self.held.append((sample, event))
-        if len(self.held) > (2 if self.is_second else KEPT):
+        if len(self.held) > KEPT:
             del self.held[0]
         return event
 
-    def is_confirmed(self, least: int) -> bool:
-        """Whether what is held goes on by itself, for `least` ns; a second source has to for long."""
+    def is_confirmed(self, least: float = 0.0) -> bool:
+        """Whether what is held goes on by itself, for `least` ns and for so long that the line that is followed is late."""
         span = self.held[-1][0].stamp - self._since
-        return span > 0 and span >= (LASTING if self.is_second else least)
+        return span > 0 and span >= max(self.usual / STEP, least)
 
     def release(self) -> list[tuple[Sample, str]]:
         """What is held; it is followed from now on."""

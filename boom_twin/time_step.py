@@ -1,4 +1,4 @@
-"""What a step of the strokes' stamps means, by where the strokes went on: a pause, a clock that was set, or neither."""
+"""What a step of the strokes' stamps means, by where the strokes went on: a pause, a clock that was set, either, or neither."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ class TimeStep(Enum):
 
     PAUSE = "pause"
     CLOCK = "clock"
+    EITHER = "pause or clock"
     NEITHER = "neither"
 
 
@@ -47,7 +48,7 @@ def goes_on(boom: Following, before: Array, strokes: Array, span: float, usual: 
 
 def nearest(boom: Following, before: Array, strokes: Array, span: float) -> Array:
     """Where strokes would be `span` s later, from their estimates or from what was measured, whichever fits better; (n,) m."""
-    now, later = boom.extrapolated(0.0)[0], boom.extrapolated(span)[0]
+    now, later = boom.extrapolated(0.0), boom.extrapolated(span)
     other = later + np.where(np.isfinite(before), before - now, 0.0)
     return np.where(np.abs(strokes - other) < np.abs(strokes - later), other, later)
 
@@ -58,7 +59,8 @@ def explain(
     """Tell why stamps stepped by `span` (s).
 
     A clock was set if both samples are where they would have been after the usual interval. If the stamps went ahead by no more
-    than can be bridged, that is also what a pause at rest looks like: then a cylinder has to move, which would have gone on.
+    than can be bridged, that is also what a pause at rest looks like: then a cylinder has to move, which would have gone on;
+    else it may be either.
 
     Parameters
     ----------
@@ -75,11 +77,15 @@ def explain(
     fits = miss <= closeness(usual, settings)
     if not 0.0 < span <= settings.restart_gap:
         return TimeStep.CLOCK if fits else TimeStep.NEITHER
-    _, speeds, deviations = boom.extrapolated(usual)
-    way = np.maximum(np.abs(speeds) - SURE * deviations, 0.0) * min(max(span - usual, 0.0), LONGEST)
-    if fits and RATIO * miss < float(way.max()):
+    if fits and RATIO * miss < boom.least_way(min(max(span - usual, 0.0), LONGEST), SURE):
         return TimeStep.CLOCK
     reach = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-    if surprise(first, boom.extrapolated(0.0)[0]) <= reach:
-        return TimeStep.PAUSE
+    if surprise(first, boom.extrapolated(0.0)) <= reach:
+        return TimeStep.EITHER if fits else TimeStep.PAUSE
     return TimeStep.NEITHER
+
+
+def jerk_densities(boom: Following, strokes: Array, span: float, settings: Settings) -> Array:
+    """Of white jerk (n,), m^2/s^5, during a pause of `span` s: as expected, or more where `strokes` (m) after it show so."""
+    shown = 20.0 * (strokes - boom.extrapolated(span)) ** 2 / span**5
+    return np.asarray(np.fmax(shown, settings.jerk_density))

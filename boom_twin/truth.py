@@ -36,7 +36,7 @@ class TipTruth:
     acceleration: Array
 
     def errors(self, predictions: list[Prediction]) -> dict[str, float]:
-        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), both as vectors."""
+        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; stamps of one clock."""
         times = np.array([prediction.stamp - predictions[0].stamp for prediction in predictions]) * 1e-9 + self.times[0]
         position = np.array([prediction.tip_position for prediction in predictions])
         acceleration = np.array([prediction.tip_acceleration for prediction in predictions])

@@ -28,7 +28,7 @@ from .scene.kinematics import stroke_curve
 from .scene.parts import Scene
 from .settings import Settings
 from .stamps import LASTING, Stamps
-from .time_step import TimeStep, explain, goes_on, is_close
+from .time_step import TimeStep, explain, goes_on, is_close, jerk_densities, surprise
 from .zeros import Zeros
 
 EVENTS = {
@@ -77,6 +77,7 @@ class _Run:
     slot: int = -1
     memory: Memory = field(default_factory=Memory)
     plausible: Plausible = field(default_factory=Plausible)
+    prediction: Prediction | None = None
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
@@ -227,7 +228,7 @@ class Twin:
             channel. Nothing has changed then.
         """
         sample = self._edge.checked(sample)
-        complete = bool(np.abs(sample.values).max(initial=0.0) <= LIMIT)
+        complete = all(-LIMIT <= value <= LIMIT for value in sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
             if not usable.any():
@@ -252,21 +253,31 @@ class Twin:
         if 0 <= span < SHORTEST:
             same = is_close(self._zeroed(sample), run.strokes, 0.0, self.settings)
             return self._refuse(sample, "duplicate" if same else "second source")
-        if 0 < span <= line.longest and goes_on(self._boom, run.strokes, self._zeroed(sample), span * NANO, 0.0, self.settings):
+        values = self._zeroed(sample)
+        if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
             return self._follow(sample, complete, [])
         then = run.memory.at(sample.stamp)
         back = (run.newest - sample.stamp) * NANO
-        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, self._zeroed(sample)):
+        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, values):
             return self._refuse(sample, "late")
         is_late = self._is_late(run, sample)
-        event = line.hold(sample, "late" if is_late else "leap")
-        if not line.is_confirmed(round(self.settings.gap / NANO) if is_late else 0):
+        event = line.hold(sample, "late" if is_late else "leap", self._is_apart(line, sample))
+        gap = self.settings.gap / NANO
+        if not line.is_confirmed(gap if is_late or line.is_second else 0.0):
             return self._hold(sample, event)
         why = self._explain(run, line)
         is_young = run.is_again and run.newest - run.epoch < LASTING
-        if why is TimeStep.NEITHER and is_young and not line.is_confirmed(LASTING):
+        if why is TimeStep.NEITHER and not line.is_confirmed(LASTING if is_young or line.is_second else gap):
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
+
+    def _is_apart(self, line: Stamps, sample: Sample) -> bool:
+        """Whether no cylinder is so fast as to come here from the strokes that are held."""
+        if not line.held:
+            return False
+        last = line.held[-1][0]
+        way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
+        return bool(surprise(sample.values, last.values) > way)
 
     def _is_late(self, run: _Run, sample: Sample) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""
@@ -295,15 +306,24 @@ class Twin:
             speeds = self._speeds_of(held)
             self.reset()
             self._speeds = speeds
+        elif events:
+            self._doubt_pause(run, held[0], why)
         reports = []
         for sample in held:
             reports.append(self._follow(sample, bool(np.isfinite(sample.values.sum())), events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
+    def _doubt_pause(self, run: _Run, first: Sample, why: TimeStep) -> None:
+        """State what the model cannot know after a pause that ended with the sample `first`."""
+        span = (first.stamp - run.newest) * NANO
+        run.deviations.add_pause(first.stamp, span, jerk_densities(self._boom, self._zeroed(first), span, self.settings))
+        if why is TimeStep.EITHER and run.prediction is not None:
+            run.deviations.add_phase(first.stamp, run.prediction)
+
     def _speeds_of(self, held: list[Sample]) -> Array:
         """Of strokes (m/s) around a start from rest: before it as estimated, after it as measured, whichever is larger."""
-        before, (first, last) = np.abs(self._boom.extrapolated(0.0)[1]), (held[0], held[-1])
+        before, (first, last) = np.abs(self._boom.speeds), (held[0], held[-1])
         after = np.abs(last.values - first.values) / ((last.stamp - first.stamp) * NANO)
         return np.asarray(np.fmin(np.fmax(before, after), self.settings.stroke_rate))
 
@@ -379,7 +399,7 @@ class Twin:
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
         before, run.newest, run.slot, run.strokes = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD, sample.values
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
-        run.plausible.estimate = prediction.strokes
+        run.plausible.estimate, run.prediction = prediction.strokes, prediction
         self._remember(run, prediction)
         if math.hypot(*prediction.tip_displacement) > self._valid:
             events.append("deflected")
@@ -411,7 +431,7 @@ class Twin:
         if -self.settings.jump_back <= span <= 0.0:
             return self._refuse(sample, "duplicate" if span == 0.0 else "late")
         event = line.hold(sample, "leap")
-        if not line.is_confirmed(0):
+        if not line.is_confirmed():
             return self._hold(sample, event)
         reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in self._released(line)]
         return replace(reports[-1], earlier=tuple(reports[:-1]))

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import spherical_jn
 
 from ..chain.program import State, Work
 from ..plan.plan import Plan
@@ -58,21 +59,52 @@ class StrokeNoise:
         c, s = np.cos(angle), np.sin(angle)
         return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2
 
-
-    def left(self, plan: Plan, time: float, speeds: Array, sag: Array) -> Array:
-        """Variances (modes,), m^2 kg, of vibration that a model started at rest lacks, `time` s after that.
+    def of_start(self, plan: Plan, speeds: Array, sag: Array) -> Array:
+        """Variances (modes,), m^2 kg, of vibration that a model lacks when it is started at rest.
 
         Strokes that went with `speeds` (n,) in m/s set off N_ij v_i / omega_j^3; and the first mode may have swung by
-        `SWUNG` of the tip's deflection `sag` (2,) in m. Both decay with the damping of the mode.
+        `SWUNG` of the tip's deflection `sag` (2,) in m.
         """
+        found = self._loads(plan) ** 2 @ speeds**2 / self._omegas() ** 6
+        return found + self._of_tip(plan, SWUNG * float(np.hypot(*sag)))
+
+    def of_pause(self, plan: Plan, span: float, densities: Array) -> Array:
+        """Variances (modes,), m^2 kg, of vibration by what strokes did in a pause of `span` s beside what its ends tell.
+
+        A stroke is known but for its jerk, white with `densities` (n,) in m^2/s^5. What a mode keeps of it is its transform
+        at omega, less the three parts that stroke, speed and acceleration at the end tell (Legendre polynomials up to the
+        second degree): N_ij^2 / omega_j^8 . q_i T (1 - sum_k (2k+1) j_k(omega_j T/2)^2), with spherical Bessel functions.
+        """
+        omegas = self._omegas()
+        known = sum((2 * k + 1) * spherical_jn(k, 0.5 * omegas * span) ** 2 for k in range(3))
+        return np.asarray(self._loads(plan) ** 2 @ densities * span * np.maximum(1.0 - known, 0.0) / omegas**8)
+
+    def of_phase(self, plan: Plan, velocity: Array, acceleration: Array) -> Array:
+        """Variances (modes,), m^2 kg, of a free vibration of unknown phase: how far two of them are apart, at the most.
+
+        `velocity` and `acceleration` (2,) of the tip are taken to be those of the first mode.
+        """
+        if not self.modes:
+            return np.zeros(0)
+        omega = float(self._omegas()[0])
+        amplitude2 = float(velocity @ velocity) / omega**2 + float(acceleration @ acceleration) / omega**4
+        return self._of_tip(plan, float(np.sqrt(2.0 * amplitude2)))
+
+    def _of_tip(self, plan: Plan, amplitude: float) -> Array:
+        """Variances (modes,) of a first mode that moves the tip by `amplitude` (m)."""
         found = np.zeros(len(self.modes))
-        for j, mode in enumerate(self.modes):
-            set_off = mode.increments[plan.tables.cylinders.z] * speeds / (2.0 * np.pi * mode.frequency) ** 3
-            found[j] = float(set_off @ set_off)
         if self.modes:
             motion = float(np.hypot(*self.modes[0].motion[plan.tables.tip : plan.tables.tip + 2]))
-            found[0] += (SWUNG * float(np.hypot(*sag)) / max(motion, TINY)) ** 2
-        return np.asarray(found * np.exp(-self.decay * time))
+            found[0] = (amplitude / max(motion, TINY)) ** 2
+        return found
+
+    def _omegas(self) -> Array:
+        return np.array([2.0 * np.pi * mode.frequency for mode in self.modes])
+
+    def _loads(self, plan: Plan) -> Array:
+        """N_ij, shape (modes, n)."""
+        rows = [mode.increments[plan.tables.cylinders.z] for mode in self.modes]
+        return np.array(rows).reshape(len(rows), plan.joints)
 
     def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array]:
         """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, tip (2,)."""
