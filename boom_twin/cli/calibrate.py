@@ -56,10 +56,10 @@ def _learn(args: Namespace) -> int:
     from ..io.atomic import check_target
     from ..settings import load_settings
 
-    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
     check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
+    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
     with _bar() as progress:
         learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress)
     write_baseline(learnt, args.baseline, _credit(args), args.force)
