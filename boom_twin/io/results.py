@@ -142,8 +142,8 @@ def _check_links(folder: Path, sources: Sequence[Path]) -> None:
             own[_identity(folder / name)] = name
     for source in sources:
         for file in [source, *(source.iterdir() if source.is_dir() else ())]:
-            if file.exists() and (name := own.get(_identity(file))) is not None:
-                raise BagError(f"{folder}: its {name} is {file}, and a source is never touched. Choose another folder.")
+            if file.exists() and (held := own.get(_identity(file))) is not None:
+                raise BagError(f"{folder}: its {held} is {file}, and a source is never touched. Choose another folder.")
 
 
 def _identity(path: Path) -> tuple[int, int]:
@@ -318,12 +318,15 @@ def _settle(place: Path, replaced: Path, kind: Kind) -> None:
 
 def _discard(folder: Path) -> None:
     """Remove an earlier result: its manifest becomes the mark of something unfinished, which goes last."""
-    with suppress(FileNotFoundError):
-        (folder / MANIFEST).rename(folder / UNFINISHED)
-    _, listed = _manifest(folder)
-    _remove(folder, [name for name in _entries(folder) if name in listed])
-    (folder / UNFINISHED).unlink(missing_ok=True)
-    _remove_empty(folder)
+    try:
+        with suppress(FileNotFoundError):
+            (folder / MANIFEST).rename(folder / UNFINISHED)
+        _, listed = _manifest(folder)
+        _remove(folder, [name for name in _entries(folder) if name in listed])
+        (folder / UNFINISHED).unlink(missing_ok=True)
+        _remove_empty(folder)
+    except OSError as error:
+        raise BagError(f"{folder}: the earlier result cannot be removed ({error.strerror}). Remove it by hand.") from None
 
 
 def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: Kind) -> None:
@@ -342,7 +345,7 @@ def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: 
     except (OSError, BagError) as error:
         reason = str(error) if isinstance(error, BagError) else f"{out}: cannot be replaced ({error.strerror})."
         raise BagError(f"{reason} The result is whole, and is kept in {building}.") from None
-    _discard(replaced)
     (place / UNFINISHED).unlink()
     if not kind.is_replaced:
         (place / MANIFEST).unlink()
+    _discard(replaced)
