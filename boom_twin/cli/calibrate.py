@@ -56,10 +56,10 @@ def _learn(args: Namespace) -> int:
     from ..io.atomic import check_target
     from ..settings import load_settings
 
-    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
     check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
+    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
     with _bar() as progress:
         learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress)
     write_baseline(learnt, args.baseline, _credit(args), args.force)
@@ -96,7 +96,7 @@ def _credit(args: Namespace) -> str:
 def _calibrate(args: Namespace) -> int:
     from ..calibrate.run import Choice, calibrate
     from ..calibrate.words import as_object, as_text
-    from ..calibrate.written import refuse_overwriting, write_mapping, write_scene
+    from ..calibrate.written import mapping_path, refuse_overwriting, write_mapping, write_scene
     from ..settings import load_settings
 
     refuse_overwriting(args.out, _sources(args), args.force)
@@ -109,8 +109,12 @@ def _calibrate(args: Namespace) -> int:
         found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress)
     wall = time.perf_counter() - began
     credit = _credit(args)
-    write_scene(found, scene.scene, scene.text, args.out, credit)
+    refuse_overwriting(args.out, _sources(args), args.force)  # again: somebody may have put something there meanwhile
+    # the scene last: without its zeros it would pass for the whole result
     mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
+    write_scene(found, scene.scene, scene.text, args.out, credit)
+    if mapping is None and (earlier := mapping_path(args.out)).exists():
+        print(f"warning: {earlier}: of an earlier calibration; {args.out} has no zeros of its own.", file=sys.stderr)
     files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
     if args.json:
         print_json(as_object(found) | {"wall_s": wall, "files": [str(path) for path in files]})

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
     from ..report.compare import Row
@@ -31,9 +31,14 @@ def run(args: Namespace) -> int:
     """Replay what is not replayed, and compare."""
     from ..report.compare import as_text, flat, rows_of
 
+    if args.out:
+        _check_place(Path(args.out))
     with ExitStack() as stack:
         out = Path(args.out or stack.enter_context(TemporaryDirectory()))
         one, other = (_side(args, Path(getattr(args, name)), out / name) for name in ("A", "B"))
+    for side in (one, other):
+        if side.incomplete:
+            print(f"warning: {side.name}: its session is {side.incomplete}", file=sys.stderr)
     if one.scene != other.scene:
         print("warning: the two were replayed with different scenes; differences may be those of the scenes", file=sys.stderr)
     rows = rows_of(one, other)
@@ -46,19 +51,28 @@ def run(args: Namespace) -> int:
     return 0
 
 
+def _check_place(out: Path) -> None:
+    """Refuse to put pictures into a session or a result."""
+    from ..errors import UsageError
+
+    if held := [name for name in ("metadata.yaml", "session.yaml", "summary.json") if (out / name).exists()]:
+        raise UsageError(f"{out}: holds {held[0]}, so it is a session or a replay. Choose another folder.")
+
+
 def _side(args: Namespace, path: Path, folder: Path) -> Side:
     from ..io.results import REPLAY, result_folder
     from ..replay import replay_into
     from ..report.side import side_of, worked_out
     from ..settings import load_settings
 
+    sources = [Path(each) for each in (args.A, args.B, args.scene, args.params, args.baseline) if each]
+
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
         scene, settings = open_session_scene(session, args.scene), load_settings(Path(args.params) if args.params else None)
-        with result_folder(folder, REPLAY, [session]) as building:
+        with result_folder(folder, REPLAY, sources) as building:
             result = replay_into(building, session, scene, settings, baseline=args.baseline)
             worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, building.folder)
-        warn_incomplete(result.session)
         return folder
 
     return side_of(path, replayed)

@@ -46,13 +46,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def refuse_misuse(args: Namespace) -> None:
-    """UsageError for an option that goes with ``--need``, without it, and for writing over the scene that is read."""
+    """UsageError for an option that goes with ``--need``, without it, and for writing over a file."""
     for option in ("out", "against"):
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
-    for source in filter(None, (args.scene, args.against)):
-        if args.out is not None:
-            check_target(args.out, [Path(source)])
+    if args.out is not None:
+        check_target(args.out, [Path(source) for source in (args.scene, args.against) if source])
+        if args.out.is_file() and args.out.stat().st_size:
+            raise UsageError(f"{args.out}: is there already, and no scene is written over. Name another file.")
 
 
 def tip_error(text: str) -> float:

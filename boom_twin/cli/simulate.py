@@ -39,8 +39,10 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
-    for target in filter(None, (args.out, args.orbits)):
-        check_target(Path(target), [Path(path) for path in (args.drive, args.scene) if path is not None])
+    sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
+    check_target(Path(args.out), sources, _earlier(len(scene.joints)))
+    if args.orbits:
+        check_target(Path(args.orbits), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)
@@ -61,6 +63,11 @@ def run(args: Namespace) -> int:
         orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
         orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
     return 0
+
+
+def _earlier(joints: int) -> bytes:
+    """How a file of results begins, and no drive."""
+    return ",".join(["t_s", *(f"stroke_{i + 1}_m" for i in range(joints)), "joint_1_rad,"]).encode()
 
 
 def read_drive(path: Path, n: int) -> tuple[Array, Array]:

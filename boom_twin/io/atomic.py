@@ -53,8 +53,17 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
         raise BagError(f"{path}: {reason}") from error
 
 
-def check_target(path: Path, sources: Sequence[Path]) -> None:
-    """Refuse to replace a file that is read, or one of a recording; to be asked before the work begins.
+def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) -> None:
+    """Refuse to replace a file that is read, one of a recording, or one that another wrote; to be asked before the work begins.
+
+    Parameters
+    ----------
+    path : Path
+        If it is a symbolic link, its target is judged: that is what `write_atomic` replaces.
+    sources : sequence of Path
+        What is read.
+    own : bytes, optional
+        How an earlier result of the same command begins, which is replaced. None: any file is replaced.
 
     Raises
     ------
@@ -66,9 +75,14 @@ def check_target(path: Path, sources: Sequence[Path]) -> None:
             raise UsageError(f"{path}: this file is read. Name another one to be written.")
     if not path.is_file():
         return
-    is_beside = any(entry.suffix in _RECORDINGS for entry in path.resolve().parent.iterdir())
-    if path.suffix in _RECORDINGS or (is_beside and path.name in _BESIDE_THEM):
+    real = path.resolve()
+    is_beside = any(entry.suffix in _RECORDINGS for entry in real.parent.iterdir())
+    if real.suffix in _RECORDINGS or (is_beside and real.name in _BESIDE_THEM):
         raise UsageError(f"{path}: this is a file of a recording, and none is written over. Name another file.")
+    if own is not None:
+        with real.open("rb") as stream:
+            if stream.read(len(own)) not in (own, b""):
+                raise UsageError(f"{path}: is there already, and is no earlier result of this command. Name another file.")
 
 
 def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:

@@ -28,6 +28,7 @@ BUILDING, REPLACED = ".unfinished", ".replaced"
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """Files that a file manager leaves where somebody looks."""
 _LARGEST = 2**20  # bytes of a manifest that is read
+_WRITABLE = 0o222  # mode of a folder that somebody may write to
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +98,10 @@ def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Bu
     building, replaced = (place.with_name(place.name + end) for end in (BUILDING, REPLACED))
     for folder in (place, building, replaced):
         _check_apart(out, folder, sources)
+        _check_links(folder, sources)
     with _locked(building, kind) as lock:
         try:
             _settle(place, replaced, kind)
-            _check_links(out, place, sources)
             _clear(building, kind)
             yield Building(building, lock)
             _complete(building, kind)
@@ -133,13 +134,16 @@ def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
             raise BagError(f"{out}: {source} lies in {folder}, and a source is never touched. Choose another folder.")
 
 
-def _check_links(out: Path, place: Path, sources: Sequence[Path]) -> None:
-    """Refuse to remove a file that a source is a link to; `place` is an earlier result."""
-    own = {_identity(place / name): name for name in _entries(place)}
+def _check_links(folder: Path, sources: Sequence[Path]) -> None:
+    """Refuse a folder with a file that a source is a link to: it would be removed with an earlier result."""
+    own: dict[tuple[int, int], str] = {}
+    for name in _entries(folder):
+        with suppress(FileNotFoundError):  # a draft of another run, at work there
+            own[_identity(folder / name)] = name
     for source in sources:
         for file in [source, *(source.iterdir() if source.is_dir() else ())]:
-            if file.exists() and (name := own.get(_identity(file))) is not None:
-                raise BagError(f"{out}: its {name} is {file}, and a source is never touched. Choose another folder.")
+            if file.exists() and (held := own.get(_identity(file))) is not None:
+                raise BagError(f"{folder}: its {held} is {file}, and a source is never touched. Choose another folder.")
 
 
 def _identity(path: Path) -> tuple[int, int]:
@@ -160,12 +164,16 @@ def _check_earlier(folder: Path, kind: Kind) -> None:
     command, listed = _manifest(folder)
     if command != kind.command:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
-    folders = {str(parent) + "/" for name in listed for parent in Path(name).parents}
+    own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
+    folders = {str(parent) + "/" for name in own for parent in Path(name).parents}
     for name in entries:
-        if name not in listed and name not in folders and name not in (MANIFEST, UNFINISHED):
+        if name not in own and name not in folders and name not in (MANIFEST, UNFINISHED):
             raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
-        if name in listed and _sha256(folder / name) != listed[name]:
+        if name in own and _sha256(folder / name) != listed[name]:
             raise BagError(f"{folder}: {name} was changed since {command} wrote it. {remedy}.")
+    for inner in (folder, *(folder / name for name in folders & set(entries))):
+        if not inner.stat().st_mode & _WRITABLE:
+            raise BagError(f"{inner}: is write-protected. Choose a new folder, or allow to write there.")
 
 
 def _entries(folder: Path) -> list[str]:
@@ -247,6 +255,9 @@ def _check_left(building: Path, kind: Kind) -> None:
     for name in entries:
         if not (kind.has(name) or name in (MANIFEST, UNFINISHED, "bag/")):
             raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
+    if not kind.is_replaced and MANIFEST in entries:
+        whole = f"holds a whole result of an earlier {kind.command}, which was not put in its place"
+        raise BagError(f"{building}: {whole}. Rename it, or choose another folder.")
 
 
 def _command(building: Path) -> str:
@@ -307,12 +318,15 @@ def _settle(place: Path, replaced: Path, kind: Kind) -> None:
 
 def _discard(folder: Path) -> None:
     """Remove an earlier result: its manifest becomes the mark of something unfinished, which goes last."""
-    with suppress(FileNotFoundError):
-        (folder / MANIFEST).rename(folder / UNFINISHED)
-    _, listed = _manifest(folder)
-    _remove(folder, [name for name in _entries(folder) if name in listed])
-    (folder / UNFINISHED).unlink(missing_ok=True)
-    _remove_empty(folder)
+    try:
+        with suppress(FileNotFoundError):
+            (folder / MANIFEST).rename(folder / UNFINISHED)
+        _, listed = _manifest(folder)
+        _remove(folder, [name for name in _entries(folder) if name in listed])
+        (folder / UNFINISHED).unlink(missing_ok=True)
+        _remove_empty(folder)
+    except OSError as error:
+        raise BagError(f"{folder}: the earlier result cannot be removed ({error.strerror}). Remove it by hand.") from None
 
 
 def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: Kind) -> None:
@@ -331,7 +345,7 @@ def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: 
     except (OSError, BagError) as error:
         reason = str(error) if isinstance(error, BagError) else f"{out}: cannot be replaced ({error.strerror})."
         raise BagError(f"{reason} The result is whole, and is kept in {building}.") from None
-    _discard(replaced)
     (place / UNFINISHED).unlink()
     if not kind.is_replaced:
         (place / MANIFEST).unlink()
+    _discard(replaced)

@@ -62,6 +62,8 @@ def flat(one: Side, other: Side, rows: list[Row]) -> dict[str, Any]:
     return {
         "session_a": one.name,
         "session_b": other.name,
+        "incomplete_a": one.incomplete or None,
+        "incomplete_b": other.incomplete or None,
         "same_scene": one.scene == other.scene,
         **{column: [getattr(row, column) for row in rows] for column in columns},
         "alarms_a": [alarm_as_text(alarm) for alarm in one.alarms],

@@ -25,12 +25,25 @@ from .vibration import Hold, holds
 
 @dataclass(frozen=True)
 class Side:
-    """What is known of one session: its name, the digest of its scene, figures, and alarms as in ``summary.json``."""
+    """What is known of one session.
+
+    Attributes
+    ----------
+    name : str
+    scene : str
+        Digest of its scene.
+    quantities : list of Quantity
+    alarms : list of dict
+        As in ``summary.json``.
+    incomplete : str
+        Why the session is not whole, in words; empty if nothing says that it is not.
+    """
 
     name: str
     scene: str
     quantities: list[Quantity]
     alarms: list[dict[str, Any]]
+    incomplete: str = ""
 
 
 def worked_out(
@@ -60,9 +73,10 @@ def side_of(path: Path, replayed: Callable[[Path], Path]) -> Side:
         with open_received(folder / "summary.json") as file:
             summary = json.load(file)
         alarms, told = list(summary["alarms"]), summary["output_sha256"]
+        incomplete = str(summary.get("session_incomplete", ""))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
     bag = folder / "bag" / RESULT
     if bag.is_file() and hashlib.sha256(bag.read_bytes()).hexdigest() != told:
         raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")
-    return Side(path.resolve().name, scene, found, alarms)
+    return Side(path.resolve().name, scene, found, alarms, incomplete)

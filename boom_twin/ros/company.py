@@ -38,6 +38,7 @@ class Child:
     arguments : list of str
         The module and its arguments.
     log : Path
+        New.
     parting : Signals
         What ends it in order.
     lock : int
@@ -46,7 +47,7 @@ class Child:
 
     def __init__(self, arguments: list[str], log: Path, parting: signal.Signals, lock: int) -> None:
         self._name, self._log, self._parting = " ".join(arguments[:2]), log, parting
-        with log.open("w", encoding="utf-8") as file:
+        with log.open("x", encoding="utf-8") as file:
             command = python_command(*arguments)
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
@@ -76,7 +77,7 @@ class Company:
     Parameters
     ----------
     out : Path
-        Folder of the logs and of the recording.
+        Folder of the recording; logs and scene go beside it, under its name. No file that is there is written over.
     scene : str
         Text of the scene that the node is given.
     lock : int
@@ -89,22 +90,27 @@ class Company:
     """
 
     def __init__(self, out: Path, scene: str, lock: int) -> None:
-        self._out, self._scene, self._lock, self.recorded = out, scene, lock, _free(out / "recorded")
+        self._scene, self._lock, self.recorded = scene, lock, _free(out / "recorded")
         self._children: list[Child] = []
         self._is_asked_to_end = False
 
     def begin(self, origin: str) -> None:
         """Start node and recorder; `origin` is kept in the recording."""
-        scene = self._out / "scene.yaml"
-        scene.write_text(self._scene, encoding="utf-8")
+        scene = self._beside("scene.yaml")
+        with scene.open("x", encoding="utf-8") as file:
+            file.write(self._scene)
         self.start("node", ["boom_twin.ros.main", "--ros-args", "-p", f"scene:={scene}"], signal.SIGTERM)
         record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin, "--scene", str(scene)]
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
     def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
         """Start one more."""
-        self._children.append(Child(arguments, self._out / f"{name}.log", parting, self._lock))
+        self._children.append(Child(arguments, self._beside(f"{name}.log"), parting, self._lock))
         return self._children[-1]
+
+    def _beside(self, name: str) -> Path:
+        """Where a file of this run goes."""
+        return self.recorded.with_name(f"{self.recorded.name}.{name}")
 
     def check(self) -> None:
         """Raise BoomTwinError if one of them has ended, KeyboardInterrupt after SIGINT or SIGTERM."""
@@ -146,9 +152,14 @@ class Company:
 
 
 def _free(folder: Path) -> Path:
-    """The folder, or with a number behind its name if it is there already."""
+    """The folder, or with a number behind its name if it, or a file that goes beside it, is there already."""
+    taken = {entry.name for entry in folder.parent.iterdir()}
     numbered = (folder.with_name(f"{folder.name}_{number}") for number in count(2))
-    return next(path for path in chain([folder], numbered) if not path.exists())
+    return next(
+        path
+        for path in chain([folder], numbered)
+        if path.name not in taken and not any(name.startswith(f"{path.name}.") for name in taken)
+    )
 
 
 @contextmanager

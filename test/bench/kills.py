@@ -268,6 +268,8 @@ class Rig(Target):
 
     def clear(self) -> None:
         shutil.rmtree(self.out, ignore_errors=True)
+        if (self.sign() / "manifest.json").exists():  # whole, which the next run would keep
+            shutil.rmtree(self.sign())
 
 
 class Calibrate(Target):

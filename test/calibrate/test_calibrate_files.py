@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene
+from boom_twin.calibrate import run
 from boom_twin.cli.main import main
 from boom_twin.io.mapping import load_mapping
 from boom_twin.scene.named import parameter
@@ -81,6 +82,36 @@ def test_it_overwrites_only_when_told(ran, source, capsys):
     assert "is there already. Name another file, or add --force" in capsys.readouterr().err
     assert main([*arguments, "--out", str(source), "--force"]) == 1
     assert "this file is read. Name another one" in capsys.readouterr().err
+
+
+def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path):
+    _, arguments = ran
+    (tmp_path / "new.mapping.yaml").mkdir()
+    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--force", "--no-pictures"]) == 1
+    assert "new.mapping.yaml: cannot be written" in capsys.readouterr().err
+    assert not (tmp_path / "new.yaml").exists()
+
+
+def test_a_file_that_comes_while_it_works_is_kept(ran, capsys, tmp_path, monkeypatch):
+    _, arguments = ran
+    calibrated = run.calibrate
+
+    def calibrate_meanwhile(*given):
+        (tmp_path / "new.yaml").write_text("mine")
+        return calibrated(*given)
+
+    monkeypatch.setattr(run, "calibrate", calibrate_meanwhile)
+    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--no-pictures"]) == 1
+    assert "is there already. Name another file" in capsys.readouterr().err
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("new.yaml", "mine")]
+
+
+def test_a_mapping_of_an_earlier_calibration_is_told(ran, capsys, tmp_path):
+    _, arguments = ran
+    (tmp_path / "new.mapping.yaml").write_text("sensors: {joint_1: {zero: 0.1}}\n")
+    options = ["--force", "--no-pictures", "--zeros", "none"]
+    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), *options]) == 0
+    assert "new.mapping.yaml: of an earlier calibration; " in capsys.readouterr().err
 
 
 def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_path):

@@ -93,7 +93,13 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
     bag.mkdir()
     for name in ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"):
         (bag / name).write_bytes(b"recorded")
+    link, notes = scene.with_name("link.csv"), scene.with_name("notes.csv")
+    link.symlink_to(bag / "session_0.mcap")
+    notes.write_text("t_s,stroke_1_m\n0,0.5\n")
+    simulate = ["simulate", str(scene), "--posture", "up", "--drive", "x.csv", "--out"]
     commands = [
+        [*simulate, str(link)],
+        [*simulate, str(notes)],
         ["rig", str(scene), "--random", "up", "--out", str(bag)],
         ["recover", str(bag), "--out", str(bag)],
         ["replay", str(scene), "--out", str(bag)],
@@ -106,9 +112,10 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
     for command in commands:
         assert main(command) == 1
         words = capsys.readouterr().err
-        refused = "holds metadata.yaml already|no manifest|source|file of a recording|this file is read"
-        assert re.search(refused, words), (command, words)
+        reasons = "metadata.yaml already|source|file of a recording|this file is read|no earlier result|only an earlier replay"
+        assert re.search(reasons, words), (command, words)
     assert {path.name: path.read_bytes() for path in bag.iterdir()} == dict.fromkeys(
         ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), b"recorded"
     )
+    assert notes.read_text() == "t_s,stroke_1_m\n0,0.5\n"
     assert scene.read_bytes() == before and [path.name for path in tmp_path.iterdir()] == ["bag"]

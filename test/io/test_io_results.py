@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -18,7 +19,7 @@ import pytest
 from boom_twin.errors import BagError, UsageError
 from boom_twin.io.atomic import check_target, write_atomic
 from boom_twin.io.incomplete import incompleteness
-from boom_twin.io.results import REPLAY, RIG, Kind, result_folder
+from boom_twin.io.results import RECOVER, REPLAY, RIG, Kind, result_folder
 
 FILES = ("summary.json", "quantities.json", "bag/session_0.mcap")
 CHANGING = ("open", "mkdir", "rename", "replace", "unlink", "rmdir", "fsync", "pwrite", "truncate")
@@ -123,6 +124,13 @@ def old_result(folder: Path) -> None:
     (folder / "summary.json").write_text("{}")
 
 
+def forged(folder: Path) -> None:
+    """A recording with a manifest that calls it a replay's."""
+    recording(folder)
+    listed = {"session_0.mcap": hashlib.sha256(b"a recording").hexdigest()}
+    (folder / "manifest.json").write_text(json.dumps({"command": "replay", "files": listed}))
+
+
 def changed(folder: Path) -> None:
     build(folder)
     (folder / "summary.json").write_text("{} ")
@@ -145,6 +153,7 @@ FOREIGN: dict[str, Callable[[Path], Any]] = {
     "a result that was edited": changed,
     "another command's": lambda folder: build(folder, RIG, name="session_0.mcap"),
     "a manifest that lies": listed_only,
+    "a manifest that was forged": forged,
     "a manifest of another shape": lambda folder: (folder.mkdir(), (folder / "manifest.json").write_text("[[]]")),
 }
 
@@ -194,6 +203,39 @@ def test_a_result_that_cannot_be_put_in_place_is_kept_and_told(tmp_path: Path) -
     assert (tmp_path / "out.unfinished" / "manifest.json").is_file()
 
 
+def test_a_session_that_could_not_be_put_in_place_is_not_thrown_away(tmp_path: Path) -> None:
+    """Its source may be gone by now."""
+    with pytest.raises(BagError, match="is whole, and is kept"), result_folder(tmp_path / "out", RECOVER, []) as building:
+        (building.folder / "session_0.mcap").write_text("saved")
+        recording(tmp_path / "out")
+    (tmp_path / "out").rename(tmp_path / "moved")
+    with pytest.raises(BagError, match=r"out\.unfinished: holds a whole result of an earlier recover.*Rename it"):
+        build(tmp_path / "out", RECOVER, name="session_0.mcap")
+    (tmp_path / "out.unfinished").rename(tmp_path / "saved")
+    assert (tmp_path / "saved" / "session_0.mcap").read_text() == "saved" and not incompleteness(tmp_path / "saved")
+
+
+def test_a_result_that_was_write_protected_is_kept(tmp_path: Path) -> None:
+    build(tmp_path / "out")
+    (tmp_path / "out").chmod(0o555)
+    with pytest.raises(BagError, match="out: is write-protected"):
+        build(tmp_path / "out")
+    (tmp_path / "out").chmod(0o755)
+    build(tmp_path / "out")
+
+
+@pytest.mark.parametrize("place", ["out", "out.unfinished", "out.replaced"])
+def test_a_file_that_a_source_links_to_is_not_removed(tmp_path: Path, place: str) -> None:
+    """Also in what an earlier run left beside the result."""
+    build(tmp_path / place)
+    (tmp_path / place / "unfinished.json").write_text('{"command": "replay"}')
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source" / "session_0.mcap").symlink_to(tmp_path / place / "summary.json")
+    with pytest.raises(BagError, match=rf"{place}: its summary\.json is .*session_0\.mcap"):
+        build(tmp_path / "out", sources=(tmp_path / "source",))
+    assert (tmp_path / "source" / "session_0.mcap").exists()
+
+
 def test_a_session_keeps_no_manifest_and_is_not_replaced(tmp_path: Path) -> None:
     build(tmp_path / "out", RIG, name="session_0.mcap")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["session_0.mcap"]
@@ -233,3 +275,24 @@ def test_files_that_are_read_and_files_of_recordings_are_no_targets(tmp_path: Pa
         with pytest.raises(UsageError, match="file of a recording"):
             check_target(path, [])
     check_target(tmp_path / "metadata.yaml", [scene])
+
+
+def test_a_link_to_a_file_of_a_recording_is_no_target(tmp_path: Path) -> None:
+    """Its own name tells nothing: what it leads to would be replaced."""
+    recording(tmp_path / "bag")
+    for name in ("session.yaml", "truth.csv.gz"):
+        (tmp_path / "bag" / name).write_text("")
+    for number, path in enumerate((tmp_path / "bag").iterdir()):
+        link = tmp_path / f"results_{number}.csv"
+        link.symlink_to(path)
+        with pytest.raises(UsageError, match="file of a recording"):
+            check_target(link, [])
+
+
+def test_only_an_earlier_result_is_a_target_where_that_can_be_told(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    path.write_text("t_s,my own notes\n")
+    with pytest.raises(UsageError, match=r"out\.csv: is there already, and is no earlier result"):
+        check_target(path, [], b"t_s,stroke_1_m,")
+    path.write_text("t_s,stroke_1_m,joint_1_rad\n0,1,2\n")
+    check_target(path, [], b"t_s,stroke_1_m,")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -122,6 +123,34 @@ def test_figures_of_another_bag_are_not_compared(session: Path, tmp_path: Path, 
         file.truncate(1000)
     assert main(["compare", str(out), str(out)]) == 1
     assert "summary.json is not of the bag beside it" in capsys.readouterr().err
+
+
+def test_compare_says_that_a_replay_is_of_an_incomplete_session(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(session, tmp_path / "cut")
+    (tmp_path / "cut" / "session.yaml").write_text("started: 2026-01-02T00:00:00.000+00:00\n")
+    out = str(tmp_path / "out")
+    assert main(["replay", str(tmp_path / "cut"), "--out", out, "--no-pictures", "--no-health"]) == 0
+    capsys.readouterr()
+    assert main(["compare", out, out, "--json"]) == 0
+    found = capsys.readouterr()
+    assert "warning: out: its session is incomplete" in found.err
+    assert json.loads(found.out)["incomplete_a"].startswith("incomplete: ")
+
+
+def test_compare_replays_over_none_of_what_it_compares(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else it would compare the first with itself."""
+    out, earlier = tmp_path / "out", tmp_path / "out" / "A"
+    assert main(["replay", str(session), "--out", str(earlier), "--no-pictures", "--no-health"]) == 0
+    before = {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
+    assert main(["compare", str(session), str(earlier), "--out", str(out)]) == 1
+    assert "lies in the source, which is never touched" in capsys.readouterr().err
+    assert main(["compare", str(earlier), str(earlier), "--out", str(earlier)]) == 1
+    assert "holds summary.json, so it is a session or a replay" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize("which", ["ahead", "behind"])

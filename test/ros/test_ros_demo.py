@@ -17,7 +17,7 @@ pytest.importorskip("rclpy")
 
 from boom_twin.io.reader import scan
 from boom_twin.io.session import write_session
-from boom_twin.ros.company import company
+from boom_twin.ros.company import Company
 from boom_twin.scene.load import default_text
 
 
@@ -73,12 +73,19 @@ def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[.
     assert "monitor ended with -9" in demo.said()
 
 
-def test_recordings_of_earlier_demonstrations_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also one that somebody else put there."""
-    monkeypatch.setattr("boom_twin.ros.isolation.refuse_foreign", lambda topics: None)  # nobody else runs here
+def test_nothing_of_earlier_demonstrations_is_written_over(tmp_path: Path) -> None:
+    """Nor what somebody else put there."""
     (tmp_path / "recorded").mkdir()
     (tmp_path / "recorded" / "session_0.mcap").write_bytes(b"a recording")
     (tmp_path / "recorded_2").mkdir()
-    with company(tmp_path, "a test", default_text()) as running:
-        assert running.recorded == tmp_path / "recorded_3"
+    (tmp_path / "recorded_3.node.log").symlink_to(tmp_path / "recorded" / "session_0.mcap")
+    for name in ("scene.yaml", "node.log", "recorder.log"):
+        (tmp_path / name).write_text("mine")
+    with open(os.devnull) as lock:
+        running = Company(tmp_path, default_text(), lock.fileno())
+        running.begin("a test")
+        running.end()
+    assert running.recorded == tmp_path / "recorded_4"
     assert (tmp_path / "recorded" / "session_0.mcap").read_bytes() == b"a recording"
+    assert {(tmp_path / name).read_text() for name in ("scene.yaml", "node.log", "recorder.log")} == {"mine"}
+    assert (tmp_path / "recorded_4.scene.yaml").read_text() == default_text()

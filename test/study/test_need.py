@@ -151,6 +151,14 @@ def test_the_scene_that_is_read_is_not_written_over(capsys: pytest.CaptureFixtur
     assert "this file is read. Name another one" in capsys.readouterr().err
 
 
+def test_no_other_scene_is_written_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text("# by hand\n")
+    assert main(["check", "--need", "tip=1mm", "--out", str(other)]) == 1
+    assert "other.yaml: is there already, and no scene is written over" in capsys.readouterr().err
+    assert other.read_text() == "# by hand\n"
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
     """A scene file and where its lean one goes."""
