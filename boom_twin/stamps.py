@@ -7,6 +7,7 @@ from .settings import Settings
 
 NANO = 1_000_000_000
 STEP = 1.75  # usual intervals; a longer one is looked at
+LEAST = 0.5  # usual intervals; samples that are closer do not confirm one another
 SMOOTHING = 0.05  # weight of the newest interval in the usual one
 KEPT = 256  # most samples that wait
 LASTING = 1_000_000_000  # ns that a second line of stamps has to go on alone before it is followed
@@ -16,7 +17,8 @@ class Stamps:
     """The line of stamps that is followed, and another one that may take its place.
 
     A sample whose stamp steps, ahead or back, is held, and does nothing. If the next ones go on where the line was, it was
-    stray. If they follow the one that is held, time has stepped: it and they are released together.
+    stray. If they follow the one that is held, time has stepped: it and they are released together. Where stamps were stray
+    within the last second there may be two sources, and the other line has to go on alone for longer.
 
     Attributes
     ----------
@@ -37,6 +39,7 @@ class Stamps:
         self.is_second = False
         self._since = 0
         self._other: int | None = None
+        self._strayed: int | None = None
         self.tune(settings)
 
     def tune(self, settings: Settings) -> None:
@@ -59,7 +62,7 @@ class Stamps:
             self.usual = self.usual + SMOOTHING * (min(span, 2.0 * self.usual) - self.usual) if self.usual else float(span)
         self.newest = stamp
         if self.held:
-            self._other, self.held = self.held[-1][0].stamp, []
+            self._other, self.held, self._strayed = self.held[-1][0].stamp, [], stamp
 
     def hold(self, sample: Sample, event: str) -> str:
         """Hold a sample, beside those that it follows, or in their place; gives what it is told to be."""
@@ -75,9 +78,11 @@ class Stamps:
         return event
 
     def is_confirmed(self, least: int) -> bool:
-        """Whether what is held goes on by itself, for `least` ns; a second source has to for long."""
+        """Whether what is held goes on by itself as samples do, for `least` ns; a second source has to for long."""
+        if self._strayed is not None and self.newest is not None and self.newest - self._strayed < LASTING:
+            least = max(least, self._gap)
         span = self.held[-1][0].stamp - self._since
-        return span > 0 and span >= (LASTING if self.is_second else least)
+        return span > 0 and span >= (LASTING if self.is_second else max(least, LEAST * self.usual))
 
     def release(self) -> list[tuple[Sample, str]]:
         """What is held; it is followed from now on."""
