@@ -33,7 +33,7 @@ class Edge:
         self._is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
-        """The sample, its stamp an int and its values float64, shape (channels,).
+        """The sample, its stamp an int and its values float64, shape (channels,): a copy, the caller's may change.
 
         Raises
         ------
@@ -51,6 +51,8 @@ class Edge:
         ):
             stream = _stream(sample.stream)
             sample = Sample(stream, _stamp(sample.stamp), self._values(stream, sample.values))
+        else:
+            sample = Sample(sample.stream, sample.stamp, values.copy())
         if not self._is_sure and sample.stream is Stream.STROKES:
             self._look(sample.stamp)
         return sample
@@ -73,7 +75,10 @@ class Edge:
         names, (count,) = self._names[stream], self._shapes[stream]
         wanted = f"Give {count} numbers, {names} of this boom, NaN where there is none."
         try:
-            values = np.asarray(given, dtype=float)
+            values = np.array(np.ma.filled(given.astype(float), np.nan) if isinstance(given, np.ma.MaskedArray) else given)
+            if values.dtype.kind not in "iufO":
+                raise TypeError
+            values = values.astype(float)
         except (TypeError, ValueError):
             raise UsageError(f"values of {stream.value} are no numbers: {_short(given)}. {wanted}") from None
         if values.shape != (count,):

@@ -22,7 +22,7 @@ NODE_ONLY = ("scene", "mapping", "health", "baseline", "autostart", "monitor")
 LIVE = "live"
 """Marks what can change while the twin runs."""
 Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
-Limit = Annotated[Positive, LIVE]
+Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
 class Settings(BaseModel):

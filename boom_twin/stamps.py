@@ -17,7 +17,8 @@ class Stamps:
     """The line of stamps that is followed, and another one that may take its place.
 
     A sample whose stamp steps, ahead or back, is held, and does nothing. If the next ones go on where the line was, it was
-    stray. If they follow the one that is held, time has stepped: it and they are released together.
+    stray. If they follow the one that is held, time has stepped: it and they are released together. Where stamps were stray
+    within the last second there may be two sources, and the other line has to go on alone for longer.
 
     Attributes
     ----------
@@ -38,6 +39,7 @@ class Stamps:
         self.is_second = False
         self._since = 0
         self._other: int | None = None
+        self._strayed: int | None = None
         self.tune(settings)
 
     def tune(self, settings: Settings) -> None:
@@ -64,7 +66,7 @@ class Stamps:
             self.usual = self.usual + SMOOTHING * (min(span, 2.0 * self.usual) - self.usual) if self.usual else float(span)
         self.newest = stamp
         if self.held:
-            self._other, self.held = self.held[-1][0].stamp, []
+            self._other, self.held, self._strayed = self.held[-1][0].stamp, [], stamp
 
     def hold(self, sample: Sample, event: str, is_apart: bool = False) -> str:
         """Hold a sample, beside those that it follows, or in their place; gives what it is told to be.
@@ -84,6 +86,8 @@ class Stamps:
 
     def is_confirmed(self, least: float = 0.0) -> bool:
         """Whether what is held goes on by itself, for `least` ns and for so long that the line that is followed is late."""
+        if self._strayed is not None and self.newest is not None and self.newest - self._strayed < LASTING:
+            least = max(least, self._gap)
         span = self.held[-1][0].stamp - self._since
         return span > 0 and span >= max(self.usual / STEP, least)
 

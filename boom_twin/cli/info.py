@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..printable import printable
 from .common import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _skew(tally: Tally, which: int) -> float | None:
 
 
 def as_text(info: BagInfo, scene: SessionScene) -> list[str]:
-    """The same for people."""
+    """The same for people; a name or note with a line break makes no line of its own."""
     told = as_json(info, scene)
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
     files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
@@ -114,7 +115,8 @@ def as_text(info: BagInfo, scene: SessionScene) -> list[str]:
     lines += [f"name       {sentence}" for sentence in told["names_extra"]]
     lines += [f"remark     {remark}" for remark in told["remarks"]]
     lines += [f"missing    {sentence}" for sentence in told["missing_for_replay"]]
-    return lines if told["missing_for_replay"] else [*lines, "replay     nothing is missing"]
+    lines += [] if told["missing_for_replay"] else ["replay     nothing is missing"]
+    return [printable(line, keep="") for line in lines]
 
 
 def _table(info: BagInfo) -> list[str]:

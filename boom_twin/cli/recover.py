@@ -7,6 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..printable import printable
 from .common import add_json, print_json
 
 if TYPE_CHECKING:
@@ -74,4 +75,4 @@ def as_text(outcome: Outcome, out: str) -> list[str]:
         lines.append("'no checksum': saved as they stood; nothing vouches for their values")
     if outcome.lost is None:
         lines.append("'unknown': no sound count is left in the source that says how many there were")
-    return [*lines, out]
+    return [printable(line, keep="") for line in [*lines, out]]

@@ -31,7 +31,10 @@ def check_ends(path: Path, file: BinaryIO) -> None:
         raise BagError(f"{path}: incomplete: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
     summary, is_sound = ends
     if not is_sound:
-        raise BagError(f"{path}: the checksum of the summary, from byte {summary}, does not fit. {RESCUE}")
+        fault = f"the checksum of the summary, from byte {summary}, does not fit"
+        if summary > size - _FOOTER.size:
+            fault = f"the summary is said to begin at byte {summary}, which is not in front of the footer of its {size} bytes"
+        raise BagError(f"{path}: {fault}. {RESCUE}")
 
 
 def summary_start(path: Path) -> int | None:
@@ -42,13 +45,15 @@ def summary_start(path: Path) -> int | None:
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
-    """Start of the summary, and whether its checksum fits or is absent; None without a whole footer."""
+    """Start of the summary, and whether it is in the file and its checksum fits or is absent; None without a whole footer."""
     file.seek(max(0, size - _FOOTER.size))
     tail = file.read()
     if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
         return None
     _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
     start = start or size - _FOOTER.size
+    if start > size - _FOOTER.size:
+        return start, False
     return start, checksum in (0, checksum_of(file, start, size - len(MCAP0_MAGIC) - 4))
 
 

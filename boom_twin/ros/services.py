@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -13,6 +14,9 @@ from std_srvs.srv import Trigger
 from ..errors import UsageError
 from ..twin import Twin
 
+PAUSE = 1.0
+"""Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
+FROM_REST = ("reset", "rezero/cylinder_")
 INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
 
@@ -50,8 +54,9 @@ class Services:
         sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
+        self._called: dict[str, float] = {}
         self._services: list[Service] = [
-            node.create_service(Trigger, f"~/{name}", partial(self._answer, act)) for name, act in acts.items()
+            node.create_service(Trigger, f"~/{name}", partial(self._answer, name, act)) for name, act in acts.items()
         ]
         self._services += [node.create_service(Trigger, f"~/{name}", partial(_tell, text)) for name, text in texts.items()]
 
@@ -60,15 +65,25 @@ class Services:
         for service in self._services:
             self._node.destroy_service(service)
 
-    def _answer(self, act: Callable[[], str], request: Any, response: Any) -> Any:
+    def _answer(self, name: str, act: Callable[[], str], request: Any, response: Any) -> Any:
         try:
             if not self._is_active():
                 raise UsageError(INACTIVE)
+            self._limit(name)
             self._catch_up()
             response.success, response.message = True, act()
         except UsageError as error:
             response.success, response.message = False, str(error)
         return response
+
+    def _limit(self, name: str) -> None:
+        """Refuse what would keep the node busy with starts from rest."""
+        now = time.monotonic()
+        if name.startswith(FROM_REST):
+            if now - self._called.get(name, -PAUSE) < PAUSE:
+                told = f"{name} was called less than {PAUSE:g} s ago, and the model starts from rest with it"
+                raise UsageError(f"{told}. Call it again later.")
+            self._called[name] = now
 
     def _reset(self) -> str:
         self._twin.requests.rest()

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from boom_twin.cli.main import main
 from boom_twin.io.factory import RosbagsTypes
@@ -154,3 +155,21 @@ def test_a_damaged_bag_names_the_rescue(bag: Path, kept: int, capsys: pytest.Cap
     assert main(["info", str(bag)]) == 1
     message = capsys.readouterr().err
     assert "the end is missing" in message and "boom_twin recover" in message and message.count("\n") == 1
+
+
+def test_names_with_line_breaks_make_no_lines(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither a feigned verdict nor a carriage return, after which a terminal writes over the line."""
+    file, name = tmp_path / "odd.mcap", "/a\nreplay     nothing is missing\r/cylinder_strokes"
+    with (bag / FILE_NAME).open("rb") as old, file.open("wb") as new:
+        writer = Writer(new)
+        writer.start(profile="ros2")
+        for schema, channel, message in make_reader(old).iter_messages():
+            kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+            own = writer.register_channel(name + channel.topic, channel.message_encoding, kind)
+            writer.add_message(own, message.log_time, message.data, message.publish_time)
+        writer.finish()
+    assert main(["info", str(file)]) == 0
+    shown = capsys.readouterr().out
+    assert main(["recover", str(file), "--out", str(tmp_path / "out")]) == 0
+    shown += capsys.readouterr().out
+    assert "\r" not in shown and "\nreplay     nothing" not in shown and r"/a\nreplay" in shown

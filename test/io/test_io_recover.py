@@ -26,6 +26,7 @@ from boom_twin.io import content
 from boom_twin.io.outcome import Outcome
 from boom_twin.io.reader import scan
 from boom_twin.io.recover import recover
+from boom_twin.io.session import write_session
 from boom_twin.io.writer import FILE_NAME
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
@@ -267,3 +268,22 @@ def test_bytes_that_are_no_bag(tmp_path: Path, data: bytes) -> None:
     with pytest.raises(BagError, match="nothing can be saved"):
         rescue(tmp_path, data)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("start", [2**64 - 1, 2**63, 10**6, 10**4 + 1])
+def test_a_summary_that_is_said_to_be_elsewhere_costs_nothing(tmp_path, start):
+    """The footer of a file that is whole otherwise names a byte that is not that of the summary."""
+    write_session(tmp_path / "bag", *_rows(), {"origin": "synthetic, made for a test"})
+    file = tmp_path / "bag" / FILE_NAME
+    whole, data = rows(file), bytearray(file.read_bytes())
+    struct.pack_into("<Q", data, len(data) - 28, start)
+    file.write_bytes(data)
+    with pytest.raises(BagError, match="boom_twin recover BAG"):
+        scan(tmp_path / "bag")
+    outcome = recover(tmp_path / "bag", tmp_path / "out")
+    assert outcome.saved.total() == len(whole)
+
+
+def _rows() -> tuple[np.ndarray, ...]:
+    """Stamps, strokes, angles and tip IMU of a boom at rest."""
+    return 10**18 + np.arange(40) * 5_000_000, np.full((40, 4), 0.2), np.zeros((40, 4)), np.zeros((40, 2))

@@ -67,6 +67,7 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     for name, value in [("lag", 0.05), ("scene", "other.yaml")]:
         refused = remote.set(name, value)
         assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
+    assert not any(remote.set("gap", absurd).successful for absurd in (1e308, 5e-324))
     assert remote.set("gap", 0.2).successful
     assert not remote.set("payload", -2.0).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)

@@ -205,6 +205,14 @@ def test_reset_and_rezero(node: Any, rig: Rig, remote: Any) -> None:
     rig.goes_on()
 
 
+def test_a_flood_of_resets_does_not_keep_the_node_busy(node: Any, rig: Rig, remote: Any) -> None:
+    """Every start from rest takes as long as hundreds of steps; one a second is done, and the others are told."""
+    answers = [remote.trigger("reset") for _ in range(20)]
+    assert answers[0].success
+    assert any("less than 1 s ago" in answer.message for answer in answers if not answer.success)
+    rig.goes_on()
+
+
 def test_two_nodes_in_two_namespaces(spawn_node: Callable[..., Any], domain: None) -> None:
     rigs: list[Rig] = []
     try:

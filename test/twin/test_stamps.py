@@ -78,7 +78,7 @@ def test_a_pause_is_caught_up(samples, clean, at, pause):
     twin = copy.deepcopy(clean[1][at])
     found = tips(twin, samples[at + pause : at + pause + AFTER + 1])
     away = misses(clean, found, at + pause, at + pause + AFTER + 1)
-    assert len(away) == AFTER + 1 and away[-1] < 0.010 and twin.counts == {"gap": 1}
+    assert len(away) == len(samples[at + pause : at + pause + AFTER + 1]) and away[-1] < 0.010 and twin.counts == {"gap": 1}
 
 
 @pytest.mark.parametrize("shift", [7200_000, -7200_000, 2500, -2500])
@@ -93,6 +93,42 @@ def test_a_second_source_is_refused_and_told(samples, clean, shift):
     got = [report.prediction.tip_position for report in reports if report.prediction is not None]
     expected = [prediction.tip_position for prediction in clean[0][700:1100]]
     assert all(np.array_equal(a, b) for a, b in zip(got, expected, strict=True))
+
+
+@pytest.mark.parametrize("apart", [1, 1000, 5 * MS])
+@pytest.mark.parametrize("off", [0.0, 0.05])
+def test_pairs_of_stray_stamps_do_not_confirm_one_another(samples, clean, apart, off):
+    """A second publisher, twice as fast, whose stamps lie anywhere, two by two in order; the first one is single."""
+    twin, reports, rng = copy.deepcopy(clean[1][700]), [], np.random.default_rng(1)
+    for k, s in enumerate(samples[700:1100]):
+        reports.append(twin.update(s))
+        stamp = s.stamp + int(rng.choice([-1, 1]) * 10.0 ** rng.uniform(9.5, 18.0))
+        twin.update(Sample(s.stream, stamp, s.values + off))
+        if k:
+            twin.update(Sample(s.stream, stamp + apart, s.values + off))
+    got = [report.prediction.tip_position for report in reports]
+    expected = [prediction.tip_position for prediction in clean[0][700:1100]]
+    assert all(np.array_equal(a, b) for a, b in zip(got, expected, strict=True))
+
+
+def test_a_caller_may_use_its_array_again(samples, scene):
+    one, other, values, residuals = Twin(scene), Twin(scene), np.empty(4), []
+    for s in samples[:20]:
+        for twin, given in ((one, s.values.copy()), (other, values)):
+            given[:] = 0.5
+            pending = twin.update(Sample(Stream.ANGLES, s.stamp, given))
+            given[:] = s.values
+            report = twin.update(Sample(s.stream, s.stamp, given))
+            assert not pending.residuals
+            residuals.append(report.residuals[0].values)
+    assert all(np.array_equal(a, b) for a, b in zip(residuals[::2], residuals[1::2], strict=True))
+
+
+def test_a_masked_value_is_missing(samples, scene):
+    twin = Twin(scene)
+    twin.update(samples[0])
+    masked = np.ma.masked_array(samples[1].values, mask=[True, False, False, False])
+    assert twin.update(Sample(Stream.STROKES, samples[1].stamp, masked)).events == ("partial",)
 
 
 def test_equal_stamps_with_other_values_are_a_second_source(samples, clean):
@@ -150,6 +186,9 @@ def test_strokes_out_of_their_range_are_told(scene, samples):
         ((Stream.IMU, 1, [0.0]), "2 numbers"),
         ((Stream.ANGLES, 1, ["a", "b", "c", "d"]), "joint_1..joint_4"),
         ((Stream.ANGLES, 1, None), "joint_1..joint_4"),
+        ((Stream.STROKES, 1, np.zeros(4) + 1j), "no numbers"),
+        ((Stream.STROKES, 1, ["0.1", "0.2", "0.3", "0.4"]), "no numbers"),
+        ((Stream.STROKES, 1, [True, False, True, False]), "no numbers"),
     ],
 )
 def test_samples_made_wrongly_are_refused_with_the_remedy(scene, sample, words):
