@@ -34,7 +34,7 @@ from .io.session_model import SessionScene, baseline_of, scene_of
 from .io.sheet import Sheet
 from .io.topics import Topics
 from .io.writer import FILE_NAME
-from .records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream
+from .records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .scene.parts import Scene
 from .settings import Settings
 from .study.rewrite import anew
@@ -195,7 +195,7 @@ def replay_into(
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    recording, other_boom = Recording(), OtherBoom()
+    recording, other_boom, read = Recording(), OtherBoom(), np.zeros(joints, dtype=bool)
     with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
@@ -214,6 +214,8 @@ def replay_into(
                 continue
             report = twin.update(sample)
             recording.add(report)
+            if not recording.predictions and sample.stream is Stream.STROKES:
+                read |= np.isfinite(sample.values)
             for each in report.all:
                 behind.put(each)
             _refuse(session, taken, other_boom.took(sample, report))
@@ -223,7 +225,7 @@ def replay_into(
     twin.counts.update(ahead.oddities)
     if not recording.predictions:
         raise BagError(
-            f"{session.path}: no stroke sample could be used ({_told(twin)}). "
+            f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
             f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
             "and stamps."
         )
@@ -299,6 +301,12 @@ def _unhurried_collector() -> Iterator[None]:
     finally:
         gc.enable()
         gc.unfreeze()
+
+
+def _never_read(read: NDArray[np.bool_]) -> str:
+    """Which cylinders never had a value, if others had."""
+    silent = [name for name, came in zip(channels_of(len(read))[Stream.STROKES], read, strict=True) if not came]
+    return f", because {', '.join(silent)} never had a value" if silent and read.any() else ""
 
 
 def _told(twin: Twin) -> str:

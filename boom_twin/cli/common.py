@@ -38,7 +38,7 @@ def open_scene(source: str | None) -> Scene:
     from ..scene.load import examine  # not for commands that open no scene
 
     scene, oddities = examine(source)
-    tell(oddities)
+    tell(oddities, source)
     return scene
 
 
@@ -48,14 +48,14 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
 
     found = scene_of(Path(session), source)
     print(f"scene: {found.source} (sha256 {found.sha256[:12]}..)", file=sys.stderr)
-    tell(found.oddities)
+    tell(found.oddities, found.source)
     return found
 
 
-def tell(oddities: Iterable[Fault]) -> None:
-    """Print warnings on stderr."""
+def tell(oddities: Iterable[Fault], source: str | None) -> None:
+    """Print warnings on stderr, with the file that they are about."""
     for oddity in oddities:
-        print(f"warning: {oddity}", file=sys.stderr)
+        print(f"warning: {source}: {oddity}", file=sys.stderr)
 
 
 def warn_incomplete(session: Session) -> None:

@@ -110,7 +110,8 @@ def _sheet(args: Namespace) -> Sheet:
 
     load_settings(args.params)
     scene = None if args.scene is None else scene_from(args.scene)
-    tell(() if scene is None else scene.oddities)
+    if scene is not None:
+        tell(scene.oddities, scene.source)
     if args.baseline:
         load_baseline(args.baseline)
     return Sheet(

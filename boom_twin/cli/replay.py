@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,8 +107,8 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         if value is None:
             lines.append(f"joint {i + 1} residual   not measured")
             continue
-        spread = summary["joint_residual_normalised_std"][i]
-        lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {spread:.2f} of what is expected")
+        ratio = hypot(summary["joint_residual_normalised_mean"][i], summary["joint_residual_normalised_std"][i])
+        lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {ratio:.2f} of what is expected")
     for name, count in summary["events"].items():
         lines.append(f"{name:18s} {count}")
     if "tip_error_rms_m" in summary:

@@ -41,7 +41,7 @@ def run(args: Namespace) -> int:
     from ..truth import FILE_NAME
 
     assumed, out = scene_from(args.scene), Path(args.out)
-    tell(assumed.oddities)
+    tell(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     faults = [parse(text) for text in args.fault]

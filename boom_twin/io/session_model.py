@@ -77,7 +77,7 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
     if own is None:
         return scene_from(given)
     try:
-        scene, oddities = examine_text(own.text, own.source)
+        scene, oddities = examine_text(own.text, own.source, whole=_recorded_sha256(session) == sha256(own.text))
     except SceneError as error:
         more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
         raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None
@@ -86,11 +86,17 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
 
 def _changed(session: Path, own: Kept) -> list[Fault]:
     """That the text is not the one that was recorded."""
-    digest = kept(session, "scene_sha256", "--scene")
-    if digest is None or digest.text == sha256(own.text):
+    digest = _recorded_sha256(session)
+    if digest is None or digest == sha256(own.text):
         return []
     bound = f"{own.source} has {sha256(own.text)[:12]}..: it was changed since the session was made"
-    return [Fault("scene_sha256", digest.text, bound, "Give the scene that is right by --scene.")]
+    return [Fault("scene_sha256", digest, bound, "Give the scene that is right by --scene.")]
+
+
+def _recorded_sha256(session: Path) -> str | None:
+    """That of the scene's text as it was when the session was made."""
+    digest = kept(session, "scene_sha256", "--scene")
+    return None if digest is None else digest.text
 
 
 def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:

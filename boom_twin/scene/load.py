@@ -69,9 +69,9 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
     return examine_text(read_text(Path(source)), str(source))
 
 
-def examine_text(text: str, name: str) -> tuple[Scene, list[Fault]]:
-    """Like `examine`, of a scene's text; `name` is what it is called in errors."""
-    cut, unmarked = missing_end_mark(text)
+def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list[Fault]]:
+    """Like `examine`, of a scene's text; `name` is what it is called in errors; `whole`: a checksum says it is not cut off."""
+    cut, unmarked = (None, None) if whole else missing_end_mark(text)
     if cut is not None:
         raise SceneError(name, (cut,))
     document = parse(text, name)

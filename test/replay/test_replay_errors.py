@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
+from boom_twin.cli.replay import as_text
 from boom_twin.errors import BagError
 from boom_twin.io.factory import RosbagsTypes
 from boom_twin.io.places import fill_header
@@ -37,6 +38,22 @@ def test_missing_folder(tmp_path):
 def test_strokes_that_are_not_the_scenes(tmp_path):
     with pytest.raises(BagError, match=r"no stroke sample could be used.*cylinder_1\.\.4"):
         replay(session(tmp_path / "bag", strokes=[5.0, 5.0, 5.0, 5.0]), load_scene(), tmp_path / "out")
+
+
+def test_a_cylinder_without_a_single_value_is_named(tmp_path):
+    strokes = strokes_of_posture(load_scene(), "arch")
+    strokes[1] = np.nan
+    with pytest.raises(BagError, match=r"no stroke sample could be used.*because cylinder_2 never had a value"):
+        replay(session(tmp_path / "bag", strokes=strokes), load_scene(), tmp_path / "out")
+
+
+def test_a_constant_residual_is_not_said_to_be_as_expected(tmp_path):
+    result = replay(session(tmp_path / "bag"), load_scene(), tmp_path / "out")  # all angles recorded are 0: none is right
+    mean = np.abs(result.summary["joint_residual_normalised_mean"])
+    told = [line for line in as_text(result.summary) if line.endswith("of what is expected")]
+    ratios = [float(line.split("rms, ")[1].split()[0]) for line in told]
+    assert len(ratios) == 4 and (mean > 100).any()
+    np.testing.assert_array_less(mean, np.array(ratios) + 0.01)
 
 
 def test_a_damaged_file_names_itself(tmp_path):

@@ -66,6 +66,21 @@ def test_a_session_of_five_is_replayed_by_its_own_scene(five, tmp_path, capsys):
     assert len(feed.scene().sections) == 5
 
 
+def test_a_scene_that_its_checksum_shows_whole_needs_no_end_mark(tmp_path, capsys):
+    lines = [line for line in scene_text(3).splitlines() if "end of scene" not in line]
+    file = tmp_path / "mine.yaml"
+    file.write_text("\n".join(lines) + "\n")
+    bag = session(tmp_path / "bag", file.read_text(), keep=True)
+    assert main(["info", str(bag)]) == 0
+    assert "end of the file" not in capsys.readouterr().err
+    assert main(["info", str(bag), "--scene", str(file)]) == 0
+    assert f"warning: {file}: line " in (told := capsys.readouterr().err) and "end of the file" in told
+    sheet = bag / FILE_NAME
+    sheet.write_text("".join(line for line in sheet.read_text().splitlines(keepends=True) if "scene_sha256:" not in line))
+    assert main(["info", str(bag)]) == 0
+    assert "end of the file" in capsys.readouterr().err
+
+
 def test_without_its_scene_it_is_refused(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bare")
     assert main(arguments(bag, tmp_path / "out")) == 1
