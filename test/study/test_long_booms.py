@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin.analysis.statics import statics
+from boom_twin.scene.end_mark import with_end_mark
 from boom_twin.scene.load import examine
 from boom_twin.study.long_booms import long_boom, seven_sections
 
@@ -25,7 +26,7 @@ def test_the_seven_sections_pass_as_a_scene_file(tmp_path):
 
 def check(scene, folder):
     file = folder / "boom.yaml"
-    file.write_text(json.dumps(scene.model_dump(exclude_none=True, mode="json")))
+    file.write_text(with_end_mark(json.dumps(scene.model_dump(exclude_none=True, mode="json"))))
     loaded, oddities = examine(file)
     assert loaded == scene
     assert oddities == []
