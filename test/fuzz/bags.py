@@ -20,13 +20,14 @@ import zstandard
 from mcap.opcode import Opcode
 from numpy.random import Generator
 
-from boom_twin import load_scene, replay
+from boom_twin import load_scene
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.io.blocks import heads
 from boom_twin.io.damage import blame
 from boom_twin.io.reader import Session, scan
 from boom_twin.io.recover import recover
 from boom_twin.io.session import write_session
+from boom_twin.replay import replay
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 from .mcap_files import PREFIX, VARIANTS, joined, records, rewrite
