@@ -92,4 +92,3 @@ def too_fast(times: Array, rates: Array) -> tuple[str, ...]:
         for i, row in enumerate(speeds.argmax(axis=0))
         if speeds[row, i] > STROKE_RATE
     )
-

@@ -22,6 +22,7 @@ from .validity import motion_beyond_validity
 
 RHO = 0.8
 
+
 @dataclass(frozen=True)
 class Simulation:
     """Results at the rows of the drive. m rows, n sections.

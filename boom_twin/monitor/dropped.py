@@ -59,4 +59,3 @@ class Dropped:
         loss = self.by_topic.setdefault(topic, Loss(topic, 0, ""))
         loss.count, loss.reason = loss.count + 1, printable(reason[:LONGEST], keep="")
         LOG.getChild(topic).warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)
-

@@ -70,7 +70,7 @@ def add_domain(parser: ArgumentParser) -> None:
 
 @contextmanager
 def isolated(domain: int | None = None) -> Iterator[Isolation]:
-    """This process, and those that it starts, in a claimed domain on this computer only, until the end.
+    """Put this process, and those that it starts, into a claimed domain on this computer only, until the end.
 
     Parameters
     ----------
