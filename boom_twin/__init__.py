@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.simulate import simulate
     from .analysis.statics import statics
+    from .offline.replay import replay
     from .records import Report, Sample, Stream
-    from .replay import replay
     from .scene import Scene, load_scene
     from .settings import Settings, load_settings
     from .twin import Twin
@@ -34,7 +34,7 @@ _HOMES = {
     "Twin": "twin",
     "load_scene": "scene",
     "load_settings": "settings",
-    "replay": "replay",
+    "replay": "offline.replay",
     "simulate": "analysis.simulate",
     "statics": "analysis.statics",
 }

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from .deviations import specific_force
+from .offline.replay import Recording, Replay
 from .plan.compile import compile_scene
 from .records import Array, Residuals, Stream
-from .replay import Recording, Replay
 from .scene.kinematics import gravity_in_base
 from .scene.parts import Scene
 from .truth import TipTruth

@@ -61,7 +61,7 @@ def _check_place(out: Path) -> None:
 
 def _side(args: Namespace, path: Path, folder: Path) -> Side:
     from ..io.results import REPLAY, result_folder
-    from ..replay import replay_into
+    from ..offline.replay import replay_into
     from ..report.side import side_of, worked_out
     from ..settings import load_settings
 

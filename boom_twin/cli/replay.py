@@ -13,8 +13,8 @@ from .common import add_json, add_session_scene, open_session_scene, print_json,
 
 if TYPE_CHECKING:
     from ..io.session_model import SessionScene
+    from ..offline.replay import Replay
     from ..records import Array
-    from ..replay import Replay
     from ..settings import Settings
 
 
@@ -45,7 +45,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
     from ..io.results import REPLAY, result_folder
-    from ..replay import replay_into
+    from ..offline.replay import replay_into
     from ..report.loads import section_heights
     from ..settings import load_settings
 
@@ -93,7 +93,7 @@ def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
 
 def as_text(summary: dict[str, Any]) -> list[str]:
     """A short table."""
-    from ..replay import alarm_as_text
+    from ..offline.replay import alarm_as_text
 
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",

@@ -18,8 +18,8 @@ from ..io.outlet import Outlet
 from ..io.reader import Session, read, scan
 from ..io.session_model import SessionScene, baseline_of
 from ..io.topics import NODE, Output, Topic, Topics
+from ..offline.replay import scene_for
 from ..records import Change, Sample, Stream
-from ..replay import scene_for
 from ..scene.parts import Scene
 from ..settings import Settings
 from ..thresholds import Thresholds
@@ -103,7 +103,7 @@ def bag_feed(
     settings : Settings
         For the twin, where the session has no outputs.
     mapping : Path, optional
-        How topics and sensors are read; as for `boom_twin.replay.replay`.
+        How topics and sensors are read; as for `boom_twin.offline.replay.replay`.
     baseline : Path, optional
         What is known of this rig while all is well; likewise.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from ..replay import alarm_as_text
+from ..offline.replay import alarm_as_text
 from .quantities import Quantity
 from .side import Side
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from .. import __version__
 from ..io.atomic import write_atomic
+from ..offline.replay import NANO, Recording, Replay
 from ..records import Alarm, Array
-from ..replay import NANO, Recording, Replay
 from ..scene.parts import Scene
 from ..twin import EVENTS
 from ..view import AlarmSpan, History

@@ -15,9 +15,9 @@ from ..errors import BagError
 from ..health.baseline import Baseline
 from ..io.atomic import write_atomic
 from ..moments import stations
+from ..offline.replay import Recording
 from ..received import open_received
 from ..records import Array, Stream, channels_of
-from ..replay import Recording
 from ..scene.parts import Scene
 from ..settings import Settings
 from ..view import History

@@ -13,9 +13,9 @@ from ..errors import BagError
 from ..io.incomplete import incompleteness
 from ..io.session_model import baseline_of
 from ..io.writer import FILE_NAME as RESULT
+from ..offline.replay import Replay
 from ..pictures import history_of
 from ..received import holds_file, open_received
-from ..replay import Replay
 from ..scene.parts import Scene
 from ..settings import Settings
 from ..view import History

@@ -18,10 +18,10 @@ from ..io.atomic import write_atomic
 from ..io.reader import Session, scan
 from ..io.results import REPLAY, result_folder
 from ..io.session_model import scene_of
+from ..offline.replay import Replay, replay_into
 from ..pictures import draw, history_of
 from ..received import holds_file, open_received
 from ..records import Stream
-from ..replay import Replay, replay_into
 from ..truth import FILE_NAME as TRUTH
 from .company import Company, company
 from .isolation import add_domain

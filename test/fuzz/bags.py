@@ -27,7 +27,7 @@ from boom_twin.io.damage import blame
 from boom_twin.io.reader import Session, scan
 from boom_twin.io.recover import recover
 from boom_twin.io.session import write_session
-from boom_twin.replay import replay
+from boom_twin.offline.replay import replay
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 from .mcap_files import PREFIX, VARIANTS, joined, records, rewrite

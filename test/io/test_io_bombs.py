@@ -43,7 +43,7 @@ finally:
 """
 
 IMPORTS = {
-    "replay": "replay, boom_twin.replay, boom_twin.twin, boom_twin.view",
+    "replay": "replay, boom_twin.offline.replay, boom_twin.twin, boom_twin.view",
     "monitor": "monitor, boom_twin.monitor.bag, boom_twin.monitor.server, boom_twin.twin",
 }
 

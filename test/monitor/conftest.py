@@ -15,8 +15,8 @@ from boom_twin.io.session import write_session
 from boom_twin.io.topics import load_topics
 from boom_twin.monitor.bag import BagFeed, bag_feed
 from boom_twin.monitor.feed import Feed
+from boom_twin.offline.replay import replay
 from boom_twin.records import Stream
-from boom_twin.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 

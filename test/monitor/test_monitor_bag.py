@@ -24,7 +24,7 @@ from boom_twin.monitor.feed import Feed
 from boom_twin.monitor.lamps import Level, overall
 from boom_twin.monitor.playback import Playback
 from boom_twin.monitor.words import state
-from boom_twin.replay import replay
+from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.settings import Settings
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -47,3 +48,16 @@ def test_everything_of_ros_that_is_used_is_named() -> None:
 def test_names_are_in_order() -> None:
     names = [str(each.text) for each in PACKAGE.findall("exec_depend")]
     assert names == sorted(set(names))
+
+
+def test_no_module_hides_a_function_of_the_package():
+    """Importing every module first must leave the public names what they are."""
+    program = (
+        "import pkgutil, importlib, boom_twin\n"
+        "for found in pkgutil.iter_modules(boom_twin.__path__): importlib.import_module(f'boom_twin.{found.name}')\n"
+        "import boom_twin.offline.replay, boom_twin.analysis.simulate, boom_twin.analysis.statics\n"
+        "from boom_twin import load_scene, replay, simulate, statics\n"
+        "assert all(map(callable, (load_scene, replay, simulate, statics)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.replay import Recording
+from boom_twin.offline.replay import Recording
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.truth import TipTruth
 

@@ -25,7 +25,7 @@ from boom_twin.io.reader import scan
 from boom_twin.io.results import REPLAY, result_folder
 from boom_twin.io.session import write_session
 from boom_twin.monitor.bag import bag_feed
-from boom_twin.replay import replay_into
+from boom_twin.offline.replay import replay_into
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.settings import Settings
 

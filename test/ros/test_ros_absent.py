@@ -16,7 +16,7 @@ def _run(code: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_package_never_imports_rclpy() -> None:
     done = _run(
-        "import boom_twin, boom_twin.twin, boom_twin.replay, boom_twin.cli.main, boom_twin.ros, boom_twin.ros.main"
+        "import boom_twin, boom_twin.twin, boom_twin.offline.replay, boom_twin.cli.main, boom_twin.ros, boom_twin.ros.main"
     )
     assert (done.returncode, done.stderr) == (0, "")
 

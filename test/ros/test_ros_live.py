@@ -21,8 +21,8 @@ from boom_twin.io.outlet import Outlet
 from boom_twin.io.reader import read, scan
 from boom_twin.io.topics import TYPES, Output, load_topics
 from boom_twin.io.typestore import jazzy
+from boom_twin.offline.replay import replay
 from boom_twin.records import Stream
-from boom_twin.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.settings import load_settings
 from boom_twin.twin import Twin

@@ -29,8 +29,8 @@ from boom_twin.io.reader import read, read_both, scan
 from boom_twin.io.topics import TYPES, Output, load_topics
 from boom_twin.io.typestore import jazzy
 from boom_twin.io.writer import SessionWriter
+from boom_twin.offline.replay import replay
 from boom_twin.records import Stream
-from boom_twin.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text
 from boom_twin.settings import Settings

@@ -19,30 +19,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import __version__
-from .alarms import Alarms
-from .errors import BagError
-from .health.baseline import Baseline
-from .io.ahead import Ahead
-from .io.atomic import write_atomic
-from .io.behind import Behind
-from .io.boom_names import refuse_other_names
-from .io.mapping import mapping_of
-from .io.reader import Session, scan
-from .io.results import REPLAY, Building, result_folder
-from .io.session_model import SessionScene, baseline_of, scene_of
-from .io.sheet import Sheet
-from .io.topics import Topics
-from .io.writer import FILE_NAME
-from .records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
-from .scene.parts import Scene
-from .settings import Settings
-from .study.rewrite import anew
-from .truth import TipTruth, load_truth
-from .watch.other_boom import OtherBoom
+from .. import __version__
+from ..alarms import Alarms
+from ..errors import BagError
+from ..health.baseline import Baseline
+from ..io.ahead import Ahead
+from ..io.atomic import write_atomic
+from ..io.behind import Behind
+from ..io.boom_names import refuse_other_names
+from ..io.mapping import mapping_of
+from ..io.reader import Session, scan
+from ..io.results import REPLAY, Building, result_folder
+from ..io.session_model import SessionScene, baseline_of, scene_of
+from ..io.sheet import Sheet
+from ..io.topics import Topics
+from ..io.writer import FILE_NAME
+from ..records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..scene.parts import Scene
+from ..settings import Settings
+from ..study.rewrite import anew
+from ..truth import TipTruth, load_truth
+from ..watch.other_boom import OtherBoom
 
 if TYPE_CHECKING:
-    from .twin import Twin
+    from ..twin import Twin
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 NANO = 1e-9
@@ -283,7 +283,7 @@ def _ends(
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
-    from .twin import Twin
+    from ..twin import Twin
 
     twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline)
     twin.warm_up()
