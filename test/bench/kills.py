@@ -321,6 +321,8 @@ class Record(Target):
         run = Run(self.arguments(), self.place / "log")
         self._until(run)
         wrote = time.monotonic()
+        while not any(file.stat().st_size > 4000 for file in self.out.glob("*.mcap")) and time.monotonic() < wrote + 60.0:
+            time.sleep(0.05)  # until publisher and recorder have found each other
         time.sleep(2.0)
         run.process.send_signal(signal.SIGINT)
         run.finish()
