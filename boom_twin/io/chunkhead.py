@@ -83,6 +83,14 @@ def head_at(file: BinaryIO, offset: int) -> ChunkHead | None:
     return found if found.is_certain or (opcode == Opcode.CHUNK and name in _COMPRESSIONS) else None
 
 
+class UnsoundError(McapError):
+    """What does not fit in a chunk; `start` is what its own sizes unpack to, so that nobody unpacks it again."""
+
+    def __init__(self, reason: str, start: bytes = b"") -> None:
+        super().__init__(reason)
+        self.start = start
+
+
 def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudget) -> tuple[bytes, int]:
     """Content of a chunk in a file of `size` bytes, and the offset after it.
 
@@ -90,33 +98,45 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudg
 
     Raises
     ------
-    McapError
-        Says what does not fit.
+    UnsoundError
     """
     if head.crc == 0:
-        if not head.is_certain:
-            raise McapError("its lengths do not agree")
+        return _fitting_content(file, head, budget), head.after
+    reason, start = "its checksum does not fit its content", b""
+    for packed, compression in _readings(head, size):
+        for limit in dict.fromkeys((min(head.unpacked, LARGEST), LARGEST)):
+            try:
+                content = _unpacked(file, head, packed, compression, limit, budget)
+            except STUMBLES as error:
+                reason = str(error)
+                break
+            if zlib.crc32(content) == head.crc:
+                return content, head.offset + head.head + packed
+            reason = "its checksum does not fit its content"
+            if (packed, compression, limit) == (head.size, head.compression, head.unpacked):
+                start = content
+            if len(content) <= limit:
+                break  # there is no more
+    raise UnsoundError(reason, start)
+
+
+def _fitting_content(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
+    """Content of a chunk without a checksum; UnsoundError if anything does not fit."""
+    if not head.is_certain:
+        raise UnsoundError("its lengths do not agree")
+    try:
         content = _unpacked(file, head, head.size, head.compression, head.unpacked, budget)
-        if len(content) != head.unpacked:
-            raise McapError(f"unpacks to another size than the {head.unpacked} bytes that it states")
-        if len(whole_parts(content)) != len(content):
-            raise McapError("its records do not fill it")
-        return content, head.after
-    reason = "its checksum does not fit its content"
-    for packed, compression, unpacked in _readings(head, size):
-        try:
-            content = _unpacked(file, head, packed, compression, unpacked, budget)
-        except STUMBLES as error:
-            reason = str(error)
-            continue
-        if zlib.crc32(content) == head.crc:
-            return content, head.offset + head.head + packed
-        reason = "its checksum does not fit its content"
-    raise McapError(reason)
+    except STUMBLES as error:
+        raise UnsoundError(str(error)) from error
+    if len(content) != head.unpacked:
+        raise UnsoundError(f"unpacks to another size than the {head.unpacked} bytes that it states", content)
+    if len(whole_parts(content)) != len(content):
+        raise UnsoundError("its records do not fill it", content)
+    return content
 
 
 def loose_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
-    """The whole records at the start of a chunk that is cut off or wrong; no checksum vouches for them.
+    """The whole records at the start of a chunk that is cut off; no checksum vouches for them.
 
     Raises
     ------
@@ -132,13 +152,12 @@ def loose_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
     return whole_parts(content)
 
 
-def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str, int]]:
-    """Packed size, compression and unpacked size that are possible, those that the head states first."""
+def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str]]:
+    """Packed size and compression that are possible, those that the head states first."""
     room = min(size - head.offset - head.head, LARGEST)
     packed = dict.fromkeys(each for each in (head.size, PREFIX.size + head.length - head.head) if 0 < each <= room)
     known = [head.compression] if head.compression in _COMPRESSIONS else list(_COMPRESSIONS)
-    sizes = dict.fromkeys(each for each in (head.unpacked, LARGEST) if each <= LARGEST)
-    yield from product(packed, known, sizes)
+    yield from product(packed, known)
 
 
 def _unpacked(

@@ -26,7 +26,6 @@ PREFIX = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
 
-_LENGTH = struct.Struct("<xQ")
 _TOO_MUCH = "the most that is read. No recorder packs like that"
 _WINDOW = 2**27  # of zstd, as its command line allows without --long
 
@@ -79,7 +78,9 @@ class UnpackBudget:
         most = own + self.records
         count = place = 0
         while place + PREFIX.size <= len(content) and count <= most:
-            (length,) = _LENGTH.unpack_from(content, place)
+            opcode, length = PREFIX.unpack_from(content, place)
+            if opcode == 0:
+                break
             place, count = place + PREFIX.size + length, count + 1
         self.records -= max(0, min(count, most) - own)
         if count > most:
@@ -119,6 +120,8 @@ def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
         if start > size:
             raise McapError(f"{size - place} bytes are left at byte {place} of a chunk, too few for a record")
         opcode, length = PREFIX.unpack_from(content, place)
+        if opcode == 0:
+            raise McapError(f"record with opcode 0 at byte {place} of a chunk: there is none")
         place = start + length
         if place > size:
             raise McapError(f"record of {length} bytes at byte {start - PREFIX.size} of a chunk ends after the chunk")

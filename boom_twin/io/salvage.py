@@ -15,8 +15,8 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from ..received import open_received
-from .chunkhead import ChunkHead, head_at, loose_start, sound_content
-from .content import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError
+from .chunkhead import ChunkHead, UnsoundError, head_at, loose_start, sound_content
+from .content import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, whole_parts
 from .damage import STUMBLES
 from .ends import BLOCK
 
@@ -94,28 +94,27 @@ def _next(
         return ([Piece(offset, False, record)], offset + len(record)) if record else ([], None)
     if head.is_certain and head.after > size:
         reason = f"cut off, {size - offset} of {head.after - offset} bytes are there"
-        return _broken(file, head, size - offset, reason, unverified, budget), size
+        start = b""
+        if head.crc == 0 or unverified:
+            try:
+                start = loose_start(file, head, budget)
+            except UnpackError as error:
+                reason = str(error)
+        return _broken(head, size - offset, reason, start), size
     try:
         content, after = sound_content(file, head, size, budget)
         return [Piece(offset, head.crc != 0, content)], after
-    except STUMBLES as error:
+    except UnsoundError as error:
         if not head.is_certain:
             return [], None
-        return _broken(file, head, head.after - offset, str(error), unverified, budget), head.after
+        start = whole_parts(error.start) if head.crc == 0 or unverified else b""
+        return _broken(head, head.after - offset, str(error), start), head.after
 
 
-def _broken(
-    file: BinaryIO, head: ChunkHead, length: int, reason: str, unverified: bool, budget: UnpackBudget
-) -> list[Piece | Fault]:
-    """A chunk that is not sound, behind the whole records at its start where no checksum denies them or all are wanted."""
-    content = b""
-    if head.crc == 0 or unverified:
-        try:
-            content = loose_start(file, head, budget)
-        except UnpackError as error:
-            reason = str(error)
+def _broken(head: ChunkHead, length: int, reason: str, start: bytes) -> list[Piece | Fault]:
+    """A chunk that is not sound, behind the whole records at its start."""
     fault = Fault(head.offset, length, f"{head}: {reason}")
-    return [Piece(head.offset, False, content), fault] if content else [fault]
+    return [Piece(head.offset, False, start), fault] if start else [fault]
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:

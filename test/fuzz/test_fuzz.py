@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -32,13 +30,7 @@ def test_the_corpus(target: str, path: Path) -> None:
 
 
 def test_a_minute_of_new_cases(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "fuzz.run", "--seconds", str(SECONDS), "--seed", "3", "--out", str(tmp_path / "found")]
+    command = [sys.executable, "-m", "fuzz.run", "--seconds", str(SECONDS), "--seed", "1", "--out", str(tmp_path / "found")]
     path = {**os.environ, "PYTHONPATH": str(ROOT / "test")}
     done = subprocess.run(command, cwd=tmp_path, env=path, capture_output=True, text=True, timeout=1500)
-    found = re.findall(r"^(\w+): PYTHONPATH=test python (-m fuzz\.run .*)$", done.stdout, re.MULTILINE)
-    if found and {kind for kind, _ in found} == {"hang"}:  # on a busy machine; alone it has the processor for itself
-        for _, words in found:
-            alone = [sys.executable, *shlex.split(words)]
-            assert subprocess.run(alone, cwd=tmp_path, env=path, timeout=600, check=False).returncode == 0, done.stdout
-        return
     assert done.returncode == 0, done.stdout + done.stderr

@@ -19,6 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 from boom_twin.io.content import LARGEST, UnpackBudget, UnpackError
 from boom_twin.io.reader import scan
 from boom_twin.io.recover import recover
+from boom_twin.io.salvage import Fault, walk
 
 SIZE = 65536  # bytes of a file, at least
 SECONDS, MEGABYTES = 1.0, 400
@@ -60,6 +61,8 @@ DEFINED = record(3, struct.pack("<H", 1) + text("std_msgs/msg/Empty") + text("ro
 DEFINED += record(4, struct.pack("<HH", 1, 1) + text("/empty") + text("cdr") + struct.pack("<I", 0))
 MESSAGE = record(5, struct.pack("<HIQQ", 1, 0, 5, 5) + b"\0\1\0\0")
 CONTENTS = {"zeros": bytes(LARGEST), "messages": DEFINED + MESSAGE * ((LARGEST - len(DEFINED)) // len(MESSAGE))}
+UNPACK = UnpackBudget.unpack
+WORDS = {"zeros": "there is none", "messages": "the most that is read. No recorder packs like that"}
 SUMS = {"wrong": lambda content: 1, "right": zlib.crc32, "none": lambda content: 0}
 
 
@@ -100,8 +103,17 @@ def test_recovery_of_a_bomb_ends_soon(bombs: Path, tmp_path: Path, compression: 
     path = bombs / f"{compression}_{content}_{crc}{cut}.mcap"
     used, said = measured("recover", path, "--out", tmp_path / "out", "--unverified")
     assert used["seconds"] < SECONDS * max(1.0, path.stat().st_size / SIZE) and used["peak"] < MEGABYTES
-    assert used["code"] == 1 and "the most that is read. No recorder packs like that" in said
+    assert used["code"] == 1 and WORDS[content] in said
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("cut", ["", "_cut"])
+@pytest.mark.parametrize("name", ["lz4_zeros_wrong", "lz4_zeros_none", "zstd_messages_wrong"])
+def test_a_chunk_that_is_not_sound_is_unpacked_once(bombs: Path, monkeypatch: pytest.MonkeyPatch, name: str, cut: str) -> None:
+    path, unpacked = bombs / f"{name}{cut}.mcap", []
+    monkeypatch.setattr(UnpackBudget, "unpack", lambda *of: unpacked.append(len(of[1].data)) or UNPACK(*of))
+    faults = [each for each in walk(path, unverified=True) if isinstance(each, Fault)]
+    assert faults and len(unpacked) == len([each for each in faults if "chunk" in each.reason])
 
 
 READ = (("info", "zstd"), ("info", "lz4"), ("replay", "zstd"), ("monitor", "zstd"))
@@ -126,7 +138,7 @@ def test_a_bomb_takes_nothing_from_chunks_that_are_not() -> None:
     budget = UnpackBudget()
     for _ in range(20):
         with pytest.raises(UnpackError, match="bytes unpack to more than"):
-            budget.unpack(packed_chunk(CONTENTS["zeros"]), LARGEST)
+            budget.unpack(packed_chunk(CONTENTS["messages"]), LARGEST)
     assert budget.records == 0
     random = np.random.default_rng(1)
     messages = (struct.pack("<HIQQ", 1, i, i * 5_000_000, i * 5_000_000) + random.bytes(8) for i in range(20_000))
