@@ -407,20 +407,28 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()), help="(the time)")
     args = parser.parse_args()
     names = args.commands.split(",")
-    os.environ |= {"ROS_DOMAIN_ID": str(150 + os.getpid() % 10), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    if "record" not in names:
+        return _run(names, args.count, args.seed)
+    from boom_twin.ros.isolation import isolated
+
+    with isolated():
+        return _run(names, args.count, args.seed)
+
+
+def _run(names: list[str], total: int, seed: int) -> int:
     place = Path(tempfile.mkdtemp(prefix="boom_twin_kills_"))
     began = time.monotonic()
     for number, name in enumerate(names):
-        count = args.count * (number + 1) // len(names) - args.count * number // len(names)
+        count = total * (number + 1) // len(names) - total * number // len(names)
         try:
-            found = kills(name, count, place, args.seed)
+            found = kills(name, count, place, seed)
         except Broken as error:
             print(error)
             return 1
         for (hit, left), times in sorted(found.items()):
             print(f"{name:10s} {times:5d}  hit: {hit:14s} left: {left}", flush=True)
     shutil.rmtree(place)
-    print(f"{args.count} kills in {time.monotonic() - began:.0f} s: no recording lost, nothing unfinished taken for whole")
+    print(f"{total} kills in {time.monotonic() - began:.0f} s: no recording lost, nothing unfinished taken for whole")
     return 0
 
 

@@ -10,10 +10,10 @@ from bench.kills import kills
 
 
 @pytest.mark.parametrize(("command", "count", "needs"), [("replay", 4, "numpy"), ("rig", 4, "exudyn"), ("record", 12, "rclpy")])
-def test_kills(command: str, count: int, needs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kills(command: str, count: int, needs: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     pytest.importorskip(needs)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "158")
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    if needs == "rclpy":
+        request.getfixturevalue("isolation")
     seed = time.time_ns() % 10**6
     print(f"seed {seed}")
     assert kills(command, count, tmp_path, seed).total() == count

@@ -17,7 +17,7 @@ import pytest
 
 from boom_twin.io.intake import stamp_of
 from boom_twin.io.session import write_session
-from boom_twin.ros.isolation import Isolation, isolated
+from boom_twin.ros.isolation import Isolation
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
@@ -63,13 +63,6 @@ class Process:
             os.killpg(self._child.pid, signal.SIGKILL)
         self._child.wait()
         self._file.close()
-
-
-@pytest.fixture(scope="session")
-def isolation() -> Iterator[Isolation]:
-    """A ROS domain that only this test run uses, closed to others."""
-    with isolated() as claimed:
-        yield claimed
 
 
 @pytest.fixture(scope="module")
