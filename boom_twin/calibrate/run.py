@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BagError, UsageError
-from ..io.mapping import Mapped, mapping_of
+from ..io.session_model import Mapped, mapping_of
 from ..records import Stream
 from ..scene.named import with_parameters
 from ..scene.parts import Scene

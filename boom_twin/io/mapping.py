@@ -1,9 +1,8 @@
-"""Read a mapping: a YAML file, or the one that a session was recorded with; whatever it leaves out is as usual."""
+"""Read a mapping, a YAML file; whatever it leaves out is as usual."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,10 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from ..errors import BagError, Fault, UsageError
-from ..plain import plain, read_plain
+from ..errors import Fault, UsageError
+from ..plain import read_plain
 from .sensors import Sensor, kind_faults, set_faults, stream_of, usual
-from .sheet import kept
 from .topics import TYPES, Qos, Topic, Topics, default_document, load_topics
-
-DEFAULT_NAME = "default mapping"
 
 _REMEDIES = {
     "name": "Give the name as it is published.",
@@ -29,14 +25,6 @@ _REMEDIES = {
     "depth": "Give a number of messages.",
 }
 _SEE = "See the comments in msg_config/topics.yaml."
-
-
-@dataclass(frozen=True, slots=True)
-class Mapped:
-    """Topics, and where they were read from."""
-
-    topics: Topics
-    source: str
 
 
 def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
@@ -55,32 +43,11 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
     """
     if path is None:
         return load_topics()
-    return _topics(read_plain(path, UsageError, "Give a file like msg_config/topics.yaml."), str(path), joints)
+    return mapping_from(read_plain(path, UsageError, "Give a file like msg_config/topics.yaml."), str(path), joints)
 
 
-def mapping_of(session: Path, path: Path | None = None, joints: int | None = None) -> Mapped:
-    """The mapping for a recorded session: that of `path`; else that in its ``session.yaml``; else the package's own.
-
-    Raises
-    ------
-    UsageError
-        As `load_mapping`.
-    BagError
-        ``session.yaml`` cannot be read.
-    """
-    if path is not None:
-        return Mapped(load_mapping(path, joints), str(path))
-    own = kept(session, "mapping", "--mapping")
-    if own is not None:
-        try:
-            return Mapped(_topics(plain(own.text), own.source, joints), own.source)
-        except ValueError as error:
-            raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None
-    return Mapped(load_topics(), DEFAULT_NAME)
-
-
-def _topics(document: Any, source: str, joints: int | None) -> Topics:
-    """The topics of a document; UsageError with all faults."""
+def mapping_from(document: Any, source: str, joints: int | None = None) -> Topics:
+    """The topics and sensors of a document read from `source`; UsageError with all faults, as `load_mapping`."""
     if not isinstance(document, dict | None):
         raise UsageError(f"{source}: a list or a value: keys inputs, outputs, sensors are needed. {_SEE}")
     usual_values = default_document()

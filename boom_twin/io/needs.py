@@ -10,8 +10,8 @@ from ..records import Stream
 from .boom_names import other_names
 from .definitions import check_encoding
 from .info import BagInfo
-from .mapping import mapping_of
 from .reader import check_topic
+from .session_model import mapping_of
 from .tally import NANO, Tally
 from .topics import Topics
 

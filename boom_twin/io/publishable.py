@@ -8,9 +8,9 @@ from typing import Any
 
 from ..errors import BagError
 from ..records import Stream
-from .mapping import mapping_of
 from .offered import profiles
 from .reader import Session, TopicInfo, check_topic
+from .session_model import mapping_of
 from .topics import Qos, Topics
 
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)

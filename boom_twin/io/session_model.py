@@ -1,4 +1,4 @@
-"""The scene and the baseline that a session is read with: as given, else as the session keeps them, else the package's own."""
+"""The scene, the baseline and the mapping of a session: as given, else as the session keeps them, else the package's own."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from ..plain import plain
 from ..scene.load import DEFAULT_NAME, default_text, examine_text
 from ..scene.parts import Scene
 from ..scene.read import read_text
+from .mapping import load_mapping, mapping_from
 from .sheet import Kept, kept, sha256
+from .topics import Topics
 
 DEFAULT_BASELINE = "default baseline"
+DEFAULT_MAPPING = "default mapping"
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,14 @@ class SessionBaseline:
     """A baseline, and where it was taken from."""
 
     baseline: Baseline
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Topics and sensors, and where they were read from."""
+
+    topics: Topics
     source: str
 
 
@@ -116,3 +127,29 @@ def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
         except (UsageError, ValueError) as error:
             raise BagError(f"{own.source}: {error} Give the baseline by --baseline.") from None
     return SessionBaseline(load_baseline(given), str(given or DEFAULT_BASELINE))
+
+
+def mapping_of(session: Path, given: Path | None = None, joints: int | None = None) -> Mapped:
+    """The mapping of a session, found as its scene is by `scene_of`.
+
+    Parameters
+    ----------
+    session : Path
+    given : Path, optional
+    joints : int, optional
+        As for `boom_twin.io.mapping.load_mapping`.
+
+    Raises
+    ------
+    UsageError
+        As `boom_twin.io.mapping.load_mapping`.
+    BagError
+        ``session.yaml`` cannot be read.
+    """
+    own = kept(session, "mapping", "--mapping") if given is None else None
+    if own is None:
+        return Mapped(load_mapping(given, joints), DEFAULT_MAPPING if given is None else str(given))
+    try:
+        return Mapped(mapping_from(plain(own.text), own.source, joints), own.source)
+    except ValueError as error:
+        raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None

@@ -13,10 +13,9 @@ from ..errors import BagError, BoomTwinError
 from ..health.baseline import Baseline
 from ..io.ahead import Ahead
 from ..io.boom_names import refuse_other_names
-from ..io.mapping import mapping_of
 from ..io.outlet import Outlet
 from ..io.reader import Session, read, scan
-from ..io.session_model import SessionScene, baseline_of
+from ..io.session_model import SessionScene, baseline_of, mapping_of
 from ..io.topics import NODE, Output, Topic, Topics
 from ..offline.replay import scene_for
 from ..records import Change, Sample, Stream

@@ -27,10 +27,9 @@ from ..io.ahead import Ahead
 from ..io.atomic import write_atomic
 from ..io.behind import Behind
 from ..io.boom_names import refuse_other_names
-from ..io.mapping import mapping_of
 from ..io.reader import Session, scan
 from ..io.results import REPLAY, Building, result_folder
-from ..io.session_model import SessionScene, baseline_of, scene_of
+from ..io.session_model import SessionScene, baseline_of, mapping_of, scene_of
 from ..io.sheet import Sheet
 from ..io.topics import Topics
 from ..io.writer import FILE_NAME

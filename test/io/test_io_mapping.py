@@ -13,7 +13,8 @@ from ruamel.yaml import YAML
 
 from boom_twin.errors import BagError, UsageError
 from boom_twin.io.bagmeta import dump
-from boom_twin.io.mapping import DEFAULT_NAME, load_mapping, mapping_of
+from boom_twin.io.mapping import load_mapping
+from boom_twin.io.session_model import DEFAULT_MAPPING, mapping_of
 from boom_twin.io.sheet import FILE_NAME, Sheet
 from boom_twin.io.topics import DEFAULT_FILE, load_topics
 from boom_twin.records import Stream
@@ -152,9 +153,9 @@ def test_a_session_is_read_as_it_was_recorded(tmp_path: Path, write: Any) -> Non
     assert mapping_of(bag / "session_0.mcap").topics == mapped.topics
     other = write("sensors: {joint_1: {absolute: head}}")
     assert mapping_of(bag, other).topics.mounts(2) == ["head", None] and mapping_of(bag, other).source == str(other)
-    assert mapping_of(tmp_path / "elsewhere").source == DEFAULT_NAME
+    assert mapping_of(tmp_path / "elsewhere").source == DEFAULT_MAPPING
     (bag / FILE_NAME).write_text("note: of an older version\n")
-    assert mapping_of(bag).source == DEFAULT_NAME
+    assert mapping_of(bag).source == DEFAULT_MAPPING
 
 
 @pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: [", "a: b: c"])

@@ -13,9 +13,9 @@ import pytest
 
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.io.mapping import mapping_of
 from boom_twin.io.reader import scan
 from boom_twin.io.recover import recover
+from boom_twin.io.session_model import mapping_of
 from boom_twin.received import holds_file, open_received
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read
