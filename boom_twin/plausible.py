@@ -28,34 +28,31 @@ class Plausible:
         self.estimate: Array | None = None
         self._stamp = self._trusted = self._before = 0
         self._others = 0
-        self._looked_at: tuple[Array, bool] | None = None
+        self._looked_at: tuple[Array, float, bool] | None = None
 
     def is_of_others(self, stamp: int, values: Array, settings: Settings) -> bool:
         """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
-        if self._are_near(stamp, values, settings) or np.count_nonzero(self._are_far(stamp, values, settings)) < 2:
+        limit, is_near = self._look(stamp, values, settings)
+        if is_near or np.count_nonzero(self._are_far(values, limit)) < 2:
             self._others = 0
             return False
         self._others += 1
         return self._others <= MOST
 
-    def _are_near(self, stamp: int, values: Array, settings: Settings) -> bool:
-        """Whether no stroke is missing, or where its cylinder cannot be; looked at once for a sample."""
+    def _look(self, stamp: int, values: Array, settings: Settings) -> tuple[float, bool]:
+        """How far strokes may be from their estimates, m, and whether none is further or missing; once for a sample."""
         assert self.estimate is not None
         if self._looked_at is None or self._looked_at[0] is not values:
-            limit = self._limit(stamp, settings)
-            pairs = zip(values.tolist(), self.estimate.tolist(), strict=True)  # of a few floats, faster than arrays
-            self._looked_at = values, all(abs(value - expected) <= limit for value, expected in pairs)
-        return self._looked_at[1]
+            span = (stamp - self._stamp) * NANO
+            limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
+            pairs = zip(values.tolist(), self.estimate.tolist(), strict=True)  # few: faster one by one than as arrays
+            self._looked_at = values, limit, all(abs(value - expected) <= limit for value, expected in pairs)
+        return self._looked_at[1:]
 
-    def _are_far(self, stamp: int, values: Array, settings: Settings) -> Flags:
-        """Which strokes are where their cylinders cannot be; shape (n,)."""
+    def _are_far(self, values: Array, limit: float) -> Flags:
+        """Which strokes are further than `limit` (m) from their estimates; shape (n,)."""
         assert self.estimate is not None
-        return np.asarray(np.abs(values - self.estimate) > self._limit(stamp, settings))
-
-    def _limit(self, stamp: int, settings: Settings) -> float:
-        """How far (m) strokes may be from their estimates."""
-        limit: float = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * ((stamp - self._stamp) * NANO)
-        return limit
+        return np.asarray(np.abs(values - self.estimate) > limit)
 
     def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
         """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events."""
@@ -63,12 +60,12 @@ class Plausible:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
             self._stamp = self._trusted = stamp
             return values, []
-        is_near, self._looked_at = self._are_near(stamp, values, settings), None
+        limit, is_near = self._look(stamp, values, settings)
+        self._stamp, self._looked_at = stamp, None
         if is_near:
-            self._stamp = self._trusted = stamp
+            self._trusted = stamp
             return values, []
-        far, self._stamp = self._are_far(stamp, values, settings), stamp
-        return self._doubted(stamp, values, far)
+        return self._doubted(stamp, values, self._are_far(values, limit))
 
     def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         assert self.estimate is not None
