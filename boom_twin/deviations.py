@@ -130,5 +130,5 @@ class Deviations:
 def specific_force(prediction: Prediction, gravity: Array) -> Array:
     """What an IMU at the tip feels along its x and z, shape (2,), m/s^2."""
     c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
-    ax, ay = prediction.tip_acceleration - gravity
+    ax, ay = (prediction.tip_acceleration - gravity).tolist()
     return np.array([c * ax + s * ay, c * ay - s * ax])

@@ -40,22 +40,22 @@ class Edge:
         UsageError
             See `boom_twin.twin.Twin.update`.
         """
-        values = sample.values
+        stream, stamp, values = sample.stream, sample.stamp, sample.values
         if (
-            type(sample.stamp) is not int
-            or type(values) is not np.ndarray
-            or values.dtype is not FLOAT
-            or type(sample.stream) is not Stream
-            or not -LIMIT <= sample.stamp < LIMIT
-            or values.shape != self._shapes[sample.stream]
+            type(stamp) is int
+            and type(values) is np.ndarray
+            and values.dtype is FLOAT
+            and type(stream) is Stream
+            and -LIMIT <= stamp < LIMIT
+            and values.shape == self._shapes[stream]
         ):
-            stream = _stream(sample.stream)
-            sample = Sample(stream, _stamp(sample.stamp), self._values(stream, sample.values))
+            values = values.copy()
         else:
-            sample = Sample(sample.stream, sample.stamp, values.copy())
-        if not self._is_sure and sample.stream is Stream.STROKES:
-            self._look(sample.stamp)
-        return sample
+            stream = _stream(stream)
+            stamp, values = _stamp(stamp), self._values(stream, values)
+        if not self._is_sure and stream is Stream.STROKES:
+            self._look(stamp)
+        return Sample(stream, stamp, values)
 
     def _look(self, stamp: int) -> None:
         """Whether stamps are nanoseconds; those that once were are never doubted, and one alone again and again is no sign."""

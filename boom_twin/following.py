@@ -38,6 +38,8 @@ class Following:
     plan : Plan
     live : State
         The boom as predicted by the newest sample.
+    variances : ndarray, shape (n,)
+        Of the newest strokes' estimates, m^2.
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
@@ -51,18 +53,14 @@ class Following:
         )
         self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
         self._newest, self._paused = 0.0, -math.inf
-        self._row = np.zeros(4 * self.plan.joints + 11 + 4 * len(self.plan.pins))
+        n = self.plan.joints
+        self._row = np.zeros(4 * n + 11 + 4 * len(self.plan.pins))
+        self.variances: Array = self._row[3 * n + 9 : 4 * n + 9]
 
     @property
     def angles(self) -> Array:
         """Joint angles (rad) of the rigid boom at the newest strokes, shape (n,)."""
         return self._track.angles
-
-    @property
-    def variances(self) -> Array:
-        """Of the newest strokes' estimates, m^2, shape (n,)."""
-        n = self.plan.joints
-        return self._row[3 * n + 9 : 4 * n + 9]
 
     @property
     def passes(self) -> int:

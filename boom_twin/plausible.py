@@ -28,26 +28,31 @@ class Plausible:
         self.estimate: Array | None = None
         self._stamp = self._trusted = self._before = 0
         self._others = 0
-        self._away: tuple[Array, Array, float, bool] | None = None
+        self._looked_at: tuple[Array, float, bool] | None = None
 
     def is_of_others(self, stamp: int, values: Array, settings: Settings) -> bool:
         """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
-        away, limit, is_near = self._distances(stamp, values, settings)
-        if is_near or np.count_nonzero(away > limit) < 2:
+        limit, is_near = self._look(stamp, values, settings)
+        if is_near or np.count_nonzero(self._are_far(values, limit)) < 2:
             self._others = 0
             return False
         self._others += 1
         return self._others <= MOST
 
-    def _distances(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, float, bool]:
-        """From the estimates (n,), how far strokes may be from them, m, and whether all are within; once for a sample."""
+    def _look(self, stamp: int, values: Array, settings: Settings) -> tuple[float, bool]:
+        """How far strokes may be from their estimates, m, and whether none is further or missing; once for a sample."""
         assert self.estimate is not None
-        if self._away is None or self._away[0] is not values:
+        if self._looked_at is None or self._looked_at[0] is not values:
             span = (stamp - self._stamp) * NANO
             limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-            away = np.abs(values - self.estimate)
-            self._away = values, away, limit, bool(np.maximum.reduce(away) <= limit)
-        return self._away[1:]
+            pairs = zip(values.tolist(), self.estimate.tolist(), strict=True)  # few: faster one by one than as arrays
+            self._looked_at = values, limit, all(abs(value - expected) <= limit for value, expected in pairs)
+        return self._looked_at[1:]
+
+    def _are_far(self, values: Array, limit: float) -> Flags:
+        """Which strokes are further than `limit` (m) from their estimates; shape (n,)."""
+        assert self.estimate is not None
+        return np.asarray(np.abs(values - self.estimate) > limit)
 
     def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
         """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events."""
@@ -55,12 +60,12 @@ class Plausible:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
             self._stamp = self._trusted = stamp
             return values, []
-        away, limit, is_near = self._distances(stamp, values, settings)
-        self._stamp, self._away = stamp, None
+        limit, is_near = self._look(stamp, values, settings)
+        self._stamp, self._looked_at = stamp, None
         if is_near:
             self._trusted = stamp
             return values, []
-        return self._doubted(stamp, values, away > limit)
+        return self._doubted(stamp, values, self._are_far(values, limit))
 
     def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         assert self.estimate is not None

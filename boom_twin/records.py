@@ -29,6 +29,8 @@ class Stream(Enum):
     ANGLES = "joint_angles"
     IMU = "tip_imu"
 
+    __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
+
 
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
     """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""

@@ -62,8 +62,8 @@ class Stamps:
     def take(self, stamp: int) -> None:
         """Go on with this stamp; samples that are held were stray."""
         if self.newest is not None:
-            span = stamp - self.newest
-            self.usual = self.usual + SMOOTHING * (min(span, 2.0 * self.usual) - self.usual) if self.usual else float(span)
+            span, usual = stamp - self.newest, self.usual
+            self.usual = usual + SMOOTHING * (min(span, 2.0 * usual) - usual) if usual else float(span)
         self.newest = stamp
         if self.held:
             self._other, self.held, self._strayed = self.held[-1][0].stamp, [], stamp

@@ -6,6 +6,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from operator import gt, lt
 
 import numpy as np
 
@@ -133,8 +134,9 @@ class Twin:
         self._build()
         self._channels = channels_of(self.plan.joints)
         self._lines = {stream: Stamps(self.settings) for stream in Stream}
-        self._travel = [joint.cylinder.max_stroke for joint in scene.joints]
         self._beyond = FAR * self.settings.stroke_variance**0.5
+        self._shortest = [-self._beyond] * len(scene.joints)
+        self._longest = [joint.cylinder.max_stroke + self._beyond for joint in scene.joints]
         self._edge = Edge(self._channels)
         self._run: _Run | None = None
         self._failed: int | None = None
@@ -228,7 +230,7 @@ class Twin:
             channel. Nothing has changed then.
         """
         sample = self._edge.checked(sample)
-        complete = all(-LIMIT <= value <= LIMIT for value in sample.values.tolist())
+        complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
             if not usable.any():
@@ -241,26 +243,25 @@ class Twin:
     # -- strokes ----------------------------------------------------------------------------------------------------
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
-        line, run = self._lines[Stream.STROKES], self._run
+        line, run, values = self._lines[Stream.STROKES], self._run, self._zeroed(sample)
         if run is None:
-            return self._follow(sample, complete, [])
+            return self._follow(sample, values, complete, [])
         span = sample.stamp - run.newest
         if line.is_next(sample.stamp) and span >= SHORTEST:
-            if run.plausible.is_of_others(sample.stamp - run.epoch, self._zeroed(sample), self.settings):
+            if run.plausible.is_of_others(sample.stamp - run.epoch, values, self.settings):
                 self.counts["implausible"] += 1
                 return Report(sample.stamp, True, events=("implausible",))
-            return self._follow(sample, complete, [])
+            return self._follow(sample, values, complete, [])
         if 0 <= span < SHORTEST:
-            same = is_close(self._zeroed(sample), run.strokes, 0.0, self.settings)
+            same = is_close(values, run.strokes, 0.0, self.settings)
             return self._refuse(sample, "duplicate" if same else "second source")
-        values = self._zeroed(sample)
         if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
-            return self._follow(sample, complete, [])
+            return self._follow(sample, values, complete, [])
         then = run.memory.at(sample.stamp)
         back = (run.newest - sample.stamp) * NANO
         if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, values):
             return self._refuse(sample, "late")
-        is_late = self._is_late(run, sample)
+        is_late = self._is_late(run, sample.stamp, values)
         event = line.hold(sample, "late" if is_late else "leap", self._is_apart(line, sample))
         gap = self.settings.gap / NANO
         if not line.is_confirmed(gap if is_late or line.is_second else 0.0):
@@ -279,12 +280,12 @@ class Twin:
         way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
         return bool(surprise(sample.values, last.values) > way)
 
-    def _is_late(self, run: _Run, sample: Sample) -> bool:
+    def _is_late(self, run: _Run, stamp: int, values: Array) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""
-        if not -self.settings.jump_back <= (sample.stamp - run.newest) * NANO < 0.0:
+        if not -self.settings.jump_back <= (stamp - run.newest) * NANO < 0.0:
             return False
-        then = run.memory.at(sample.stamp)
-        return then is None or is_close(self._zeroed(sample), then.strokes, run.interval, self.settings)
+        then = run.memory.at(stamp)
+        return then is None or is_close(values, then.strokes, run.interval, self.settings)
 
     def _explain(self, run: _Run, line: Stamps) -> TimeStep:
         """Why the stamps of what is held are not those that were to come."""
@@ -310,7 +311,8 @@ class Twin:
             self._doubt_pause(run, held[0], why)
         reports = []
         for sample in held:
-            reports.append(self._follow(sample, bool(np.isfinite(sample.values.sum())), events))
+            complete = bool(np.isfinite(sample.values.sum()))
+            reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
@@ -353,15 +355,16 @@ class Twin:
         zeros = self._zeros.of(Stream.STROKES, sample.stamp)
         return sample.values if zeros is None else sample.values - zeros
 
-    def _follow(self, sample: Sample, complete: bool, events: list[str]) -> Report:
-        """Go on to a stroke sample; the model starts if it has not."""
+    def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
+        """Go on to a stroke sample, whose `values` are without the sensors' zeros; the model starts if it has not."""
         if not complete:
             events.append("partial")
         asked = complete and self.requests.due
         if asked:
             events += self._take_over(sample.stamp)
-        told, values = asked or "clock set" in events, self._zeroed(sample)
-        if any(y < -self._beyond or y > most + self._beyond for y, most in zip(values.tolist(), self._travel, strict=True)):
+            values = self._zeroed(sample)
+        told = asked or "clock set" in events
+        if self._are_beyond_travel(values.tolist()):
             events.append("out of range")
         if values is not sample.values:
             sample = replace(sample, values=values)
@@ -374,6 +377,10 @@ class Twin:
         if told or (from_rest and report.accepted):
             return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
         return report
+
+    def _are_beyond_travel(self, strokes: list[float]) -> bool:
+        """Whether one is where its cylinder cannot stand; those that are missing are not."""
+        return any(map(lt, strokes, self._shortest)) or any(map(gt, strokes, self._longest))
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
@@ -401,7 +408,7 @@ class Twin:
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
         run.plausible.estimate, run.prediction = prediction.strokes, prediction
         self._remember(run, prediction)
-        if math.hypot(*prediction.tip_displacement) > self._valid:
+        if math.hypot(*prediction.tip_displacement.tolist()) > self._valid:
             events.append("deflected")
         if events:
             self.counts.update(events)
@@ -489,3 +496,8 @@ class Twin:
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)
         return Report(sample.stamp, False, events=events, status=status)
+
+
+def _are_readings(values: list[float]) -> bool:
+    """Whether none is missing, not finite or absurd."""
+    return math.isfinite(sum(values)) and max(map(abs, values)) <= LIMIT
