@@ -37,10 +37,10 @@ warm: $(READY)
 	@$(BIN)/python -c 'from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up()'
 
 demo: warm
-	$(BIN)/python -P -m boom_twin.ros.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
+	$(BIN)/python -P -m boom_twin.ros.demo.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
 
 demo-live: warm
-	$(BIN)/python -P -m boom_twin.ros.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
+	$(BIN)/python -P -m boom_twin.ros.demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
 
 test: lint
 	$(BIN)/python -m pytest -m "not slow"

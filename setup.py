@@ -58,5 +58,5 @@ setup(
     },
     # where `ros2 run` looks; pip puts scripts into bin/ all the same
     options={"install": {"install_scripts": "$base/lib/boom_twin"}, "develop": {"script_dir": "$base/lib/boom_twin"}},
-    entry_points={"console_scripts": ["boom_twin = boom_twin.cli.main:main", "twin_node = boom_twin.ros.main:main"]},
+    entry_points={"console_scripts": ["boom_twin = boom_twin.cli.main:main", "twin_node = boom_twin.ros.node.main:main"]},
 )

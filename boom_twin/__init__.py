@@ -15,28 +15,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analysis.equilibrium import statics
     from .analysis.simulate import simulate
-    from .analysis.statics import statics
+    from .config.settings import Settings, load_settings
     from .offline.replay import replay
-    from .records import Report, Sample, Stream
     from .scene import Scene, load_scene
-    from .settings import Settings, load_settings
-    from .twin import Twin
+    from .twin.twin import Twin
+    from .types import Report, Sample, Stream
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Report": "records",
-    "Sample": "records",
+    "Report": "types",
+    "Sample": "types",
     "Scene": "scene",
-    "Settings": "settings",
-    "Stream": "records",
-    "Twin": "twin",
+    "Settings": "config.settings",
+    "Stream": "types",
+    "Twin": "twin.twin",
     "load_scene": "scene",
-    "load_settings": "settings",
+    "load_settings": "config.settings",
     "replay": "offline.replay",
     "simulate": "analysis.simulate",
-    "statics": "analysis.statics",
+    "statics": "analysis.equilibrium",
 }
 
 __all__ = [

@@ -10,7 +10,7 @@
 
     SceneWarning               no exception but a warning: a scene that can be used and looks odd
 
-Kernels never raise: they return a status (see `boom_twin.chain.status`), and the caller decides.
+Kernels never raise: they return a status (see `boom_twin.kernels.tables`), and the caller decides.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .printable import printable
+from .system.terminal_text import printable
 
 
 class BoomTwinError(Exception):

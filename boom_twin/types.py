@@ -88,7 +88,7 @@ class Prediction:
     clearances : ndarray, shape (k, 4), or None
         Of every pin with clearance the journal's offset x, y (m), contact force (N), and 1 where it touches.
     moments : ndarray, shape (k,), or None
-        Bending moment (N m) at the stations of `boom_twin.moments`, positive where it bends the outboard end up.
+        Bending moment (N m) at the stations of `boom_twin.analysis.bending_moments`, positive where it bends the outer end up.
     """
 
     stamp: int
@@ -147,7 +147,7 @@ class Change:
     from_rest : bool
         Whether the model began with it, at rest.
     settings : dict of str to float
-        All that can change while the twin runs, see `boom_twin.settings.Settings`.
+        All that can change while the twin runs, see `boom_twin.config.settings.Settings`.
     zeros : dict of str to float
         What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2); 0 if not named.
     """
@@ -249,7 +249,7 @@ class Report:
     residuals : tuple of Residuals
         All that became known by this sample, in order of their stamps.
     events : tuple of str
-        What was out of the ordinary, by the names in `boom_twin.twin.EVENTS`.
+        What was out of the ordinary, by the names in `boom_twin.twin.twin.EVENTS`.
     status : str
         ``ok``, or one sentence on a failure of the model.
     change : Change or None

@@ -9,15 +9,36 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.analysis.statics import statics
-from boom_twin.scene import Scene, load_scene
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.scene import Scene
+from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import stroke_curve
-from boom_twin.scene.parts import Joint
-from boom_twin.view.boom import boom_picture, depth, section_parts
-from boom_twin.view.dimensions import angle, dimension, frame, leader, mass_centre, name, span
-from boom_twin.view.drawing import draw_base, draw_cylinder, draw_link, draw_pin, draw_section
-from boom_twin.view.skeleton import JointPins, Skeleton, skeleton
-from boom_twin.view.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+from boom_twin.scene.schema import Joint
+from boom_twin.plots.boom import boom_picture
+from boom_twin.plots.boom import depth
+from boom_twin.plots.boom import section_parts
+from boom_twin.plots.dimensions import angle
+from boom_twin.plots.dimensions import dimension
+from boom_twin.plots.dimensions import frame
+from boom_twin.plots.dimensions import leader
+from boom_twin.plots.dimensions import mass_centre
+from boom_twin.plots.dimensions import name
+from boom_twin.plots.dimensions import span
+from boom_twin.plots.boom import draw_base
+from boom_twin.plots.boom import draw_cylinder
+from boom_twin.plots.boom import draw_link
+from boom_twin.plots.boom import draw_pin
+from boom_twin.plots.boom import draw_section
+from boom_twin.scene.kinematics import JointPins
+from boom_twin.scene.kinematics import Skeleton
+from boom_twin.scene.kinematics import skeleton
+from boom_twin.plots.style import BLUE
+from boom_twin.plots.style import GREEN
+from boom_twin.plots.style import GREY
+from boom_twin.plots.style import INK
+from boom_twin.plots.style import ORANGE
+from boom_twin.plots.style import PURPLE
+from boom_twin.plots.style import picture
 
 HERE = Path(__file__).parent
 SURROGATE = "drawn from the default scene (surrogate parameters)"

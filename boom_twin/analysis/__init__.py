@@ -1,0 +1,1 @@
+"""Statics, modes, simulation and batches of a compiled boom."""

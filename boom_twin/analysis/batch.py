@@ -10,16 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ..chain.batch import run_each
-from ..chain.status import OK, SENTENCES
+from ..compiler.plan import Plan, first_row, row_width
 from ..errors import UsageError
-from ..physics.integrators import GENERALISED_ALPHA
-from ..plan.plan import Plan
-from ..records import Array
-from .course import PASSES, TOLERANCE
-from .rows import first_row, row_width
+from ..kernels.integrators import GENERALISED_ALPHA
+from ..kernels.tables import OK, SENTENCES
+from ..kernels.transfer.time_step import run_each
+from ..types import Array
+from .drive import PASSES, TOLERANCE
+from .equilibrium import settle
 from .simulate import RHO
-from .statics import settle
 
 SHARES = 4  # pieces of work a core, so that one that is slowed down does not hold up the others
 
@@ -51,7 +50,7 @@ class Batch:
     def settle(self, strokes: Array, angles: Array) -> Array:
         """Bring every boom to rest at `strokes` (m) next to joint `angles` (rad), both (n,) or (booms, n).
 
-        Returns their first rows, shape (booms, row_width), see `analysis.rows`.
+        Returns their first rows, shape (booms, row_width), see `compiler.plan`.
 
         Raises
         ------
@@ -82,7 +81,7 @@ class Batch:
         Returns
         -------
         ndarray, shape (booms, steps/every, row_width)
-            See `analysis.rows`. NaN from where a boom's step failed; see `failures`.
+            See `compiler.plan`. NaN from where a boom's step failed; see `failures`.
         """
         count, n = len(self.plans), self.plans[0].joints
         total = np.shape(strokes)[-2]

@@ -1,8 +1,8 @@
 """Bending moments of the flexible parts, from their bending coordinates: M = EI times curvature.
 
 In the default basis the curvature at xi = s/length of a part is sum_k P_k(2 xi - 1) q_k / length with Legendre polynomials P_k,
-and K_00 = EI / length is the part's stiffness (notes at `boom_twin.physics.modes`). Three shapes so hold what weight spread
-along a part and forces at its ends do; material damping is left out.
+and K_00 = EI / length is the part's stiffness (notes at `boom_twin.kernels.elements.beam_shapes`). Three shapes so hold
+what weight spread along a part and forces at its ends do; material damping is left out.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre
 
-from .plan.plan import Plan
-from .records import Array
-from .scene.parts import Scene
-from .scene.splits import flexible_parts
+from ..compiler.plan import Plan
+from ..scene.schema import Scene
+from ..scene.segmentation import flexible_parts
+from ..types import Array
 
 PLACES = (0.0, 0.5, 1.0)
 """Of the stations of a part, over its length."""

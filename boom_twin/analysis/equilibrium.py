@@ -1,4 +1,4 @@
-"""Static equilibrium of a boom under gravity for given strokes, and small vibrations about it."""
+"""Static equilibrium of a boom under gravity for given strokes, with and without clearance in its pins."""
 
 from __future__ import annotations
 
@@ -6,21 +6,119 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..chain.program import State, Work
-from ..chain.status import OK
-from ..chain.step import advance, observe
+from ..compiler.compile import compile_scene
+from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
-from ..physics.integrators import REST, prepare
-from ..plan.compile import compile_scene
-from ..plan.plan import Plan
-from ..records import Array
+from ..kernels.elements.linkage import link_angles
+from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
+from ..kernels.integrators import REST, X, prepare
+from ..kernels.tables import OK, State, Work
+from ..kernels.transfer.clearance_pins import axis_of
+from ..kernels.transfer.time_step import advance, observe
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
-from ..scene.parts import Scene
-from .frequencies import Mode, constraints, natural_modes, negative_pivots
-from .posture import rigid_tip, set_undeformed
-from .seating import clamp_pins, linearise_pins, loosen_pins, release_pins
-from .validity import beyond_validity
+from ..scene.schema import Scene
+from ..types import Array
+from .modal import Mode, constraints, natural_modes, negative_pivots
+
+CLAMP = 1e12  # N/m, a pin that is as good as ideal
+
+
+def clamp_pins(state: State) -> None:
+    """Hold all journals in the middle of their bushes."""
+    state.contacts[:] = 0.0
+    state.contacts[:, SPRING] = CLAMP
+
+
+def release_pins(plan: Plan, state: State) -> None:
+    """Let contact hold every clamped journal, as deep in its bush as its force presses it, with no clearance yet."""
+    for row, memory in zip(plan.tables.clearances, state.contacts, strict=True):
+        offset = state.z[row.z : row.z + 2]
+        distance = float(np.hypot(*offset))
+        if distance > 0.0:
+            offset *= (CLAMP * distance / row.stiffness) ** (1.0 / row.exponent) / distance
+        memory[SPRING], memory[CLOSED], memory[APPROACH] = 0.0, 1.0, SLOWEST
+
+
+def loosen_pins(plan: Plan, state: State, share: float, more: float) -> Plan:
+    """Move every journal outwards by `more` of its clearance; returns the boom with `share` of all clearances."""
+    worn = plan.tables.clearances.copy()
+    for row in worn:
+        offset = state.z[row.z : row.z + 2]
+        distance = float(np.hypot(*offset))
+        if distance > 0.0:
+            offset *= 1.0 + more * row.gap / distance
+        state.history[X, row.z : row.z + 2] = offset
+        row.gap *= share
+    return replace(plan, tables=plan.tables._replace(clearances=worn))
+
+
+def linearise_pins(plan: Plan, state: State) -> None:
+    """Note which pins touch, and give those that are to be linear their spring and damper at the present force."""
+    for row, memory in zip(plan.tables.clearances, state.contacts, strict=True):
+        offset = state.z[row.z : row.z + 2]
+        distance = float(np.hypot(*offset))
+        memory[CLOSED] = float(distance > row.gap - NEAR)
+        _, _, _, depth, _ = penetration(row, *offset)
+        memory[FORCE] = row.stiffness * depth**row.exponent
+        if row.linear:
+            memory[SPRING] = row.exponent * memory[FORCE] / depth
+            memory[DAMPER] = row.loss * memory[FORCE] / SLOWEST
+            x, y = offset * (1.0 - memory[FORCE] / (memory[SPRING] * distance))
+            c, s = axis_of(plan.tables, state, row)
+            memory[SEAT_X], memory[SEAT_Y] = c * x + s * y, c * y - s * x
+
+
+def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
+    """Write the undeformed boom at relative joint `angles` (rad), shape (n,), into the state; all forces zero."""
+    state.z[:] = 0.0
+    heading = 0.0
+    for i, angle in enumerate(angles):
+        z = plan.tables.joints[i].z
+        if plan.tables.linkages[i].length_l > 0.0:
+            left, right = link_angles(plan.tables.linkages[i], angle)
+            state.z[z + 1], state.z[z + 2] = heading + left, heading + right
+        heading += angle
+        state.z[z] = heading
+    state.history[X, : len(state.z)] = state.z
+
+
+def rigid_tip(scene: Scene, angles: Array) -> Array:
+    """Tip (m), shape (2,), of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
+    heading = np.cumsum(angles)
+    lengths = np.array([section.length for section in scene.sections])
+    pivot = np.array(scene.base.pivot)
+    return np.asarray(pivot + np.array([lengths @ np.cos(heading), lengths @ np.sin(heading)]))
+
+
+SHARE = 0.5  # of the boom's reach, most that the tip may be off the undeformed boom's
+INSTANTS = 8  # of a motion, evenly spaced, at which that is looked at; and where the tip is farthest from its start
+
+
+def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
+    """A sentence if a tip `away` (m) from the undeformed boom's is outside the model's validity."""
+    if away <= SHARE * scene.reach:
+        return ()
+    return (
+        f"the tip is {away:.3g} m from where rigid sections and cylinders would have it, more than half the reach of "
+        f"{scene.reach:.3g} m: outside the model's validity. Check stiffnesses, masses and load",
+    )
+
+
+def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
+    """The same for the worst of some instants of a motion; strokes (m, n), tip (m, 2) in m; angles (n,) near the first, rad."""
+    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, INSTANTS).astype(np.int64)
+    rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
+    worst, near = 0.0, angles
+    for row in rows:
+        try:
+            near = joint_angles_of_strokes(scene, strokes[row], near=near)
+        except UsageError:  # in the cylinder's travel, but out of the joint's range
+            continue
+        worst = max(worst, float(np.hypot(*(tip[row] - rigid_tip(scene, near)))))
+    return beyond_validity(scene, worst)
+
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
@@ -48,7 +146,7 @@ class Equilibrium:
     outline : ndarray, shape (k, 2)
         Points of the deflected centre line from base to tip, m.
     doubts : tuple of str
-        A sentence if it is outside the model's validity, see `analysis.validity`.
+        A sentence if it is outside the model's validity, see `analysis.equilibrium`.
     """
 
     strokes: Array

@@ -1,4 +1,4 @@
-"""A boom stepped along a smooth drive by a chosen method, timed: what every comparison of methods is made of."""
+"""Step a boom along a smooth drive by a chosen integration method, timed, for comparisons of methods."""
 
 from __future__ import annotations
 
@@ -10,22 +10,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..chain.plain import new_product
-from ..chain.program import State, Work
-from ..chain.status import OK, SENTENCES
-from ..chain.step import run
+from ..compiler.compile import BasisName, compile_scene
+from ..compiler.plan import Plan, first_row, row_width, taken_apart
 from ..errors import UsageError
-from ..physics import integrators
-from ..plan.compile import BasisName, compile_scene
-from ..plan.plan import Plan
-from ..records import Array
+from ..kernels import integrators
+from ..kernels.tables import OK, SENTENCES, State, Work
+from ..kernels.transfer.matrix_product import new_product
+from ..kernels.transfer.time_step import run
 from ..scene.kinematics import joint_angles_of_strokes
-from ..scene.parts import Scene
-from .course import PASSES, TOLERANCE
-from .doubt import doubt
-from .rows import first_row, row_width, taken_apart
+from ..scene.schema import Scene
+from ..types import Array
+from .drive import PASSES, TOLERANCE
+from .equilibrium import settle
+from .error_estimate import doubt
 from .simulate import RHO
-from .statics import settle
 
 FAMILIES = {
     "generalised-alpha": integrators.GENERALISED_ALPHA,
@@ -52,7 +50,7 @@ class Method:
     passes : int
         Most Newton passes in a step; 1 is the papers' single linearised pass.
     tolerance : float
-        rad, see `chain.step.advance`.
+        rad, see `kernels.transfer.time_step.advance`.
     product : str
         "riccati" or "plain", the papers' product of transfer matrices.
     """
@@ -88,7 +86,7 @@ class March:
     joints, cylinder_forces : ndarray, shape (m, n)
         rad, N.
     pins : ndarray, shape (m, k, 4)
-        Pins with clearance, see `analysis.rows`.
+        Pins with clearance, see `compiler.plan`.
     seconds : float
         Wall time of the stepping alone, median of the repeats.
     steps : int
@@ -97,7 +95,7 @@ class March:
     status : str
         "ok", or why the motion ended.
     doubt : str
-        What the motion itself gives reason to doubt: too coarse a step, ringing; see `analysis.doubt`.
+        What the motion itself gives reason to doubt: too coarse a step, ringing; see `analysis.error_estimate`.
     """
 
     times: Array
@@ -173,7 +171,7 @@ def march(
 
 
 class _Run(NamedTuple):
-    """Rows, what `chain.step.run` returns, and the wall time, s."""
+    """Rows, what `kernels.transfer.time_step.run` returns, and the wall time, s."""
 
     out: Array
     status: int

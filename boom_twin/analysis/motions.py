@@ -1,4 +1,4 @@
-"""The motion that a study steps through: from rest at a posture, some cylinders travel in a quintic, then all hold.
+"""Stroke motions used by studies: a quintic move from rest, and a drive at full speed that is stopped.
 
 The default boom in its posture `arch` moves as everywhere in the documentation: stroke 1 by 50 mm, stroke 3 by 30 mm. On any
 other boom every second cylinder turns its joint by `TURN`, up and down in turn so that a long boom does not curl up: the other
@@ -15,10 +15,10 @@ from typing import TypeVar
 import numpy as np
 
 from ..errors import UsageError
-from ..records import Array
 from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_posture
 from ..scene.load import load_scene
-from ..scene.parts import Scene
+from ..scene.schema import Scene
+from ..types import Array
 
 ARCH = "arch"
 ARCH_TRAVEL = (0.05, 0.0, 0.03, 0.0)  # m
@@ -146,3 +146,63 @@ def _stroke_after(scene: Scene, index: int, angle: float, turn: float) -> float 
     inside = np.isfinite(curve).all() and 0.0 <= curve[-1] <= joint.cylinder.max_stroke
     way = np.sign(np.diff(curve))
     return float(curve[-1]) if inside and bool(np.all(way == way[0])) and way[0] != 0.0 else None
+
+
+RAMP, STOP = 0.3, 1.0  # s, until full speed; begin of braking
+FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Strokes that reach full speed within `ramp`, brake from `stop` on within `brake` (s), and hold. n cylinders.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (n,)
+        Joint angles (rad) of the undeformed boom at the start.
+    first, speed : ndarray, shape (n,)
+        Strokes at the start, m; full speed, m/s.
+    """
+
+    angles: Array
+    first: Array
+    speed: Array
+    brake: float
+    ramp: float = RAMP
+    stop: float = STOP
+
+    @property
+    def still(self) -> float:
+        """From here on the drives hold, s."""
+        return self.stop + self.brake
+
+    @property
+    def last(self) -> Array:
+        """Strokes (m) in the end, shape (n,)."""
+        return np.asarray(self(np.array([self.still]))[0][0])
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
+        x, y = np.clip(times / self.ramp, 0.0, 1.0), np.clip((times - self.stop) / self.brake, 0.0, 1.0)
+        cruise = np.clip(times, self.ramp, self.stop) - self.ramp
+        gone = self.ramp * _risen(x) + cruise + self.brake * (y - _risen(y))
+        return self.first + np.outer(gone, self.speed), np.outer(_rise(x) - _rise(y), self.speed)
+
+
+def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> Halt:
+    """Full speed in the directions of the study's motion, no farther than it goes; `only` one cylinder (from 0): up to half."""
+    own = motion_of(scene, posture)
+    full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
+    travel = np.where(np.arange(len(full)) == only, 0.5 * full, 0.0) if only is not None else own.travel
+    lasting = STOP - 0.5 * RAMP + 0.5 * brake
+    speed = np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
+    return Halt(own.angles, own.first, speed, brake)
+
+
+def _rise(x: Array) -> Array:
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+
+
+def _risen(x: Array) -> Array:
+    """Its integral from 0."""
+    return 2.5 * x**4 - 3.0 * x**5 + x**6

@@ -1,4 +1,4 @@
-"""The boom's answer to given strokes, from rest in equilibrium."""
+"""Simulate the boom's answer to a stroke history, from rest in equilibrium, with an estimate of its error."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain.status import OK, SENTENCES
+from ..compiler.compile import compile_scene
 from ..errors import SolverError, UsageError
-from ..plan.compile import compile_scene
-from ..records import Array
+from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
-from ..scene.parts import Scene
-from .course import Course
-from .doubt import EstimatedError, ringing, told, too_fast
-from .estimated_errors import row_errors, step_errors
-from .statics import checked_strokes, settle
-from .validity import motion_beyond_validity
+from ..scene.schema import Scene
+from ..types import Array
+from .drive import Course
+from .equilibrium import checked_strokes, motion_beyond_validity, settle
+from .error_estimate import EstimatedError, ringing, row_errors, step_errors, told, too_fast
 
 RHO = 0.8
 

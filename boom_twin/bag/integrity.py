@@ -1,18 +1,50 @@
-"""Both ends of an .mcap file: whether it is whole, and where its summary is."""
+"""Integrity of .mcap files: whether both ends are whole, and one kind of error for whatever is damaged."""
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
+from rosbags.serde import SerdeError
+from zstandard import ZstdError
 
 from ..errors import BagError
-from ..received import open_received
-from .damage import RESCUE
+from ..system.received_files import open_received
+
+RESCUE = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
+
+_LZ4 = (RuntimeError,)
+_PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
+STUMBLES = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
+"""What the parsers raise on bytes that are not what they should be."""
+
+
+@contextmanager
+def blame(path: Path) -> Iterator[None]:
+    """Turn what reading `path` stumbles over into a BagError that names it."""
+    try:
+        yield
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    except STUMBLES as error:
+        raise BagError(f"{path}: {str(error) or type(error).__name__}. {RESCUE}") from error
+
+
+def compare_counts(place: Path, teller: str, told: Mapping[str, int], finder: str, found: Mapping[str, int]) -> None:
+    """Raise BagError that names each topic whose two counts differ; a count of 0 is the same as none."""
+    topics = sorted(topic for topic in {*told, *found} if told.get(topic, 0) != found.get(topic, 0))
+    if topics:
+        pairs = [(topic, told.get(topic, 0), found.get(topic, 0)) for topic in topics]
+        faults = "; ".join(f"{topic}: {teller} {one}, {finder} {other}" for topic, one, other in pairs)
+        raise BagError(f"{place}: message counts differ ({faults}). {RESCUE}")
+
 
 BLOCK = 2**20
 """Bytes that are read at a time where a file may be of any size."""

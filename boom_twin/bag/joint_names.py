@@ -1,14 +1,14 @@
-"""Whether the cylinders and joints that a session names are those of the scene."""
+"""Check that the cylinders and joints that a session names are those of the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from ..errors import BagError
-from ..records import Stream
-from .intake import LONGEST
+from ..messages.sample_decoder import LONGEST
+from ..messages.topic_table import Topics
+from ..types import Stream
 from .reader import Session, read
-from .topics import Topics
 
 WINDOW = 5_000_000_000
 """Log time (ns) from the first message of strokes or angles on, in which all names are looked at."""

@@ -1,4 +1,4 @@
-"""What one .mcap file holds, without its messages."""
+"""Summarise one .mcap file without decoding its messages."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata,
 from mcap.summary import Summary
 
 from ..errors import BagError
-from ..received import open_received
-from .blocks import records
-from .chunkhead import head_at
-from .content import LARGEST
-from .damage import blame, compare_counts
-from .ends import check_ends
+from ..system.received_files import open_received
+from .integrity import blame, check_ends, compare_counts
+from .mcap_records import LARGEST, records
+from .recovery.chunk_head import head_at
 
 PROFILE = "ros2"
 NOTES = "boom_twin"

@@ -1,9 +1,10 @@
-"""``metadata.yaml`` of a rosbag2 directory, to read and to write."""
+"""``metadata.yaml`` of a rosbag2 directory: read, write, and add up from the files; offered QoS of its topics."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,10 @@ from typing import Any
 from pydantic import BaseModel, Field, ValidationError
 from ruamel.yaml import YAML
 
+from ..config.yaml_text import plain, read_plain
 from ..errors import BagError
-from ..plain import read_plain
-from .atomic import write_atomic
-from .topics import Qos
+from ..messages.topic_table import Qos
+from ..system.atomic_files import write_atomic
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -139,3 +140,113 @@ def dump(document: Any) -> str:
     text = StringIO()
     yaml.dump(document, text)
     return text.getvalue()
+
+
+DEEPEST = 10_000
+"""Largest depth that is taken over."""
+
+_RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
+_DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
+_LONGEST = 100_000  # characters of YAML in one entry
+
+
+def profiles(value: Any) -> list[Qos]:
+    """The profiles of one topic, in the words of ``topics.yaml``; what cannot be read is left out.
+
+    Parameters
+    ----------
+    value : object
+        ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
+    """
+    if isinstance(value, str):
+        try:
+            value = plain(value) if len(value) <= _LONGEST else []
+        except ValueError:
+            return []
+    found = [_profile(entry) for entry in (value if isinstance(value, list) else []) if isinstance(entry, dict)]
+    return [qos for qos in found if qos is not None]
+
+
+def _profile(entry: dict[Any, Any]) -> Qos | None:
+    try:
+        return Qos.model_validate(
+            {
+                "reliability": _RELIABILITY.get(entry.get("reliability"), "reliable"),
+                "durability": _DURABILITY.get(entry.get("durability"), "volatile"),
+                "depth": min(max(int(entry.get("depth") or 1), 1), DEEPEST),
+            }
+        )
+    except (ValidationError, TypeError, ValueError):
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One topic as it stands in a bag.
+
+    Attributes
+    ----------
+    topic, type : str
+        Absolute name; ``package/msg/Name``.
+    definition : bytes
+        Of the type and all types in it, in the language that `definition_encoding` names.
+    details : dict of str to str
+        Kept with the channel.
+    qos : object
+        Offered profiles, for ``metadata.yaml``.
+    type_hash : str
+    encoding, definition_encoding : str
+    """
+
+    topic: str
+    type: str
+    definition: bytes
+    details: Mapping[str, str] = field(default_factory=dict)
+    qos: Any = ()
+    type_hash: str = ""
+    encoding: str = "cdr"
+    definition_encoding: str = "ros2msg"
+
+
+def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
+    """One file: name, first and last log time (ns), messages."""
+    start, duration = Start(nanoseconds_since_epoch=first), Duration(nanoseconds=last - first)
+    return FileInformation(path=path, starting_time=start, duration=duration, message_count=count)
+
+
+def metadata_of(
+    files: Sequence[FileInformation],
+    topics: Sequence[Recorded],
+    counts: Mapping[int, int],
+    notes: Mapping[str, str],
+    distro: str,
+) -> BagMetadata:
+    """The metadata of a whole bag; `counts` are messages by place in `topics`."""
+    filled = [file for file in files if file.message_count]
+    first = min((file.starting_time.nanoseconds_since_epoch for file in filled), default=0)
+    last = max((file.starting_time.nanoseconds_since_epoch + file.duration.nanoseconds for file in filled), default=0)
+    return BagMetadata(
+        version=VERSION,
+        storage_identifier="mcap",
+        duration=Duration(nanoseconds=last - first),
+        starting_time=Start(nanoseconds_since_epoch=first),
+        message_count=sum(file.message_count for file in files),
+        topics_with_message_count=[_topic_count(topic, counts[key]) for key, topic in enumerate(topics)],
+        relative_file_paths=[file.path for file in files],
+        files=list(files),
+        custom_data=dict(notes) or None,
+        ros_distro=distro,
+    )
+
+
+def _topic_count(topic: Recorded, count: int) -> TopicCount:
+    return TopicCount(
+        topic_metadata=TopicMetadata(
+            name=topic.topic,
+            type=topic.type,
+            serialization_format=topic.encoding,
+            offered_qos_profiles=topic.qos,
+            type_description_hash=topic.type_hash,
+        ),
+        message_count=count,
+    )

@@ -1,4 +1,4 @@
-"""A recorded session: what it holds, its messages decoded in the order of their log times.
+"""Read a recorded session: its files, what it holds, and its messages decoded in the order of their log times.
 
 A session is a rosbag2 directory, a directory of .mcap files without ``metadata.yaml``, or a bare .mcap.
 """
@@ -6,24 +6,100 @@ A session is a rosbag2 directory, a directory of .mcap files without ``metadata.
 from __future__ import annotations
 
 import heapq
+import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from mcap.records import Schema
+from rosbags.interfaces.typing import Typesdict
+from rosbags.typesys import TypesysError, get_types_from_msg
+
 from ..errors import BagError
-from ..received import holds_file
-from .bagmeta import FILE_NAME, BagMetadata, read_metadata
-from .blocks import messages
-from .damage import RESCUE, STUMBLES, blame, compare_counts
-from .definitions import check_encoding
-from .files import check_listed, mcap_files
-from .incomplete import incompleteness
-from .survey import McapFile, survey
-from .typestore import jazzy
+from ..messages.cdr_encoder import jazzy
+from ..system.received_files import holds_file
+from .integrity import RESCUE, STUMBLES, blame, compare_counts
+from .mcap_records import messages
+from .mcap_summary import McapFile, survey
+from .metadata import FILE_NAME, BagMetadata, read_metadata
+from .session_sheet import incompleteness
+
+
+def mcap_files(path: Path) -> list[Path]:
+    """The files of a session without metadata; BagError if there are none."""
+    if path.is_file():
+        return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
+    if not path.is_dir():
+        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
+    files = sorted(path.glob("*.mcap"))
+    if not files:
+        there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
+        raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
+    return files
+
+
+def check_listed(path: Path, named: list[Path]) -> None:
+    """Refuse to pass over a file that a recorder left behind when it was killed."""
+    if unlisted := sorted(file.name for file in path.glob("*.mcap") if file not in named):
+        raise BagError(
+            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
+            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
+        )
+
+
+def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
+    """The .mcap files of a session: those that its metadata names, then all others by number; and the metadata."""
+    metadata: BagMetadata | None = None
+    is_described = holds_file(path / FILE_NAME)
+    try:
+        metadata = read_metadata(path / FILE_NAME) if is_described else None
+    except BagError:
+        if path.is_file():
+            raise
+    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else []
+    there = [file for file in named if holds_file(file)]
+    others = [] if there and not any(path.glob("*.mcap")) else mcap_files(path)
+    return there + sorted(set(others) - set(there), key=_by_number), metadata
+
+
+def _by_number(path: Path) -> list[tuple[int, str]]:
+    """Sorts ``session_10`` behind ``session_9``."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+
+
+def check_encoding(file: McapFile, topics: Container[str]) -> None:
+    """Refuse what is not CDR, or was written with another definition of a message than Jazzy's.
+
+    Raises
+    ------
+    BagError
+        Names the file, the topic, what was found and what is read.
+    """
+    for channel in file.channels.values():
+        if channel.topic not in topics:
+            continue
+        place = f"{file.path}: topic {channel.topic}"
+        if channel.message_encoding != "cdr":
+            raise BagError(f"{place}: message encoding {channel.message_encoding!r}: only cdr is read. Use ROS 2.")
+        for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id]).items():
+            known = jazzy().fielddefs.get(name)
+            if known is not None and list(known[1]) != list(fields):
+                raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
+
+
+def _parsed(place: str, schema: Schema) -> Typesdict:
+    """The types in a schema; none where the recorder did not know the definition and left it empty."""
+    if schema.encoding != "ros2msg":
+        raise BagError(f"{place}: schema encoding {schema.encoding!r}: only ros2msg is read. Record with ROS 2.")
+    try:
+        return get_types_from_msg(schema.data.decode(), schema.name) if schema.data else {}
+    except (TypesysError, UnicodeDecodeError) as error:
+        raise BagError(f"{place}: its definition cannot be parsed ({error}). Record the session again.") from error
+
 
 RECOVERED = "recovered from"
 """The note of a session that was saved from a damaged one, which may have been ended by force."""

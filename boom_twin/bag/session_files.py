@@ -1,4 +1,4 @@
-"""A rig session from arrays: strokes, joint angles, tip IMU."""
+"""Write a session from arrays of samples."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..records import Array, Sample, Stream
-from .factory import RosbagsTypes
-from .places import FRAME, fill_header
-from .topics import TYPES, load_topics
+from ..messages.cdr_encoder import RosbagsTypes
+from ..messages.message_fields import FRAME, fill_header
+from ..messages.topic_table import TYPES, load_topics
+from ..types import Array, Sample, Stream
 from .writer import SessionWriter
 
 IMU_FRAME = "tip"

@@ -1,19 +1,19 @@
-"""The scene, the baseline and the mapping of a session: as given, else as the session keeps them, else the package's own."""
+"""Choose the scene and the baseline of a session: those given, else those that the session keeps, else the package's own."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..config.yaml_text import plain
 from ..errors import BagError, Fault, SceneError, UsageError
 from ..health.baseline import Baseline, baseline_from, load_baseline
-from ..plain import plain
+from ..messages.mapping import load_mapping, mapping_from
+from ..messages.topic_table import Topics
 from ..scene.load import DEFAULT_NAME, default_text, examine_text
-from ..scene.parts import Scene
-from ..scene.read import read_text
-from .mapping import load_mapping, mapping_from
-from .sheet import Kept, kept, sha256
-from .topics import Topics
+from ..scene.schema import Scene
+from ..scene.yaml_reader import read_text
+from .session_sheet import KeptText, kept, sha256
 
 DEFAULT_BASELINE = "default baseline"
 DEFAULT_MAPPING = "default mapping"
@@ -95,7 +95,7 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
     return SessionScene(scene, own.text, own.source, (*_changed(session, own), *oddities))
 
 
-def _changed(session: Path, own: Kept) -> list[Fault]:
+def _changed(session: Path, own: KeptText) -> list[Fault]:
     """That the text is not the one that was recorded."""
     digest = _recorded_sha256(session)
     if digest is None or digest == sha256(own.text):
@@ -137,12 +137,12 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     session : Path
     given : Path, optional
     joints : int, optional
-        As for `boom_twin.io.mapping.load_mapping`.
+        As for `boom_twin.messages.mapping.load_mapping`.
 
     Raises
     ------
     UsageError
-        As `boom_twin.io.mapping.load_mapping`.
+        As `boom_twin.messages.mapping.load_mapping`.
     BagError
         ``session.yaml`` cannot be read.
     """

@@ -1,8 +1,9 @@
-"""``session.yaml``: what a session was made with, beside its bag; written and read here alone."""
+"""``session.yaml`` of a session: its notes, the scene it was recorded with, and whether the folder is whole."""
 
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -10,18 +11,19 @@ from pathlib import Path
 
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
+from ..config.yaml_text import LARGEST, plain, read_plain
 from ..errors import BagError
-from ..plain import LARGEST, plain, read_plain
-from ..received import holds_file
-from .atomic import write_atomic
-from .bagmeta import dump
+from ..system.atomic_files import write_atomic
+from ..system.received_files import holds_file
+from ..system.result_folder import UNFINISHED, is_unfinished
+from .metadata import dump
 
 FILE_NAME = "session.yaml"
 _HEAD = "# What this session was made with. scene_sha256 is of the text under scene (UTF-8).\n"
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class SessionSheet:
     """What a session was made with. What is None or empty is left out of the file.
 
     Attributes
@@ -89,7 +91,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptText:
     """A text of a ``session.yaml``, and its place in words."""
 
     text: str
@@ -101,7 +103,7 @@ def sheet_path(session: Path) -> Path:
     return (session if session.is_dir() else session.parent) / FILE_NAME
 
 
-def kept(session: Path, key: str, option: str) -> Kept | None:
+def kept(session: Path, key: str, option: str) -> KeptText | None:
     """The text that a session keeps under `key`; None if it keeps none. Whoever made the session chose it: trust nothing in it.
 
     Parameters
@@ -126,7 +128,7 @@ def kept(session: Path, key: str, option: str) -> Kept | None:
     text = (document or {}).get(key)
     if not isinstance(text, str | None):
         raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
-    return Kept(text, f"{path}, {key}") if text else None
+    return KeptText(text, f"{path}, {key}") if text else None
 
 
 def sha256(text: str) -> str:
@@ -150,3 +152,28 @@ def _block(text: str | None) -> str | None:
 
 def _time(moment: datetime) -> str:
     return moment.isoformat(timespec="milliseconds")
+
+
+_BEGUN, _ENDED = (re.compile(rb"^%b:" % key, re.MULTILINE) for key in (b"started", b"ended"))
+"""Lines that the recorder writes at the beginning, and at the end; the texts inside ``session.yaml`` are indented."""
+
+
+def incompleteness(path: Path) -> str:
+    """Why a session or a result is incomplete, in words; empty if its folder does not say that it is.
+
+    Parameters
+    ----------
+    path : Path
+        Of the folder or of a file in it; also ``bag`` in the folder of a replay.
+    """
+    folder = path if path.is_dir() else path.parent
+    for place in (folder, folder.resolve().parent):
+        if is_unfinished(place):
+            return f"incomplete: {place / UNFINISHED} says that its command was stopped, or is still at work. Run it again."
+    sheet = folder / FILE_NAME
+    if sheet.is_file():
+        with sheet.open("rb") as stream:
+            text = stream.read(LARGEST)
+        if _BEGUN.search(text) and not _ENDED.search(text):
+            return f"incomplete: the recorder was ended by force, or is still at work: {sheet} tells no end."
+    return ""

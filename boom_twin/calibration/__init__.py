@@ -3,6 +3,8 @@
 See docs/calibrate.md for what it does and what sessions it needs.
 """
 
+from __future__ import annotations
+
 from .run import Calibration, Choice, Estimate, calibrate
 
 __all__ = ["Calibration", "Choice", "Estimate", "calibrate"]

@@ -1,22 +1,65 @@
-"""A baseline from recorded healthy sessions, and its file."""
+"""Learn a health baseline from recorded healthy sessions, and read and write its file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import StringIO
 from pathlib import Path
 
 from ruamel.yaml import YAML
 
+from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.baseline import Baseline
-from ..io.atomic import write_atomic
-from ..learn import learn_baseline
-from ..records import Sample, Stream
-from ..scene.parts import Scene
-from ..settings import Settings
-from .measured import Measured, read_sessions
+from ..health.inference.block_problem import BlockProblem
+from ..health.inference.fault_catalogue import parameters
+from ..health.learning import learn
+from ..scene.edit import loaded
+from ..scene.schema import Scene
+from ..system.atomic_files import write_atomic
+from ..twin.twin import Twin
+from ..types import Mount, Sample, Stream
 from .run import common_mapping
+from .sessions import MeasuredSession, read_sessions
+
+
+def learn_baseline(
+    scene: Scene,
+    settings: Settings,
+    sessions: Iterable[Iterable[Sample]],
+    names: Sequence[str],
+    mounts: Sequence[Mount | None] = (),
+    progress: Callable[[float, str], None] = lambda share, what: None,
+) -> Baseline:
+    """What model and sensors are off by in `sessions`, called `names`, in which all was well.
+
+    `progress` is told the share done and what comes next.
+
+    Raises
+    ------
+    UsageError
+        Too few usable samples to learn from.
+    """
+    problems: list[list[BlockProblem]] = []
+    for name, session in zip(names, sessions, strict=True):
+        progress(0.3 * len(problems) / len(names), name)
+        problems.append(_problems(scene, settings, session, mounts))
+    scene = loaded(scene, *settings.load)
+    return learn(problems, parameters(scene), len(scene.joints), names, lambda share: progress(0.3 + 0.7 * share, "learning"))
+
+
+def _problems(
+    scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]
+) -> list[BlockProblem]:
+    """The linear problems that a twin makes of one session."""
+    twin = Twin(scene, settings, mounts, Baseline())
+    assert twin.judge is not None
+    found: list[BlockProblem] = []
+    twin.judge.residuals.listener = found.append
+    for sample in session:
+        twin.update(sample)
+    return found
+
 
 WIDTH = 120
 ORDER = tuple(Stream)
@@ -58,7 +101,7 @@ def baseline_of(
     return learn_baseline(scene, settings or Settings(), map(_samples, sessions), names, mounts, progress)
 
 
-def _samples(session: Measured) -> list[Sample]:
+def _samples(session: MeasuredSession) -> list[Sample]:
     """All samples in the order of stamps, those of strokes first."""
     found = [
         Sample(stream, int(stamp), values)

@@ -1,30 +1,102 @@
-"""Residuals of sessions as a function of the unknowns, with their derivatives."""
+"""Forward model of a calibration: residuals of sessions as a function of the unknowns, with derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..errors import BagError
-from ..records import Array
-from ..scene.parts import Scene
-from ..settings import Settings
-from .blocks import Blocks
-from .course import Course
-from .forward import Forward
+from ..analysis.batch import Batch
+from ..compiler.compile import compile_scene
+from ..compiler.plan import taken_apart
+from ..config.settings import Settings
+from ..errors import BagError, SolverError
+from ..scene.edit import with_parameters
+from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
+from ..scene.schema import Scene
+from ..types import Array, Stream, channels_of
+from .noise_model import NoiseModel, ResidualBlocks
+from .sessions import SessionCourse
 from .unknowns import Unknown
-from .whitening import Whitening
+
+Values = Mapping[str, float]
+
+
+class ForwardModel:
+    """Predictions of a boom for trials of its parameters and of the zeros of its stroke transducers.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it is at present.
+    trials : sequence of dict
+        Value (SI) by name of the unknowns; zeros of other sensors are passed over.
+    """
+
+    def __init__(self, scene: Scene, trials: Sequence[Values]) -> None:
+        self._scene, self._gravity = scene, gravity_in_base(scene)
+        own = [{name: value for name, value in trial.items() if not name.endswith(".zero")} for trial in trials]
+        self._batch = Batch([compile_scene(with_parameters(scene, values)) for values in own])
+        strokes = channels_of(len(scene.joints))[Stream.STROKES]
+        self._zeros = np.array([[trial.get(f"{name}.zero", 0.0) for name in strokes] for trial in trials])
+
+    def move(self, course: SessionCourse, noise: Array | None = None) -> tuple[Array, Array]:
+        """Readings along a course.
+
+        Parameters
+        ----------
+        noise : ndarray, shape (trials, m, n), optional
+            Added to the strokes, m.
+
+        Returns
+        -------
+        angles : ndarray, shape (trials, m, n)
+        force : ndarray, shape (trials, m, 2)
+            Specific force of the tip.
+
+        Raises
+        ------
+        SolverError
+            The model fails with one of the trials.
+        """
+        strokes = course.strokes - self._zeros[:, None]
+        if noise is not None:
+            strokes = strokes + noise
+        rates = np.gradient(strokes, course.step, axis=1)
+        first = self._settled(course.strokes[0], strokes[:, 0])
+        rows = self._batch.run(course.step, strokes[:, 1:], rates[:, 1:])
+        if failures := self._batch.failures():
+            raise SolverError(f"the model fails within the session: {next(iter(failures.values()))}. Is it one of this boom?")
+        return self._readings(np.concatenate([first[:, None], rows], axis=1))
+
+    def rest(self, strokes: Array) -> tuple[Array, Array]:
+        """Readings at rest with strokes (n,) in m; shapes (trials, 1, n) and (trials, 1, 2)."""
+        return self._readings(self._settled(strokes, strokes - self._zeros)[:, None])
+
+    def _settled(self, near: Array, strokes: Array) -> Array:
+        return self._batch.settle(strokes, joint_angles_of_strokes(self._scene, near))
+
+    def _readings(self, rows: Array) -> tuple[Array, Array]:
+        found = taken_apart(self._batch.plans[0], rows.reshape(-1, rows.shape[-1]))
+        force = _specific_force(found.tip[:, 2, :2] - self._gravity, found.tip[:, 0, 2])
+        return found.joints.reshape(*rows.shape[:2], -1), force.reshape(*rows.shape[:2], 2)
+
+
+def _specific_force(felt: Array, angle: Array) -> Array:
+    """Acceleration less gravity (k, 2) in axes turned by `angle` (k,)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * felt[:, 0] + s * felt[:, 1], c * felt[:, 1] - s * felt[:, 0]])
+
 
 DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths
 REALISATIONS = 48  # of the noise, over all sessions
 START = 0.02  # prior deviations off a bound
 PRESENT = 0.5  # share of blocks that a channel must have
 
-Parts = Sequence[tuple[Course, Blocks]]
+Parts = Sequence[tuple[SessionCourse, ResidualBlocks]]
 
 
-class Problem:
+class CalibrationProblem:
     """What is compared.
 
     Parameters
@@ -77,9 +149,9 @@ class Problem:
         """Values of the unknowns by name."""
         return {unknown.name: unknown.value(float(d)) for unknown, d in zip(self.unknowns, deviations, strict=True)}
 
-    def moving(self, deviations: Array, whitening: Whitening) -> tuple[Array, Array]:
+    def moving(self, deviations: Array, whitening: NoiseModel) -> tuple[Array, Array]:
         """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
-        forward = Forward(self.scene, self._trials(deviations))
+        forward = ForwardModel(self.scene, self._trials(deviations))
         residuals, slopes = [], []
         for course, blocks in self.parts:
             means = np.array([blocks.averaged(*streams) for streams in zip(*forward.move(course), strict=True)])
@@ -92,7 +164,7 @@ class Problem:
 
     def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
         """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
-        forward = Forward(self.scene, self._trials(deviations))
+        forward = ForwardModel(self.scene, self._trials(deviations))
         angles, force = (np.concatenate(each, axis=1) for each in zip(*map(forward.rest, strokes), strict=True))
         return self._with_slopes(np.concatenate([angles, force], axis=2), deviations)
 
@@ -103,7 +175,7 @@ class Problem:
         """
         rng = np.random.default_rng(0)
         count = -(-REALISATIONS // len(self.parts))
-        forward = Forward(self.scene, [self.values(deviations)] * (count + 1))
+        forward = ForwardModel(self.scene, [self.values(deviations)] * (count + 1))
         found = []
         for course, blocks in self.parts:
             noise = np.zeros((len(course.stamps), count + 1, course.strokes.shape[1]))

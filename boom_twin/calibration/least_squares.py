@@ -1,4 +1,4 @@
-"""Nonlinear least squares of the unknowns, with what is likely before as one more measurement of each."""
+"""Nonlinear least squares with priors, and which unknowns the sessions can tell apart."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..records import Array
-from .blocks import Blocks
-from .course import Course
-from .problem import Problem
-from .whitening import Whitening, whitening_of
+from ..errors import BoomTwinError
+from ..scene.kinematics import strokes_of_posture
+from ..types import Array
+from .forward_model import CalibrationProblem
+from .noise_model import NoiseModel, ResidualBlocks, whitening_of
+from .sessions import SessionCourse
 
 MOST = 12  # evaluations of a round
 ROUNDS = 2
@@ -39,7 +40,7 @@ class Fit:
     misfit : float
         Root mean square of the white residuals, 1 where noise alone is left; what is above 1 counts as noise.
     passes : int
-    whitening : Whitening
+    whitening : NoiseModel
     """
 
     deviations: Array
@@ -47,7 +48,7 @@ class Fit:
     scatter: Array
     misfit: float
     passes: int
-    whitening: Whitening
+    whitening: NoiseModel
 
     def covariance(self, more: Array | float = 0.0) -> Array:
         """Of the deviations, with the priors, and with `more` information.
@@ -61,7 +62,7 @@ class Fit:
         return np.asarray(factors[:, None] * found * factors)
 
 
-def fitted(problem: Problem, tell: Tell) -> Fit:
+def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     """Minimise; `tell` is called before every pass over the sessions.
 
     A stiffness that is wrong makes the boom swing at a wrong frequency, and after some swings measured and predicted ones are
@@ -75,7 +76,7 @@ def fitted(problem: Problem, tell: Tell) -> Fit:
         noise = problem.noise(deviations)
         whitening = whitening_of([each[::2] for each in noise], problem.length)
 
-        def moving(deviations: Array, whitening: Whitening = whitening) -> tuple[Array, Array]:
+        def moving(deviations: Array, whitening: NoiseModel = whitening) -> tuple[Array, Array]:
             tell()
             return problem.moving(deviations, whitening)
 
@@ -87,7 +88,7 @@ def fitted(problem: Problem, tell: Tell) -> Fit:
     return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitening, slopes), misfit, passes, whitening)
 
 
-def _scatter(noise: list[Array], whitening: Whitening, slopes: Array) -> Array:
+def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:
     """Covariance of J^T w over realisations that the filter was not made from; sessions are independent, so theirs add up."""
     found, first = np.zeros((slopes.shape[1], slopes.shape[1])), 0
     for each in noise:
@@ -98,7 +99,7 @@ def _scatter(noise: list[Array], whitening: Whitening, slopes: Array) -> Array:
     return found
 
 
-def _in_holds(problem: Problem) -> Evaluate:
+def _in_holds(problem: CalibrationProblem) -> Evaluate:
     """Residuals of the means over holds and their derivatives, in deviations of single samples."""
     found = [hold for course, blocks in problem.parts for hold in _holds(course, blocks)]
     found = found[:: 1 + len(found) // HOLDS]
@@ -115,7 +116,7 @@ def _in_holds(problem: Problem) -> Evaluate:
     return evaluate
 
 
-def _holds(course: Course, blocks: Blocks) -> list[tuple[Array, Array]]:
+def _holds(course: SessionCourse, blocks: ResidualBlocks) -> list[tuple[Array, Array]]:
     """Means of strokes and of readings over holds, one after the other."""
     length = float(blocks.times[1] - blocks.times[0])
     group = max(1, round(HOLD / length))
@@ -144,3 +145,85 @@ def _minimised(evaluate: Evaluate, start: Array, least: Array) -> tuple[Array, i
         lambda x: both(x)[0], start, lambda x: both(x)[1], (least, np.inf), "dogbox", ENOUGH, ENOUGH, None, max_nfev=MOST
     )
     return found.x, int(found.nfev)
+
+
+TOGETHER = 0.7  # correlation from which on two unknowns count as one group
+MORE = 10.0  # s of a hold in another posture
+HELPS = 0.5  # of the deviation left, from which on a posture is worth the way
+
+
+@dataclass(frozen=True)
+class Group:
+    """Unknowns that the sessions cannot tell apart, or do not show.
+
+    Attributes
+    ----------
+    names : tuple of str
+        One alone: the sessions do not show it.
+    posture : str or None
+        A posture of the scene in which a hold would tell them apart.
+    enough : bool
+        Whether it would do so fully.
+    """
+
+    names: tuple[str, ...]
+    posture: str | None = None
+    enough: bool = False
+
+    def __str__(self) -> str:
+        what = f"{self.names[0]}: these sessions do not show it" if len(self.names) == 1 else (
+            f"{', '.join(self.names)}: these sessions cannot tell them apart"
+        )  # fmt: skip
+        if self.posture is None:
+            return f"{what}; none of the scene's postures would. Left as before."
+        verb = "would" if self.enough else "would help to"
+        return f"{what}; a hold of {MORE:g} s in posture {self.posture} {verb}. Left as before."
+
+
+def groups_of(problem: CalibrationProblem, fit: Fit) -> list[Group]:
+    """Unknowns whose estimates are too uncertain to be of use, together with those that they are confused with."""
+    covariance = fit.covariance()
+    spread = np.sqrt(np.diag(covariance))
+    vague = spread > _useful(problem)
+    tied = np.abs(covariance) > TOGETHER * np.outer(spread, spread)
+    groups, left = [], set(np.flatnonzero(vague).tolist())
+    while left:
+        group: set[int] = set()
+        grown = {min(left)}
+        while grown != group:
+            group, grown = grown, grown | set(np.flatnonzero(tied[sorted(grown)].any(axis=0) & vague).tolist())
+        left -= group
+        groups.append(_with_posture(problem, fit, sorted(group)))
+    return groups
+
+
+def _useful(problem: CalibrationProblem) -> Array:
+    """Deviations from which estimates are of use, in units of the priors'."""
+    return np.array([unknown.kind.useful / unknown.kind.prior for unknown in problem.unknowns])
+
+
+def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> Group:
+    """The group with the posture that leaves least of its uncertainty."""
+    names, useful = tuple(problem.unknowns[i].name for i in group), _useful(problem)
+
+    def left(more: Array | float) -> float:
+        return float(np.max((np.sqrt(np.diag(fit.covariance(more))) / useful)[group]))
+
+    found = {posture: left(more) for posture, more in _in_postures(problem, fit).items()}
+    best = min(found, key=lambda posture: found[posture], default=None)
+    if best is None or found[best] > max(1.0, HELPS * left(0.0)):
+        return Group(names)
+    return Group(names, best, found[best] <= 1.0)
+
+
+def _in_postures(problem: CalibrationProblem, fit: Fit) -> dict[str, Array]:
+    """Information (p, p) that a hold in each of the scene's postures would add; those out of reach are left out."""
+    found = {}
+    for posture in problem.scene.postures or {}:
+        try:
+            _, slopes = problem.resting(fit.deviations, strokes_of_posture(problem.scene, posture)[None])
+        except BoomTwinError:
+            continue
+        white = fit.whitening.of_constant(slopes[:, 0])
+        found[posture] = MORE / problem.length * white @ white.T
+    return found

@@ -1,4 +1,12 @@
-"""Samples averaged over blocks of time, measured and predicted ones alike."""
+"""Noise model of a calibration: block averages, and a vector autoregression that whitens residuals.
+
+The noise of block means is not white: the sensors' own is, but noise of the strokes shakes the boom's natural modes, which
+ring for seconds and move all channels together. Its realisations, made by the very model, are fitted by
+
+e_t = sum_k A_k e_(t-k) + L w_t,    k = 1 .. p,
+
+with w of unit variance and white (Luetkepohl, New Introduction to Multiple Time Series Analysis, 2005, ch. 3, least squares).
+"""
 
 from __future__ import annotations
 
@@ -9,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..records import Array, Mount, Stream, channels_of
-from .course import Course, filled
-from .measured import NANO, Measured, Series
+from ..types import Array, Mount, Stream, channels_of
+from .sessions import NANO, MeasuredSession, Series, SessionCourse, filled
 
 SHORTEST = 0.05  # s
 END = 0.25  # s before the end of a course that are not used, for smoothing ends there
@@ -20,7 +27,7 @@ STREAMS = (Stream.ANGLES, Stream.IMU)
 
 
 @dataclass(frozen=True)
-class Blocks:
+class ResidualBlocks:
     """Measured means of b blocks in c channels, and how predictions on a grid of m instants are averaged likewise.
 
     Attributes
@@ -46,12 +53,12 @@ class Blocks:
         return np.concatenate(parts, axis=1)
 
 
-def has_imu(sessions: Sequence[Measured]) -> bool:
+def has_imu(sessions: Sequence[MeasuredSession]) -> bool:
     """Whether every session has a tip IMU; if one lacks it, it is left out of all."""
     return all(Stream.IMU in session.series for session in sessions)
 
 
-def block_length(sessions: Sequence[Measured], imu: bool) -> float:
+def block_length(sessions: Sequence[MeasuredSession], imu: bool) -> float:
     """Time (s) that holds samples of every stream of every session."""
     intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in used(imu)]
     return max(SHORTEST, 2.0 * float(max(intervals)))
@@ -68,7 +75,9 @@ def channel_names(joints: int, imu: bool) -> tuple[str, ...]:
     return tuple(name for stream in used(imu) for name in known[stream])
 
 
-def blocks_of(session: Measured, course: Course, length: float, imu: bool, mounts: Sequence[Mount | None]) -> Blocks:
+def blocks_of(
+    session: MeasuredSession, course: SessionCourse, length: float, imu: bool, mounts: Sequence[Mount | None]
+) -> ResidualBlocks:
     """Average a session over blocks of `length` (s); the angles of inclinometers are left out."""
     count = int((course.duration - END) / length)
     measured, counts, means = [], [], []
@@ -82,10 +91,10 @@ def blocks_of(session: Measured, course: Course, length: float, imu: bool, mount
         counts.append(number)
         means.append(mean)
     times: Array = np.asarray(length * (0.5 + np.arange(count)))
-    return Blocks(times, np.concatenate(measured, axis=1), np.concatenate(counts, axis=1), tuple(means))
+    return ResidualBlocks(times, np.concatenate(measured, axis=1), np.concatenate(counts, axis=1), tuple(means))
 
 
-def _averages(series: Series, course: Course, length: float, count: int) -> tuple[Array, Array, csr_array]:
+def _averages(series: Series, course: SessionCourse, length: float, count: int) -> tuple[Array, Array, csr_array]:
     """Means (count, channels), numbers of values in them, and the average of linear interpolations on the course's grid."""
     times: Array = np.asarray((series.stamps - course.start) * NANO)
     block = np.minimum((times / length).astype(np.int64), count - 1)
@@ -102,3 +111,45 @@ def _interpolated_mean(places: Array, block: NDArray[np.int64], total: NDArray[n
     share, weight = places - left, 1.0 / total[block]
     rows, columns = np.tile(block, 2), np.concatenate([left, left + 1])
     return csr_array((np.concatenate([(1.0 - share) * weight, share * weight]), (rows, columns)), shape=(len(total), grid))
+
+
+MEMORY = 2.0  # s, in which a boom's slowest swing is told from others near it
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """The filter for c channels: `matrix` (c, c) is the inverse of L, `past` (p, c, c) holds A_1 .. A_p."""
+
+    matrix: Array
+    past: Array
+
+    def __call__(self, residuals: Array) -> Array:
+        """White residuals of b blocks in a row, shape (.., b, c) to (.., b - p, c); 0 where a value it needs is missing."""
+        order, count = len(self.past), residuals.shape[-2]
+        left = residuals[..., order:, :].copy()
+        for k, gain in enumerate(self.past, start=1):
+            left -= residuals[..., order - k : count - k, :] @ gain.T
+        return np.asarray(np.nan_to_num(left @ self.matrix.T, nan=0.0))
+
+    def of_constant(self, values: Array) -> Array:
+        """What white residuals a constant (.., c) has in every block."""
+        return np.asarray((values - values @ self.past.sum(axis=0).T) @ self.matrix.T)
+
+
+def whitening_of(noise: Sequence[Array], length: float) -> NoiseModel:
+    """Fit the filter to realisations, each of shape (k, b, c), of blocks of `length` (s)."""
+    order = max(1, round(MEMORY / length))
+    past = np.concatenate([_lagged(each, order) for each in noise])
+    now = np.concatenate([each[:, order:].reshape(-1, each.shape[-1]) for each in noise])
+    gains = np.linalg.solve(past.T @ past, past.T @ now)
+    left = now - past @ gains
+    channels = now.shape[1]
+    factor = np.linalg.cholesky(left.T @ left / len(left))
+    return NoiseModel(np.linalg.inv(factor), gains.T.reshape(channels, order, channels).swapaxes(0, 1))
+
+
+def _lagged(noise: Array, order: int) -> Array:
+    """The values before every one, newest first, shape (k (b - p), p c)."""
+    count = noise.shape[1]
+    columns = [noise[:, order - k : count - k] for k in range(1, order + 1)]
+    return np.concatenate(columns, axis=2).reshape(-1, order * noise.shape[2])

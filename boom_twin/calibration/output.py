@@ -1,4 +1,4 @@
-"""A calibration as files: the scene with its comments kept, and the sensors' zeros as a mapping beside it."""
+"""Output of a calibration: the scene with its comments kept, sensor zeros as a mapping, a text and a flat object."""
 
 from __future__ import annotations
 
@@ -9,20 +9,18 @@ from typing import Any
 
 from ruamel.yaml.error import YAMLError
 
+from ..bag.session_sheet import kept
+from ..config.yaml_text import plain, with_value, yaml_text
 from ..errors import SceneError, UsageError
-from ..io.atomic import check_target, write_atomic
-from ..io.mapping import load_mapping
-from ..io.sensors import factor
-from ..io.sheet import kept
-from ..plain import plain
-from ..records import Stream
-from ..retouch import with_value, yaml_text
-from ..scene.end_mark import with_end_mark
-from ..scene.parts import Scene
-from ..scene.read import parse
-from ..scene.structure import structure
-from ..study.rewrite import anew
-from .run import Calibration
+from ..messages.mapping import load_mapping
+from ..messages.topic_table import factor
+from ..scene.edit import anew
+from ..scene.load import structure
+from ..scene.schema import Scene
+from ..scene.yaml_reader import parse, with_end_mark
+from ..system.atomic_files import check_target, write_atomic
+from ..types import Stream
+from .run import Calibration, Estimate
 
 DIGITS = 1e-5  # relative; values are written with six digits
 
@@ -134,3 +132,56 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return math.isclose(one, other, rel_tol=DIGITS)
     return bool(one == other)
+
+
+SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}
+"""Factor and unit in which zeros are shown."""
+
+
+def as_text(found: Calibration) -> list[str]:
+    """A table, what the sessions do not tell, and how the twin does on what was held out."""
+    rows = [("", "before", "now", "95 % interval", ""), *(_row(estimate) for estimate in found.estimates)]
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    lines = ["  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines += [f"{group}" for group in found.groups]
+    lines += ["", f"held out: {found.held_out}; residual rms over what is expected (1 is right)"]
+    channels = zip(found.before.names, found.before.spread.tolist(), found.after.spread.tolist(), strict=True)
+    lines += [f"  {name:10s} {before:8.2f} before  {after:6.2f} now" for name, before, after in channels]
+    return [*lines, f"fit: residuals {found.misfit:.2f} of what noise explains, {found.passes} passes", *found.remarks]
+
+
+def as_object(found: Calibration) -> dict[str, Any]:
+    """Keys of the flat object; SI."""
+    values: dict[str, Any] = {}
+    for estimate in found.estimates:
+        name = estimate.unknown.name
+        values |= {f"{name}_before": estimate.unknown.present, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+        values[name] = estimate.value if estimate.told else None
+    for kind, judged in (("before", found.before), ("after", found.after)):
+        spread = zip(judged.names, judged.spread.tolist(), strict=True)
+        values |= {f"held_out_{kind}_{name}": value for name, value in spread}
+    return values | {
+        "told": [estimate.unknown.name for estimate in found.estimates if estimate.told],
+        "not_told": [str(group) for group in found.groups],
+        "held_out": found.held_out,
+        "misfit": found.misfit,
+        "passes": found.passes,
+        "remarks": list(found.remarks),
+    }
+
+
+def shown(estimate: Estimate) -> tuple[float, str]:
+    """Factor from SI, and unit, in which a parameter is shown."""
+    unit = estimate.unknown.kind.unit
+    return SHOWN.get(unit, (1.0, unit)) if estimate.unknown.channel else (1.0, unit)
+
+
+def _row(estimate: Estimate) -> tuple[str, str, str, str, str]:
+    factor, unit = shown(estimate)
+    values = (estimate.unknown.present, estimate.value, estimate.low, estimate.high)
+    before, now, low, high = (factor * value for value in values)
+    interval = f"{low:.4g} to {high:.4g} {unit}"
+    if not estimate.told:
+        return estimate.unknown.name, f"{before:.4g}", "as before", interval, "cannot be told"
+    change = f"{100.0 * (now / before - 1.0):+.1f} %" if estimate.unknown.kind.relative else ""
+    return estimate.unknown.name, f"{before:.4g}", f"{now:.4g}", interval, change

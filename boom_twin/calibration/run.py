@@ -1,4 +1,4 @@
-"""A whole calibration: read, hold out, fit, judge."""
+"""Run a calibration: read sessions, hold out a part, fit, judge."""
 
 from __future__ import annotations
 
@@ -8,20 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bag.session_model import Mapped, mapping_of
+from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..io.session_model import Mapped, mapping_of
-from ..records import Stream
-from ..scene.named import with_parameters
-from ..scene.parts import Scene
-from ..settings import Settings
-from .blocks import block_length, blocks_of, channel_names, has_imu
-from .course import Course, course_of, refuse_short
-from .fit import Fit, fitted
-from .heldout import Judged, judged
-from .measured import NANO, Measured, read_sessions
-from .problem import Problem
-from .telling import Group, groups_of
+from ..scene.edit import with_parameters
+from ..scene.schema import Scene
+from ..types import Stream
+from .forward_model import CalibrationProblem
+from .least_squares import Fit, Group, fitted, groups_of
+from .noise_model import block_length, blocks_of, channel_names, has_imu
+from .sessions import NANO, MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
 from .unknowns import Unknown, unknowns_of, usual_names
+from .validation import HeldOutResult, judged
 
 KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 MOVED = 0.01  # m, least travel of some stroke
@@ -36,7 +34,7 @@ Progress = Callable[[float, str], None]
 class Choice:
     """What is to be estimated: `names`, or if there are none the usual ones with what else is asked for.
 
-    See `boom_twin.calibrate.unknowns.usual_names`.
+    See `boom_twin.calibration.unknowns.usual_names`.
     """
 
     names: tuple[str, ...] = ()
@@ -73,10 +71,10 @@ class Calibration:
     misfit : float
         Root mean square of the white residuals of the fit; 1 where the model explains all but noise.
     passes : int
-    sessions : tuple of Measured
+    sessions : tuple of MeasuredSession
     held_out : str
         What was not used for the fit.
-    before, after : Judged
+    before, after : HeldOutResult
         The twin's residuals there.
     mapped : Mapped
         How the sensors of the sessions were read.
@@ -90,10 +88,10 @@ class Calibration:
     groups: tuple[Group, ...]
     misfit: float
     passes: int
-    sessions: tuple[Measured, ...]
+    sessions: tuple[MeasuredSession, ...]
     held_out: str
-    before: Judged
-    after: Judged
+    before: HeldOutResult
+    after: HeldOutResult
     mapped: Mapped
     remarks: tuple[str, ...]
 
@@ -116,7 +114,7 @@ def calibrate(
     settings : Settings, optional
         Noise of the sensors; the package's own by default.
     mapping : path, optional
-        Of topics and sensors; by default as the sessions were recorded, see `boom_twin.io.mapping`.
+        Of topics and sensors; by default as the sessions were recorded, see `boom_twin.messages.mapping`.
     progress : callable, optional
         Told the share done and what comes next.
 
@@ -179,8 +177,8 @@ def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> 
 
 
 def _problem(
-    scene: Scene, unknowns: Sequence[Unknown], sessions: Sequence[Measured], mapped: Mapped, settings: Settings
-) -> tuple[Problem, int]:
+    scene: Scene, unknowns: Sequence[Unknown], sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings
+) -> tuple[CalibrationProblem, int]:
     """What is fitted, and the stamp from which on the last session is held out."""
     joints, imu = len(scene.joints), has_imu(sessions)
     courses = [course_of(session, settings) for session in sessions]
@@ -202,10 +200,10 @@ def _problem(
     length = block_length(sessions, imu)
     mounts = mapped.topics.mounts(joints)
     parts = [(course, blocks_of(session, course, length, imu, mounts)) for session, course in fitting]
-    return Problem(scene, unknowns, parts, channel_names(joints, imu), settings), kept_from
+    return CalibrationProblem(scene, unknowns, parts, channel_names(joints, imu), settings), kept_from
 
 
-def _refuse_other_boom(scene: Scene, sessions: Sequence[Measured], courses: Sequence[Course]) -> None:
+def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], courses: Sequence[SessionCourse]) -> None:
     """BagError where strokes are beyond what the scene's cylinders travel."""
     for session, course in zip(sessions, courses, strict=True):
         for i, joint in enumerate(scene.joints):
@@ -218,7 +216,7 @@ def _refuse_other_boom(scene: Scene, sessions: Sequence[Measured], courses: Sequ
                 )
 
 
-def _estimates(problem: Problem, fit: Fit, groups: Sequence[Group]) -> tuple[Estimate, ...]:
+def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Group]) -> tuple[Estimate, ...]:
     untold = {name for group in groups for name in group.names}
     reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
     found = []
@@ -228,7 +226,7 @@ def _estimates(problem: Problem, fit: Fit, groups: Sequence[Group]) -> tuple[Est
     return tuple(found)
 
 
-def _worse(before: Judged, after: Judged) -> list[str]:
+def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
     worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
     if not worse:
         return []
@@ -238,7 +236,9 @@ def _worse(before: Judged, after: Judged) -> list[str]:
     ]
 
 
-def _remarks(problem: Problem, fit: Fit, sessions: Sequence[Measured], mounts: Sequence[object], imu: bool) -> list[str]:
+def _remarks(
+    problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object], imu: bool
+) -> list[str]:
     found = []
     if fit.misfit > MISFIT:
         found.append(

@@ -1,4 +1,4 @@
-"""How the drives went, as a calibration takes it: smoothed forth and back on a uniform grid, which needs no estimate of now.
+"""Measured sessions as arrays, with strokes smoothed forth and back on a uniform grid.
 
 The filter is Butterworth's of third order run in both directions, so that its gain is 1 / (1 + (omega/omega_c)^6) without any
 lag: that of the twin's smoother for strokes that are integrated white jerk, with its corner omega_c = (q / (r T))^(1/6).
@@ -6,17 +6,143 @@ lag: that of the twin's smoother for strokes that are integrated white jerk, wit
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ..bag.joint_names import refuse_other_names
+from ..bag.reader import Session, check_topic, scan
+from ..config.settings import Settings
 from ..errors import BagError
-from ..records import Array, Stream
-from ..settings import Settings
-from .measured import NANO, Measured, Series
+from ..messages.topic_table import Topics
+from ..offline.reader_process import SampleReader
+from ..system.received_files import open_received
+from ..types import Array, Change, Sample, Stream
+
+NANO = 1e-9
+SHOWN = 12  # hex digits of a hash
+LOADS = ("payload", "line_fill")
+MISSING = 0.5  # largest share of values of a channel that may be missing
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples of one stream: stamps (ns, ascending), shape (m,), and values (SI), shape (m, channels)."""
+
+    stamps: NDArray[np.int64]
+    values: Array
+
+    def of(self, start: int, stop: int) -> Series:
+        """Those with stamps from `start` to `stop`."""
+        inside = (self.stamps >= start) & (self.stamps <= stop)
+        return Series(self.stamps[inside], self.values[inside])
+
+
+@dataclass(frozen=True)
+class MeasuredSession:
+    """One session.
+
+    Attributes
+    ----------
+    name : str
+    digest : str
+        First digits of the SHA-256 of its files.
+    series : dict of Stream to Series
+        The streams that it has.
+    changed : bool
+        Whether something was changed while it was recorded: a load, a zero.
+    """
+
+    name: str
+    digest: str
+    series: dict[Stream, Series]
+    changed: bool = False
+
+
+def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[MeasuredSession]:
+    """Read sessions, all at once.
+
+    Raises
+    ------
+    BagError
+        One cannot be read, is of another boom, or lacks strokes or angles of this one.
+    """
+    sessions = [scan(path) for path in paths]
+    for session in sessions:
+        refuse_other_names(session, topics, joints)
+    wanted = [_wanted(session, topics) for session in sessions]
+    with ExitStack() as stack:
+        readers = []
+        for session, names in zip(sessions, wanted, strict=True):
+            readers.append(SampleReader(session.path, topics, names, joints))
+            stack.callback(readers[-1].stop)
+        return [_measured(session, reader, joints) for session, reader in zip(sessions, readers, strict=True)]
+
+
+def _wanted(session: Session, topics: Topics) -> list[str]:
+    """Topics of strokes and angles, which must be there, and of the IMU if it is."""
+    names = []
+    for stream in (Stream.STROKES, Stream.ANGLES):
+        topic = topics.inputs[stream]
+        check_topic(session, topic.name, topic.type)
+        names.append(topic.name)
+    imu = session.find(topics.inputs[Stream.IMU].name)
+    return list(dict.fromkeys([*names, *([topics.inputs[Stream.IMU].name] if imu and imu.count else [])]))
+
+
+def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredSession:
+    found: dict[Stream, list[Sample]] = {stream: [] for stream in Stream}
+    changed = False
+    samples.wait_ready()
+    for sample in samples:
+        if isinstance(sample, Change):
+            changed |= any(sample.zeros.values()) or max(sample.settings.get(load, -1.0) for load in LOADS) >= 0.0
+        elif sample is not None:
+            found[sample.stream].append(sample)
+    series = {stream: _series(group) for stream, group in found.items() if group}
+    for stream, word in ((Stream.STROKES, "cylinder"), (Stream.ANGLES, "joint")):
+        if stream not in series:
+            raise BagError(
+                f"{session.path}: no usable value of {word}_1..{joints} (met: {_told(samples)}). "
+                "Is it a session of this boom? If its sensors have other names, give a mapping."
+            )
+    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(_shares_missing(series[Stream.STROKES]) > MISSING)]
+    if lacking:
+        raise BagError(
+            f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
+            "cylinders: give a session of this boom."
+        )
+    return MeasuredSession(session.path.resolve().name, _digest(session), series, changed)
+
+
+def _series(samples: list[Sample]) -> Series:
+    """Samples by stamp, the first of equal ones."""
+    stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
+    return Series(stamps, np.array([samples[i].values for i in first]))
+
+
+def _shares_missing(series: Series) -> Array:
+    return np.asarray(np.isnan(series.values).mean(axis=0))
+
+
+def _told(samples: SampleReader) -> str:
+    return ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"
+
+
+def _digest(session: Session) -> str:
+    digest = hashlib.sha256()
+    for file in session.files:
+        with open_received(file.path) as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()[:SHOWN]
+
 
 LARGEST_GAP = 0.5  # s between strokes; a session is used from one such gap to the next
 REST, SPEED = 1.0, 1e-3  # a course starts where no stroke has gone faster (m/s) than this for so long (s)
@@ -25,7 +151,7 @@ HIGHEST = 0.4  # of the grid's frequency, bound of the corner
 
 
 @dataclass(frozen=True)
-class Course:
+class SessionCourse:
     """Strokes of a stretch of a session on a uniform grid.
 
     Attributes
@@ -58,18 +184,18 @@ class Course:
         """From the first to the last instant, s."""
         return self.step * (len(self.strokes) - 1)
 
-    def until(self, time: float) -> Course:
+    def until(self, time: float) -> SessionCourse:
         """The part up to `time` (s)."""
         count = 1 + int(time / self.step)
         end = self.start + round(time / NANO)
-        return Course(self.start, self.step, self.strokes[:count], self.stamps[self.stamps <= end], self.corner)
+        return SessionCourse(self.start, self.step, self.strokes[:count], self.stamps[self.stamps <= end], self.corner)
 
     def smoothed(self, values: Array) -> Array:
         """What became of values at `stamps`, shape (k, ..), on the grid, shape (m, ..)."""
         return _smoothed(np.asarray((self.stamps - self.start) * NANO), values, self.times, self.corner)
 
 
-def course_of(session: Measured, settings: Settings) -> Course:
+def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
     """The longest stretch of a session without a gap, from where the boom rests.
 
     Raises
@@ -90,7 +216,7 @@ def course_of(session: Measured, settings: Settings) -> Course:
         raise BagError(f"{session.name}: the boom never rests for {REST:g} s, where a calibration starts. Record a hold first.")
     refuse_short(session.name, step * (len(grid) - 1 - first), "from the first rest on")
     start = int(series.stamps[0] + round(grid[first] / NANO))
-    return Course(start, step, strokes[first:], series.stamps[series.stamps >= start], corner)
+    return SessionCourse(start, step, strokes[first:], series.stamps[series.stamps >= start], corner)
 
 
 def refuse_short(name: str, duration: float, where: str) -> None:

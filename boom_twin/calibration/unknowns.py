@@ -1,4 +1,4 @@
-"""What a calibration may estimate: names, units, and what is taken to be likely before anything is measured."""
+"""Unknowns that a calibration may estimate: names, units, priors."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import UsageError
-from ..records import Stream, channels_of
-from ..scene.named import parameter, parameter_names
-from ..scene.parts import Scene
+from ..scene.edit import parameter, parameter_names
+from ..scene.schema import Scene
+from ..types import Stream, channels_of
 
 LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class UnknownKind:
     """A kind of parameter.
 
     Attributes
@@ -35,16 +35,16 @@ class Kind:
 
 
 KINDS = {
-    "k": Kind("N/m", 0.3, 0.1, relative=True),
-    "d": Kind("N s/m", 1.0, 0.2, relative=True),
-    "EI": Kind("N m^2", 0.3, 0.1, relative=True),
-    "beta": Kind("s", 1.0, 0.2, relative=True),
-    "mass": Kind("kg", 0.1, 0.05, relative=True),
-    "tip.payload": Kind("kg", 50.0, 5.0),
-    "line_fill": Kind("kg/m", 10.0, 1.0),
-    "joint": Kind("rad", math.radians(2.0), math.radians(0.05)),
-    "cylinder": Kind("m", 0.01, 5e-4),
-    "tip_imu": Kind("m/s^2", 0.3, 0.03),
+    "k": UnknownKind("N/m", 0.3, 0.1, relative=True),
+    "d": UnknownKind("N s/m", 1.0, 0.2, relative=True),
+    "EI": UnknownKind("N m^2", 0.3, 0.1, relative=True),
+    "beta": UnknownKind("s", 1.0, 0.2, relative=True),
+    "mass": UnknownKind("kg", 0.1, 0.05, relative=True),
+    "tip.payload": UnknownKind("kg", 50.0, 5.0),
+    "line_fill": UnknownKind("kg/m", 10.0, 1.0),
+    "joint": UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
+    "cylinder": UnknownKind("m", 0.01, 5e-4),
+    "tip_imu": UnknownKind("m/s^2", 0.3, 0.03),
 }
 """By the last word of a parameter's name; of zeros, by the sensor's."""
 
@@ -65,7 +65,7 @@ class Unknown:
         return match["channel"] if match else None
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> UnknownKind:
         """Unit and likely deviations."""
         match = _ZERO.fullmatch(self.name)
         return KINDS[match["sensor"] if match else self.name if self.name in KINDS else self.name.rpartition(".")[2]]

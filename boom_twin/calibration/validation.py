@@ -1,4 +1,4 @@
-"""Residuals of the twin itself on what was kept from the fit, before and after."""
+"""Validate a calibration on the sessions held out: the twin's residuals before and after."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from heapq import merge
 
 import numpy as np
 
+from ..config.settings import Settings
 from ..errors import BagError
-from ..records import Array, Mount, Residuals, Sample, Stream, channels_of
-from ..scene.parts import Scene
-from ..settings import Settings
-from ..twin import Twin
-from .measured import NANO, Measured
+from ..scene.schema import Scene
+from ..twin.twin import Twin
+from ..types import Array, Mount, Residuals, Sample, Stream, channels_of
+from .sessions import NANO, MeasuredSession
 
 
 @dataclass(frozen=True)
-class Judged:
+class HeldOutResult:
     """Residuals of k samples in c channels, NaN where not measured.
 
     Attributes
@@ -41,8 +41,13 @@ class Judged:
 
 
 def judged(
-    scene: Scene, settings: Settings, mounts: Sequence[Mount | None], session: Measured, zeros: Mapping[str, float], start: int
-) -> Judged:
+    scene: Scene,
+    settings: Settings,
+    mounts: Sequence[Mount | None],
+    session: MeasuredSession,
+    zeros: Mapping[str, float],
+    start: int,
+) -> HeldOutResult:
     """Run a session through the twin of `scene`, and keep the residuals from stamp `start` on.
 
     Parameters
@@ -72,10 +77,10 @@ def judged(
         at = names.index(residuals.names[0])
         values[row, at : at + len(residuals.names)] = residuals.values
         sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
-    return Judged(names, times, values, sigmas)
+    return HeldOutResult(names, times, values, sigmas)
 
 
-def _samples(session: Measured, zeros: Mapping[str, float], joints: int) -> list[Sample]:
+def _samples(session: MeasuredSession, zeros: Mapping[str, float], joints: int) -> list[Sample]:
     """All samples of a session in the order of their stamps, strokes first."""
     streams = []
     for order, (stream, names) in enumerate(channels_of(joints).items()):

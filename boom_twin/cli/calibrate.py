@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
-from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..calibrate.run import Calibration, Progress
-    from ..io.session_model import SessionScene
+    from ..bag.session_model import SessionScene
+    from ..calibration.run import Calibration, Progress
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -43,7 +43,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Calibrate, or learn a baseline; write, tell."""
-    from ..io.reader import scan
+    from ..bag.reader import scan
 
     code = _learn(args) if args.baseline else _calibrate(args)
     for bag in args.bags:
@@ -52,9 +52,9 @@ def run(args: Namespace) -> int:
 
 
 def _learn(args: Namespace) -> int:
-    from ..calibrate.baseline import baseline_of, write_baseline
-    from ..io.atomic import check_target
-    from ..settings import load_settings
+    from ..calibration.baseline import baseline_of, write_baseline
+    from ..config.settings import load_settings
+    from ..system.atomic_files import check_target
 
     check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
@@ -75,7 +75,7 @@ def _learn(args: Namespace) -> int:
 
 def _scene(args: Namespace) -> SessionScene:
     """The scene that all sessions have; UsageError if theirs differ."""
-    from ..io.session_model import scene_of
+    from ..bag.session_model import scene_of
 
     found = open_session_scene(args.bags[0], args.scene)
     for bag in args.bags[1:] if args.scene is None else []:
@@ -94,10 +94,9 @@ def _credit(args: Namespace) -> str:
 
 
 def _calibrate(args: Namespace) -> int:
-    from ..calibrate.run import Choice, calibrate
-    from ..calibrate.words import as_object, as_text
-    from ..calibrate.written import mapping_path, refuse_overwriting, write_mapping, write_scene
-    from ..settings import load_settings
+    from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
+    from ..calibration.run import Choice, calibrate
+    from ..config.settings import load_settings
 
     refuse_overwriting(args.out, _sources(args), args.force)
     scene = _scene(args)
@@ -139,9 +138,8 @@ def _bar() -> Iterator[Progress]:
 
 def _draw(found: Calibration, out: Path) -> list[Path]:
     """Pictures beside the scene."""
-    from ..calibrate.words import shown
-    from ..calibrate.written import picture_paths
-    from ..view.calibration import Interval, parameters_picture, residuals_picture
+    from ..calibration.output import picture_paths, shown
+    from ..plots.session import Interval, parameters_picture, residuals_picture
 
     note = f"held out: {found.held_out}"
     judged = (found.before, found.after)

@@ -8,12 +8,12 @@ from typing import Any
 
 from ..errors import Fault
 from ..scene import Scene
-from ..scene.explain import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..scene.load import DEFAULT_NAME, examine
-from ..scene.parts import Clearance
-from ..scene.splits import LEAST
-from . import need
-from .common import add_json, add_scene, open_scene, print_json
+from ..scene.schema import Clearance
+from ..scene.segmentation import LEAST
+from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
+from . import reduce as need
+from .main import add_json, add_scene, open_scene, print_json
 
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"

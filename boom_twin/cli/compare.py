@@ -9,11 +9,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .common import add_json, add_session_scene, open_session_scene, print_json
+from .main import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
-    from ..report.compare import Row
-    from ..report.side import Side
+    from ..report.compare import ComparedSession, ComparisonRow
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -59,11 +58,11 @@ def _check_place(out: Path) -> None:
         raise UsageError(f"{out}: holds {held[0]}, so it is a session or a replay. Choose another folder.")
 
 
-def _side(args: Namespace, path: Path, folder: Path) -> Side:
-    from ..io.results import REPLAY, result_folder
+def _side(args: Namespace, path: Path, folder: Path) -> ComparedSession:
+    from ..config.settings import load_settings
     from ..offline.replay import replay_into
-    from ..report.side import side_of, worked_out
-    from ..settings import load_settings
+    from ..report.compare import side_of, worked_out
+    from ..system.result_folder import REPLAY, result_folder
 
     sources = [Path(each) for each in (args.A, args.B, args.scene, args.params, args.baseline) if each]
 
@@ -78,9 +77,9 @@ def _side(args: Namespace, path: Path, folder: Path) -> Side:
     return side_of(path, replayed)
 
 
-def _draw(out: Path, one: Side, other: Side, rows: list[Row]) -> None:
+def _draw(out: Path, one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> None:
+    from ..plots.session import compare_picture
     from ..report.compare import SURE
-    from ..view.compare import compare_picture
 
     known = [(row.name, row.difference / row.sigma) for row in rows if row.sigma and row.difference is not None]
     out.mkdir(parents=True, exist_ok=True)

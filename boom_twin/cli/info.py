@@ -6,13 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..printable import printable
-from .common import add_json, add_session_scene, open_session_scene, print_json
+from ..system.terminal_text import printable
+from .main import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
-    from ..io.info import BagInfo
-    from ..io.session_model import SessionScene
-    from ..io.tally import Tally
+    from ..bag.inspect import BagInfo, Tally
+    from ..bag.session_model import SessionScene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -24,7 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Read the session once and tell."""
-    from ..io.info import inspect
+    from ..bag.inspect import inspect
 
     info = inspect(Path(args.bag))
     scene = open_session_scene(args.bag, args.scene)
@@ -37,7 +36,7 @@ def run(args: Namespace) -> int:
 
 def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
     """All that is known; lists have one entry for each of ``topics``."""
-    from ..io.needs import missing, names_extra, names_missing, remarks
+    from ..bag.advice import missing, names_extra, names_missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
     joints = len(scene.scene.joints)

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .common import add_session_scene, open_scene, open_session_scene, warn_incomplete
+from .main import add_session_scene, open_scene, open_session_scene, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..monitor.feed import Feed
+    from ..monitor.data.feed import Feed
+
 
 PORT = 8420
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
@@ -56,16 +57,15 @@ def run(args: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
-    from ..monitor.desk import Desk
-    from ..monitor.log import write_log
-    from ..monitor.recording import Recording
+    from ..monitor.actions import Recording, ViewerActions
+    from ..monitor.log_limit import write_log
 
     _give_way()
     write_log()
     recording = Recording(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
         with _feed(args) as feed:
-            _serve(args, feed, Desk(feed, frozenset(args.allow), recording))
+            _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
     finally:
         if recording is not None:
             recording.close()
@@ -90,9 +90,9 @@ def _give_way() -> None:
 def _feed(args: Namespace) -> Iterator[Feed]:
     """Of a session, or live."""
     if args.bag is not None:
-        from ..io.reader import scan
-        from ..monitor.bag import bag_feed
-        from ..settings import load_settings
+        from ..bag.reader import scan
+        from ..config.settings import load_settings
+        from ..monitor.data.bag_feed import bag_feed
 
         print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
         settings = load_settings(args.params)
@@ -101,12 +101,12 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline)) as feed:
             yield feed
         return
-    from ..ros.require import require_rclpy
+    from ..ros.startup import require_rclpy
 
     require_rclpy()
-    from ..io.mapping import load_mapping
-    from ..ros.context import ros
-    from ..ros.monitor import TopicFeed
+    from ..messages.mapping import load_mapping
+    from ..ros.monitor_feed import TopicFeed
+    from ..ros.runtime import ros
 
     with ros(["--ros-args", *args.ros_args]):
         shown = open_scene(args.scene) if args.scene else None
@@ -117,10 +117,10 @@ def _feed(args: Namespace) -> Iterator[Feed]:
 def _serve(args: Namespace, feed: Feed, desk: Any) -> None:
     import asyncio
 
-    from ..monitor.door import Door
+    from ..monitor.access_control import AccessControl
     from ..monitor.server import Server
 
-    door = Door(args.host)
+    door = AccessControl(args.host)
     try:
         asyncio.run(_run(args, Server(feed, desk, door), door.token))
     except OSError as error:
@@ -133,8 +133,8 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
 
     from aiohttp import web
 
+    from ..monitor.access_control import in_address
     from ..monitor.connections import Connections
-    from ..monitor.door import in_address
 
     stopped = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

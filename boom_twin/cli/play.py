@@ -1,20 +1,26 @@
-"""`boom_twin play`: publish a recorded session over ROS 2."""
+"""`boom_twin play`: publish a recorded session over ROS 2; keys of the terminal pause it."""
 
 from __future__ import annotations
 
+import os
+import select
 import sys
+import termios
+import tty
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from tqdm import tqdm
 
+from ..bag.reader import scan
 from ..errors import BoomTwinError
-from ..io.reader import scan
-from ..ros.require import require_rclpy
+from ..ros.startup import require_rclpy
 
 if TYPE_CHECKING:
-    from ..ros.player import Player
+    from ..ros.bag.player import Player
+
 
 BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
@@ -43,8 +49,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Play, and tell on stderr what was sent."""
     require_rclpy()
-    from ..ros.context import ros
-    from ..ros.player import Player
+    from ..ros.bag.player import Player
+    from ..ros.runtime import ros
 
     session = scan(args.bag)
     with ros([]):
@@ -67,7 +73,6 @@ def run(args: Namespace) -> int:
 
 def _play(player: Player, args: Namespace, length: float) -> None:
     """Once or for ever; the space bar of a terminal pauses."""
-    from .keys import Keys
 
     is_paused = False
 
@@ -115,3 +120,44 @@ def not_negative(text: str) -> float:
     if not 0.0 <= value < float("inf"):
         raise ArgumentTypeError(f"{text}: must be >= 0 and finite")
     return value
+
+
+class Keys:
+    """Use it as a context; it gives no keys where stdin is no terminal, or that of another program.
+
+    Leaving the context gives the terminal back as it was.
+    """
+
+    def __init__(self) -> None:
+        self._before: list[Any] | None = None
+
+    def __enter__(self) -> Self:
+        if _is_ours():
+            self._before = termios.tcgetattr(sys.stdin)
+            tty.setcbreak(sys.stdin, termios.TCSADRAIN)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._before is not None and _is_ours():
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+
+    @property
+    def are_read(self) -> bool:
+        """Whether there is a terminal."""
+        return self._before is not None
+
+    def pressed(self) -> str:
+        """The keys since the last call."""
+        if self._before is None or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
+            return ""
+        return os.read(sys.stdin.fileno(), 100).decode(errors="replace")
+
+
+def _is_ours() -> bool:
+    """Whether stdin is a terminal and this process in its foreground."""
+    try:
+        if not sys.stdin.isatty():
+            return False
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (OSError, ValueError, AttributeError):  # no controlling terminal; stdin closed
+        return sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()

@@ -13,19 +13,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..bag.session_sheet import SessionSheet
+from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
+from ..config.settings import load_thresholds
 from ..errors import BagError, BoomTwinError
-from ..io.mapping import load_mapping
-from ..io.sheet import Sheet
-from ..io.topics import DEFAULT_FILE, Topic, Topics
-from ..ros.require import require_rclpy
-from ..settings import DEFAULT_FILE as DEFAULT_PARAMETERS
-from ..thresholds import load_thresholds
-from .common import tell
+from ..messages.mapping import load_mapping
+from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
+from ..ros.startup import require_rclpy
+from .main import tell
 from .play import positive
 
 if TYPE_CHECKING:
-    from ..ros.recorder import Count
-    from ..ros.wanted import Wanted
+    from ..ros.bag.recorder import Count
+    from ..ros.bag.subscriptions import Wanted
+
 
 SMALLEST = 2**20
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
@@ -59,13 +60,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
     require_rclpy()
-    from ..io.bagwriter import BagWriter
-    from ..io.incomplete import incompleteness
-    from ..io.storage import Split, Storage
-    from ..ros.context import ros
-    from ..ros.recorder import record, recorder_node
-    from ..ros.stop import on_stop_signal
-    from ..ros.wanted import resolved, resolved_mapping
+    from ..bag.async_writer import Split, Storage
+    from ..bag.session_sheet import incompleteness
+    from ..bag.writer import BagWriter
+    from ..ros.bag.recorder import record, recorder_node
+    from ..ros.bag.subscriptions import resolved, resolved_mapping
+    from ..ros.runtime import ros
+    from ..ros.startup import on_stop_signal
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
@@ -102,11 +103,11 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _sheet(args: Namespace) -> Sheet:
+def _sheet(args: Namespace) -> SessionSheet:
     """What is known before anything is recorded; the files that are given must be valid."""
+    from ..bag.session_model import scene_from
+    from ..config.settings import load_settings
     from ..health.baseline import load_baseline
-    from ..io.session_model import scene_from
-    from ..settings import load_settings
 
     load_settings(args.params)
     scene = None if args.scene is None else scene_from(args.scene)
@@ -114,7 +115,7 @@ def _sheet(args: Namespace) -> Sheet:
         tell(scene.oddities, scene.source)
     if args.baseline:
         load_baseline(args.baseline)
-    return Sheet(
+    return SessionSheet(
         __version__,
         scene=None if scene is None else scene.text,
         baseline=args.baseline and args.baseline.read_text(encoding="utf-8-sig"),
@@ -126,9 +127,9 @@ def _sheet(args: Namespace) -> Sheet:
     )
 
 
-def _met(sheet: Sheet, told: Mapping[str, Any]) -> Sheet:
+def _met(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
     """With what the running twin tells of itself; what was given instead stays, and the difference is told."""
-    from ..ros.recorder import TEXTS
+    from ..ros.bag.recorder import TEXTS
 
     changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
     for name in TEXTS:
@@ -155,7 +156,7 @@ def _tell(counts: list[Count]) -> None:
 
 def _wanted(args: Namespace, known: Topics) -> list[Wanted]:
     """The topics of the command line, or the chosen ones of the mapping."""
-    from ..ros.wanted import Wanted, wanted_of
+    from ..ros.bag.subscriptions import Wanted, wanted_of
 
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
     outputs = {topic.absolute: topic for topic in [*known.outputs.values(), known.events]}

@@ -7,11 +7,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..printable import printable
-from .common import add_json, print_json
+from ..system.terminal_text import printable
+from .main import add_json, print_json
 
 if TYPE_CHECKING:
-    from ..io.outcome import Outcome
+    from ..bag.recovery.recover import Recovery
+
 
 SHOWN = 20
 """Faults that are printed one by one."""
@@ -32,7 +33,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Save, and tell what was saved and what was lost."""
-    from ..io.recover import recover
+    from ..bag.recovery.recover import recover
 
     outcome = recover(Path(args.bag), Path(args.out), args.unverified)
     for path, fault in outcome.faults[:SHOWN]:
@@ -46,7 +47,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def as_json(outcome: Outcome, out: str) -> dict[str, Any]:
+def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
     """The count; lists have one entry for each of ``topics``, null in ``lost`` is unknown."""
     topics = sorted({*outcome.saved, *(outcome.lost or {})})
     return {
@@ -61,7 +62,7 @@ def as_json(outcome: Outcome, out: str) -> dict[str, Any]:
     }
 
 
-def as_text(outcome: Outcome, out: str) -> list[str]:
+def as_text(outcome: Recovery, out: str) -> list[str]:
     """The same for people."""
     told = as_json(outcome, out)
     wide = max(len(topic) for topic in told["topics"])

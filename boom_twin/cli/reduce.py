@@ -1,4 +1,4 @@
-"""`boom_twin check --need tip=1mm`: the leanest model that keeps the tip, in words, as a flat object and as a scene file."""
+"""`boom_twin check --need tip=1mm`: the leanest model that keeps the tip, in words, as JSON and as a scene file."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..io.atomic import check_target, write_atomic
 from ..scene import Scene
-from ..scene.end_mark import with_end_mark
 from ..scene.load import default_text
-from ..scene.read import read_text
+from ..scene.yaml_reader import read_text, with_end_mark
+from ..system.atomic_files import check_target, write_atomic
 
-if TYPE_CHECKING:  # at run time only when --need is given: they import the compiler
-    from ..study.edits import Edit
-    from ..study.need import Proposal
+if TYPE_CHECKING:
+    from ..reduction.search import Proposal
+    from ..scene.edit import Edit
+
 
 UNITS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}  # in m
 FORM = "give the error that the tip may have, like tip=1mm, tip=0.5cm or tip=0.001 (m)"
@@ -73,7 +73,7 @@ def tip_error(text: str) -> float:
 
 def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
     """Look for the leanest model, telling on stderr how it goes."""
-    from ..study.need import propose
+    from ..reduction.search import propose
 
     shown = sys.stderr.isatty()
 
@@ -130,7 +130,7 @@ def report(scene: Scene, found: Proposal, most: float) -> list[str]:
 
 def write(source: str | None, scene: Scene, found: Proposal, most: float, out: Path) -> None:
     """The lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
-    from ..study.rewrite import rewritten
+    from ..scene.edit import rewritten
 
     text = default_text() if source is None else read_text(Path(source))
     head = [

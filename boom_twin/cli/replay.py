@@ -9,13 +9,13 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..io.session_model import SessionScene
+    from ..bag.session_model import SessionScene
+    from ..config.settings import Settings
     from ..offline.replay import Replay
-    from ..records import Array
-    from ..settings import Settings
+    from ..types import Array
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -44,10 +44,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
-    from ..io.results import REPLAY, result_folder
+    from ..config.settings import load_settings
     from ..offline.replay import replay_into
-    from ..report.loads import section_heights
-    from ..settings import load_settings
+    from ..report.quantities import section_heights
+    from ..system.result_folder import REPLAY, result_folder
 
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
@@ -72,9 +72,9 @@ def _write(
     args: Namespace, result: Replay, scene: SessionScene, settings: Settings, heights: Array | None, out: Path
 ) -> list[Path]:
     """Figures, pictures and report, as they are wanted."""
-    from ..pictures import draw
+    from ..offline.history import draw
+    from ..report.compare import worked_out
     from ..report.page import Subject, write_report
-    from ..report.side import worked_out
 
     history, still, path = worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, out)
     files = [path]

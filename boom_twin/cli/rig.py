@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .. import __version__
-from .common import add_scene, tell
+from .main import add_scene, tell
 
 ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 
@@ -29,16 +29,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
-    from ..io.results import RIG, result_folder
-    from ..io.session import write_session
-    from ..io.session_model import scene_from
-    from ..io.sheet import Sheet
-    from ..rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
-    from ..rig.faults import check, parse
-    from ..rig.faulty_scene import with_faults
-    from ..rig.faulty_sensors import spoil
-    from ..rig.wrong import wrong_by
-    from ..truth import FILE_NAME
+    from ..bag.session_files import write_session
+    from ..bag.session_model import scene_from
+    from ..bag.session_sheet import SessionSheet
+    from ..offline.ground_truth import FILE_NAME
+    from ..system.result_folder import RIG, result_folder
+    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
+    from ..validation.rig.faults import check, parse, spoil, with_faults, wrong_by
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell(assumed.oddities, assumed.source)
@@ -60,7 +57,7 @@ def run(args: Namespace) -> int:
         arrays = session.stamps, session.strokes, session.joints, session.imu
         write_session(building.folder, *arrays, notes, session.angle_stamps)
         # not the boom that was simulated: what a twin is to assume
-        Sheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
+        SessionSheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
         session.save_truth(building.folder / FILE_NAME)
     print(out)
     return 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from ..scene.end_mark import with_end_mark
 from ..scene.load import clearance_text, default_text
+from ..scene.yaml_reader import with_end_mark
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import UsageError
-from ..io.atomic import check_target, write_atomic
-from ..records import Array
 from ..scene import Scene
-from .common import add_scene, open_scene
+from ..system.atomic_files import check_target, write_atomic
+from ..types import Array
+from .main import add_scene, open_scene
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 
@@ -34,7 +34,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
     from ..analysis.simulate import simulate
-    from ..plan.compile import compile_scene
+    from ..compiler.compile import compile_scene
 
     scene = open_scene(args.scene)
     if args.orbits and not compile_scene(scene).pins:
@@ -56,8 +56,8 @@ def run(args: Namespace) -> int:
     for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
         print(f"{name}: contact lost {lost} times")
     if args.orbits:
-        from ..view.orbits import orbits_picture  # with the plotting library
-        from ..view.records import Orbits
+        from ..plots.history import Orbits
+        from ..plots.posture import orbits_picture
 
         gaps = compile_scene(scene).tables.clearances.gap
         orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)

@@ -7,10 +7,10 @@ import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 
-from .common import add_json, add_scene, open_scene, print_json
+from .main import add_json, add_scene, open_scene, print_json
 
 if TYPE_CHECKING:
-    from ..analysis.statics import Equilibrium
+    from ..analysis.equilibrium import Equilibrium
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -32,7 +32,7 @@ def numbers(text: str) -> list[float]:
 
 def run(args: Namespace) -> int:
     """Solve and print."""
-    from ..analysis.statics import statics
+    from ..analysis.equilibrium import statics
 
     scene = open_scene(args.scene)
     found = statics(scene, strokes=args.strokes, posture=args.posture)

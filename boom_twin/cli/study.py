@@ -12,18 +12,18 @@ from pathlib import Path
 # program is timed on one core.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# kind: (module in boom_twin.study with write(scene, out, quick, posture) -> paths, what it does)
+# kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
-    "error": ("error", "error against run time of all methods, beside two other programs"),
-    "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
+    "error": ("error.report", "error against run time of all methods, beside two other programs"),
+    "stability": ("stability.report", "where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
-    "clearance": ("clearance", "play in the pins: the tip after a stop and at rest, convergence, what a pin costs"),
+    "clearance": ("clearance.report", "play in the pins: the tip after a stop and at rest, convergence, what a pin costs"),
 }
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """A parser for every kind."""
-    from .common import add_scene
+    from .main import add_scene
 
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
     for name, (_, purpose) in KINDS.items():
@@ -38,9 +38,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compute and write the report; prints the files."""
-    from .common import open_scene
+    from .main import open_scene
 
-    write: Callable[..., list[Path]] = import_module(f"boom_twin.study.{KINDS[args.kind][0]}").write
+    write: Callable[..., list[Path]] = import_module(f"boom_twin.validation.study.{KINDS[args.kind][0]}").write
     options = {"soak": True} if getattr(args, "soak", False) else {}
     for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture, **options):
         print(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from .common import add_scene, open_scene
+from .main import add_scene, open_scene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -15,7 +15,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Print the document."""
-    from ..io.urdf import urdf
+    from ..messages.urdf import urdf
 
     sys.stdout.write(urdf(open_scene(args.scene)))
     return 0

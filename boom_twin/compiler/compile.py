@@ -1,4 +1,4 @@
-"""Scene -> compiled boom: which operation stands where along the chain, and where its numbers sit in memory.
+"""Compile a scene: which operation stands where along the chain, and where its numbers sit in memory.
 
 Only what the scene names gets rows. Section axes: x from the inboard pivot; the head's frame starts where the beam ends.
 """
@@ -11,16 +11,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..chain import program
-from ..chain.program import Tables
-from ..physics import contact, cylinder, modes
-from ..physics.linkage import LINK_L, LINK_R, LINKAGE
-from ..records import Array
+from ..kernels import tables as program
+from ..kernels.elements import beam_shapes as modes
+from ..kernels.elements import cylinder
+from ..kernels.elements import pin_contact as contact
+from ..kernels.elements.linkage import LINK_L, LINK_R, LINKAGE
+from ..kernels.tables import Tables
 from ..scene.kinematics import gravity_in_base, linkage
-from ..scene.parts import Cylinder, Pin, RigidPart, Scene
-from ..scene.splits import SAME_PLACE, flexible_parts
-from .layout import Layout
-from .plan import Plan
+from ..scene.schema import Cylinder, Pin, RigidPart, Scene
+from ..scene.segmentation import SAME_PLACE, flexible_parts
+from ..types import Array
+from .plan import Layout, Plan
 
 BasisName = Literal["end-shapes", "cantilever"]
 BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantilever_modes}
@@ -35,7 +36,7 @@ FINE = 0.1  # increment of an offset, as a share of its clearance, that counts a
 
 
 def compile_scene(scene: Scene, basis: BasisName = "end-shapes") -> Plan:
-    """Compile `scene`; `basis` chooses the bending shapes of all flexible parts (see `boom_twin.physics.modes`)."""
+    """Compile `scene`; `basis` chooses the bending shapes of all parts (`boom_twin.kernels.elements.beam_shapes`)."""
     builder = _Builder(scene, basis)
     for index in range(len(scene.sections)):
         builder.joint(index)
@@ -232,9 +233,7 @@ class _Builder:
         axial = int(self.scene.has_axial(index))
         z = self.layout.unknowns([f"q{k + 1}_part{part}" for k in range(n)] + [f"eps_part{part}"] * axial)
         self.scale += [1.0] * n + [length] * axial
-        history = self.layout.histories(
-            [m for m in mass for _ in range(2)], [m * g for m in mass for g in self.gravity]
-        )
+        history = self.layout.histories([m for m in mass for _ in range(2)], [m * g for m in mass for g in self.gravity])
         if section.rho_I:
             self.layout.histories(list(turning), [0.0] * points)
         row = self.layout.add(

@@ -1,17 +1,81 @@
-"""A compiled boom, and the arrays that a step of it works on."""
+"""The compiled boom: tables of records built row by row, the arrays that a step works on, and the rows that kernels write."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from ..chain.program import SLOTS, State, Tables, Work
-from ..physics import contact
-from ..physics.integrators import DEPTH, new_weights
-from ..records import Array
+from ..kernels import tables as program
+from ..kernels.elements import pin_contact as contact
+from ..kernels.elements.beam import BEAM as BEAM_ROW
+from ..kernels.elements.cylinder import CYLINDER, CYLINDER_PART
+from ..kernels.elements.linkage import LINKAGE
+from ..kernels.elements.pin_contact import CLEARANCE
+from ..kernels.integrators import DEPTH, new_weights
+from ..kernels.tables import SLOTS, State, Tables, Work
+from ..kernels.transfer.time_step import observe, observe_pins
+from ..types import Array
 
-LOOP = 11 + 8 + SLOTS - 3  # most rows of the system of a six-bar: see `chain.substructure_b`
+DTYPES = {
+    "operations": program.OPERATION,
+    "joints": program.JOINT,
+    "linkages": LINKAGE,
+    "links": program.LINK,
+    "offsets": program.OFFSET_ROW,
+    "bodies": program.BODY_ROW,
+    "beams": BEAM_ROW,
+    "outlets": program.OUTLET,
+    "cylinders": CYLINDER,
+    "parts": CYLINDER_PART,
+    "clearances": CLEARANCE,
+}
+
+
+@dataclass
+class Layout:
+    """Rows so far, names of the unknowns, and of every history of a mass point its inertia and its weight.
+
+    Inertia in kg or kg m^2, weight in N along x or y. Histories of the unknowns come first, so places of histories shift by
+    their number in `table`.
+    """
+
+    rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: {name: [] for name in DTYPES})
+    names: list[str] = field(default_factory=list)
+    masses: list[float] = field(default_factory=list)
+    weights: list[float] = field(default_factory=list)
+
+    def add(self, table: str, **values: Any) -> int:
+        """Append a row; returns its index."""
+        self.rows[table].append(values)
+        return len(self.rows[table]) - 1
+
+    def operate(self, kind: int, row: int) -> None:
+        """Append an operation along the chain."""
+        self.add("operations", kind=kind, row=row)
+
+    def unknowns(self, names: list[str]) -> int:
+        """Places for unknowns of these names; returns the first."""
+        self.names.extend(names)
+        return len(self.names) - len(names)
+
+    def histories(self, masses: list[float], weights: list[float]) -> int:
+        """Places for histories of mass points, counted from the first one behind the unknowns; returns the first."""
+        self.masses.extend(masses)
+        self.weights.extend(weights)
+        return len(self.masses) - len(masses)
+
+    def table(self, name: str) -> np.recarray:
+        """The finished table, possibly of length 0."""
+        rows = np.zeros(len(self.rows[name]), DTYPES[name])
+        for i, values in enumerate(self.rows[name]):
+            for key, value in values.items():
+                rows[key][i] = value + len(self.names) if key in ("history", "turn") else value
+        return rows.view(np.recarray)
+
+
+LOOP = 11 + 8 + SLOTS - 3  # most rows of the system of a six-bar: see `kernels.transfer.six_bar`
 
 
 @dataclass(frozen=True)
@@ -73,3 +137,53 @@ class Plan:
             angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
             drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
         )  # fmt: skip
+
+
+TIP = 9  # x, v, a of tip x, y, angle
+PIN = 4  # x and y of the journal's offset, force, contact
+
+
+@dataclass(frozen=True)
+class Rows:
+    """m instants of a boom with n joints and k pins with clearance.
+
+    Attributes
+    ----------
+    joints, cylinder_forces : ndarray, shape (m, n)
+        rad, N.
+    tip : ndarray, shape (m, 3, 3)
+        Position, velocity, acceleration; of x, y (m) and orientation (rad).
+    pins : ndarray, shape (m, k, 4)
+        Offset x, y of the journal in its bush (m), contact force (N), 1 where they touch.
+    """
+
+    joints: Array
+    cylinder_forces: Array
+    tip: Array
+    pins: Array
+
+    def at(self, rows: Array) -> Rows:
+        """Some of the instants, by their numbers."""
+        return Rows(self.joints[rows], self.cylinder_forces[rows], self.tip[rows], self.pins[rows])
+
+
+def row_width(plan: Plan) -> int:
+    """Numbers of one instant."""
+    return 2 * plan.joints + TIP + PIN * len(plan.pins)
+
+
+def first_row(plan: Plan, state: State) -> Array:
+    """The instant in `state`, shape (row_width,)."""
+    row = np.zeros(row_width(plan))
+    observe(plan.tables, state, row)
+    observe_pins(plan.tables, state, row, 2 * plan.joints + TIP)
+    return row
+
+
+def taken_apart(plan: Plan, rows: Array) -> Rows:
+    """Rows as the kernels wrote them, shape (m, row_width), by name."""
+    n = plan.joints
+    end = 2 * n + TIP
+    return Rows(
+        rows[:, :n], rows[:, n : 2 * n], rows[:, 2 * n : end].reshape(-1, 3, 3), rows[:, end:].reshape(len(rows), -1, PIN)
+    )

@@ -1,4 +1,4 @@
-"""Whether strokes and angles fit one another on the scene: if not, they are of another boom."""
+"""Check whether strokes and angles fit one another on the scene: if not, they are of another boom."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 
-from ..records import Array, Report, Sample, Stream
+from ..types import Array, Report, Sample, Stream
 
 WINDOW = 5_000_000_000
 """Time (ns) over which angles are judged together."""

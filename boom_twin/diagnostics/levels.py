@@ -1,17 +1,91 @@
-"""Several quantities of one component judged into one status."""
+"""Diagnostic levels: the status of a component (REP-107), hysteresis in value and time, several quantities judged into one."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import replace
-from math import isfinite
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from math import isfinite, nan
 
-from ..thresholds import Thresholds
-from .gate import Bounds, Gate, Patience
-from .status import Level, Status
+from ..config.settings import Thresholds
 
 
-class Judge:
+class Level(IntEnum):
+    """How a component is; the numbers are those of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """State of one component.
+
+    Attributes
+    ----------
+    name : str
+        Without the node's.
+    level : Level
+    message : str
+        One line.
+    values : dict of str to str, int or float
+        Units are at the end of the keys.
+    """
+
+    name: str
+    level: Level
+    message: str
+    values: Mapping[str, str | int | float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Above these a quantity has that level, or below these if it is `low` that is bad; NaN is no limit."""
+
+    warn: float = nan
+    error: float = nan
+    low: bool = False
+
+    def level(self, value: float, held: Level, release: float) -> Level:
+        """The level of `value`, where a level that is `held` is left at `release` times its limit (if low: over `release`)."""
+        for level, limit in ((Level.ERROR, self.error), (Level.WARN, self.warn)):
+            share = release if level <= held else 1.0
+            if value < limit / share if self.low else value > limit * share:
+                return level
+        return Level.OK
+
+
+@dataclass(frozen=True, slots=True)
+class Persistence:
+    """How long (s) a worse and a better level must last before it counts, and the share of a limit where it is left."""
+
+    raise_after: float
+    clear_after: float
+    release: float
+
+
+class Hysteresis:
+    """The level of one quantity; a NaN is no reason to change it to a worse one."""
+
+    def __init__(self) -> None:
+        self.level = Level.OK
+        self._agreed: float | None = None
+
+    def update(self, value: float, bounds: Bounds, patience: Persistence, now: float) -> Level:
+        """The level at the time `now` (s, of a clock that only goes forward)."""
+        seen = bounds.level(value, self.level, patience.release)
+        if seen == self.level or self._agreed is None:
+            self._agreed = now
+        wait = patience.raise_after if seen > self.level else patience.clear_after
+        if now - self._agreed >= wait:
+            self.level, self._agreed = seen, now
+        return self.level
+
+
+class ComponentJudge:
     """Judges one component again and again: `begin`, any number of `check` and `note`, `finish`.
 
     Parameters
@@ -22,7 +96,7 @@ class Judge:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._gates: defaultdict[str, Gate] = defaultdict(Gate)
+        self._gates: defaultdict[str, Hysteresis] = defaultdict(Hysteresis)
         self._words: dict[str, str] = {}
         self._level: Level | None = None
         self._since = 0.0
@@ -35,7 +109,7 @@ class Judge:
     def begin(self, now: float, thresholds: Thresholds) -> None:
         """A new look, at the time `now` (s, of a clock that only goes forward)."""
         self._now = now
-        self._patience = Patience(thresholds.raise_after, thresholds.clear_after, thresholds.release)
+        self._patience = Persistence(thresholds.raise_after, thresholds.clear_after, thresholds.release)
         self._faults: list[tuple[Level, str]] = []
         self._values: dict[str, str | int | float] = {}
 

@@ -1,15 +1,18 @@
-"""Whether the model keeps up with the strokes."""
+"""Status of the model: whether it keeps up, whether residuals are explained by noise, what the health monitor has found."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
-from math import nan
+from math import nan, sqrt
+from typing import NamedTuple
 
-from ..records import Report
-from ..thresholds import Thresholds
-from .gate import Bounds
-from .judge import Judge
-from .status import Level, Status
+import numpy as np
+
+from ..config.settings import Thresholds
+from ..health.alarms import Alarms, values_of
+from ..types import Alarm, Array, Health, Report
+from .levels import Bounds, ComponentJudge, Level, Status
 
 HOLD = 1.0
 """Seconds for which a failure is shown."""
@@ -25,7 +28,7 @@ class ModelWatch:
     """
 
     def __init__(self) -> None:
-        self._judge = Judge("model")
+        self._judge = ComponentJudge("model")
         self.begin(0.0)
 
     def begin(self, now: float) -> None:
@@ -73,7 +76,7 @@ class ModelWatch:
             Whether the twin listens, and strokes come.
         thresholds : Thresholds
         now, clock : float
-            As for `boom_twin.watch.sensor.SensorJudge`.
+            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
         """
         judge = self._judge
         judge.begin(now, thresholds)
@@ -105,3 +108,107 @@ class ModelWatch:
         told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0
+
+
+class _Sums(NamedTuple):
+    """Of the normalised residuals in one look: its time (s), and how many, their sum, squares and largest magnitude."""
+
+    time: float
+    number: int
+    total: float
+    squares: float
+    largest: float
+
+
+class ResidualJudge:
+    """Judges one channel by the root mean square of its normalised residual, which is 1 where noise explains all.
+
+    Parameters
+    ----------
+    name : str
+        Of the channel.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._judge = ComponentJudge(f"residual {name}")
+        self._window: deque[_Sums] = deque()
+
+    def take(self, normalised: Array, now: float) -> None:
+        """Normalised residuals, shape (k,), that became known since the last look; NaN where not measured."""
+        known = normalised[np.isfinite(normalised)]
+        if len(known):
+            squares = float(known @ known)
+            self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
+
+    def status(self, alarm: tuple[Level, str] | None, thresholds: Thresholds, now: float, clock: float) -> Status:
+        """State of the channel, with its alarm if there is one; times as for `SensorJudge`."""
+        while self._window and self._window[0].time <= now - thresholds.residual_window:
+            self._window.popleft()
+        judge, count = self._judge, sum(sums.number for sums in self._window)
+        judge.begin(now, thresholds)
+        rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
+        told = f"{rms:.2f} times as large as noise explains, for {thresholds.residual_window:g} s"
+        if alarm is not None:
+            judge.fault(*alarm)
+        judge.check("rms_normalised", rms, Bounds(thresholds.residual_warn, thresholds.residual_error), told)
+        judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
+        judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))
+        judge.note("count", count)
+        judge.note("window_s", thresholds.residual_window)
+        if not count:
+            judge.fault(Level.STALE, f"none for {thresholds.residual_window:g} s")
+        return judge.finish(clock, "as large as noise explains")
+
+
+class HealthWatch:
+    """Alarms that last, and those that ended and are not acknowledged.
+
+    Attributes
+    ----------
+    has_news : bool
+        Whether an alarm began since the last look.
+    """
+
+    def __init__(self) -> None:
+        self._judge = ComponentJudge("health")
+        self._alarms = Alarms()
+        self.has_news = False
+
+    def took(self, health: Health) -> None:
+        """Go on with what the twin tells."""
+        before = len(self._alarms.all)
+        self._alarms.take(health)
+        self.has_news |= len(self._alarms.all) > before
+
+    def acknowledge(self) -> str:
+        """Let go of alarms that ended; says which."""
+        ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
+        self._alarms.forget_ended()
+        return "; ".join(f"{alarm.channel}: {alarm.told}" for alarm in ended) or "no alarm has ended"
+
+    def of(self, channel: str) -> Alarm | None:
+        """The alarm that lasts in a channel."""
+        return next((alarm for alarm in self._alarms.lasting if alarm.channel == channel), None)
+
+    def status(self, thresholds: Thresholds, now: float, clock: float) -> Status:
+        """State of the rig; times as for `SensorJudge`."""
+        judge, self.has_news = self._judge, False
+        judge.begin(now, thresholds)
+        alarms = self._alarms.all
+        judge.note("alarms", len(self._alarms.lasting))
+        judge.note("not_acknowledged", len(alarms) - len(self._alarms.lasting))
+        for number, alarm in enumerate(alarms, 1):
+            judge.fault(level_of(alarm), told_of(alarm))
+            for key, value in {"channel": alarm.channel, **values_of(alarm)}.items():
+                judge.note(f"{number} {key}", value)
+        return judge.finish(clock, "no alarm")
+
+
+def level_of(alarm: Alarm) -> Level:
+    """An error is what lasts and has a name."""
+    return Level.WARN if alarm.until is not None or alarm.cause is None else Level.ERROR
+
+
+def told_of(alarm: Alarm) -> str:
+    """In words."""
+    return f"{alarm.channel}: {alarm.told}" + ("" if alarm.until is None else " (ended; not acknowledged)")

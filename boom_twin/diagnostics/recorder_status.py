@@ -1,14 +1,12 @@
-"""Whether a recording is complete, on the disk, and has room."""
+"""Status of a recording: whether it is complete, on the disk, and has room."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..thresholds import Thresholds
-from .gate import Bounds
-from .judge import Judge
-from .status import Level, Status
+from ..config.settings import Thresholds
+from .levels import Bounds, ComponentJudge, Level, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +46,7 @@ class RecordingJudge:
     """Judges one recording."""
 
     def __init__(self) -> None:
-        self._judge = Judge("recording")
+        self._judge = ComponentJudge("recording")
 
     def status(
         self,
@@ -69,7 +67,7 @@ class RecordingJudge:
             Why it ended too early; empty if it ended in order, None while it runs.
         thresholds : Thresholds
         now, clock : float
-            As for `boom_twin.watch.sensor.SensorJudge`.
+            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
         """
         judge, missed = self._judge, sum(topic.missed or 0 for topic in topics.values())
         judge.begin(now, thresholds)

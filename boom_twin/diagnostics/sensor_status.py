@@ -1,16 +1,17 @@
-"""Whether one sensor measures."""
+"""Status of every sensor: whether it measures, is frozen, or silent."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isnan
+from math import inf, isnan, radians
 
-from ..thresholds import Thresholds
-from .channel import Figures
-from .frozen import readings_of_frozen
-from .gate import Bounds
-from .judge import Judge
-from .status import Status
+from ..config.settings import Settings, Thresholds
+from ..health.sensor_monitor import readings_of_frozen
+from ..scene.schema import Scene
+from ..types import Mount, Stream
+from .levels import Bounds, ComponentJudge, Status
+from .stream_stats import ChannelStats
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,14 +34,14 @@ class SensorJudge:
     """Judges one sensor by its figures."""
 
     def __init__(self, sensor: Sensor) -> None:
-        self._sensor, self._judge = sensor, Judge(f"sensor {sensor.name}")
+        self._sensor, self._judge = sensor, ComponentJudge(f"sensor {sensor.name}")
 
-    def status(self, figures: Figures, age: float, thresholds: Thresholds, now: float, clock: float) -> Status:
+    def status(self, figures: ChannelStats, age: float, thresholds: Thresholds, now: float, clock: float) -> Status:
         """State of the sensor.
 
         Parameters
         ----------
-        figures : Figures
+        figures : ChannelStats
         age : float
             Since its last reading, s.
         thresholds : Thresholds
@@ -64,7 +65,7 @@ class SensorJudge:
         self._check_frozen(figures, thresholds)
         return judge.finish(clock, "measuring" if figures.stamp else "waiting for a reading")
 
-    def _check_range(self, figures: Figures, share: Bounds) -> None:
+    def _check_range(self, figures: ChannelStats, share: Bounds) -> None:
         if self._sensor.high < inf:
             low, high, unit = self._sensor.low, self._sensor.high, self._sensor.unit
             told = f"{figures.outside:.1%} of the readings out of {low:.6g} to {high:.6g} {unit}, newest {figures.value:.6g}"
@@ -72,10 +73,44 @@ class SensorJudge:
             self._judge.note(f"high_{unit}", high)
             self._judge.check("outside_share", figures.outside, share, told)
 
-    def _check_frozen(self, figures: Figures, thresholds: Thresholds) -> None:
+    def _check_frozen(self, figures: ChannelStats, thresholds: Thresholds) -> None:
         """How long the reading has not changed, against what noise explains."""
         known = 0.0 if isnan(figures.rate) else 1.0 / figures.rate
         needed = readings_of_frozen(self._sensor.sigma, self._sensor.resolution, thresholds.frozen_false_alarm)
         limit, unchanged = max(thresholds.frozen_after, needed * known), figures.unchanged * known
         told = f"the reading has not changed for {unchanged:.1f} s: frozen"
         self._judge.check("unchanged_s", unchanged, Bounds(error=limit), told)
+
+
+SLACK = 5.0
+"""Deviations of its noise by which a sensor may read beyond the range of what it measures."""
+
+
+def sensors_of(
+    scene: Scene, settings: Settings, required: Mapping[Stream, bool], mounts: Sequence[Mount | None]
+) -> dict[Stream, list[Sensor]]:
+    """The sensors of every stream, in the order of a sample's values.
+
+    Parameters
+    ----------
+    scene : Scene
+        Gives the ranges: strokes 0 to ``max_stroke``, angles as in ``range_deg``.
+    settings : Settings
+        Noise and resolution.
+    required : dict of Stream to bool
+        Whether the twin needs the stream.
+    mounts : sequence of Mount or None
+        Of the sensor of each joint; an inclinometer (not None) has no range of its own.
+    """
+    tuned = settings
+    stroke = tuned.stroke_sigma, tuned.stroke_resolution, required[Stream.STROKES]
+    angle = tuned.angle_sigma, tuned.angle_resolution, required[Stream.ANGLES]
+    force = tuned.imu_sigma, 0.0, required[Stream.IMU]
+    beyond, over = SLACK * tuned.stroke_sigma, SLACK * tuned.angle_sigma
+    strokes, angles = [], []
+    for number, (joint, mount) in enumerate(zip(scene.joints, mounts, strict=True), start=1):
+        low, high = (-inf, inf) if mount is not None else (radians(degrees) for degrees in joint.range_deg)
+        strokes.append(Sensor(f"cylinder_{number}", "m", -beyond, joint.cylinder.max_stroke + beyond, *stroke))
+        angles.append(Sensor(f"joint_{number}", "rad", low - over, high + over, *angle))
+    imu = [Sensor(f"tip_imu_{axis}", "m_s2", -inf, inf, *force) for axis in "xz"]
+    return {Stream.STROKES: strokes, Stream.ANGLES: angles, Stream.IMU: imu}

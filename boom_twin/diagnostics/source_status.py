@@ -1,4 +1,4 @@
-"""Whether the messages that were published are received, and how long they wait for their turn."""
+"""Status of the sources: whether every input topic has one publisher, and whether all its messages are received in time."""
 
 from __future__ import annotations
 
@@ -6,10 +6,54 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import nan
 
-from ..thresholds import Thresholds
-from .gate import Bounds
-from .judge import Judge
-from .status import Status
+from ..config.settings import Thresholds
+from ..types import Stream
+from .levels import Bounds, ComponentJudge, Status
+from .topic_status import Peers
+
+FOLLOWED = "Followed is the one whose stamps go on, and which of them that is ROS does not tell. End all but one"
+
+
+class PublishersJudge:
+    """Judges all input topics together. A second source makes all that is predicted doubtful: it is told before all else."""
+
+    def __init__(self) -> None:
+        self._judge = ComponentJudge("publishers")
+
+    def status(
+        self,
+        publishers: Mapping[Stream, Peers],
+        followed: Mapping[Stream, str],
+        thresholds: Thresholds,
+        now: float,
+        clock: float,
+    ) -> Status:
+        """State of the sources.
+
+        Parameters
+        ----------
+        publishers : dict of Stream to Peers
+            Streams that come by one topic may have a publisher each.
+        followed : dict of Stream to str
+            Stamp of the newest sample of each, s.
+        thresholds : Thresholds
+        now, clock : float
+            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
+        """
+        judge = self._judge
+        judge.begin(now, thresholds)
+        streams: dict[str, list[Stream]] = {}
+        for stream, peers in publishers.items():
+            streams.setdefault(peers.address, []).append(stream)
+        for address, sharing in streams.items():
+            names = publishers[sharing[0]].names
+            judge.note(f"{address} publishers", ", ".join(names))
+            judge.note(f"{address} gids", ", ".join(publishers[sharing[0]].ids))
+            told = f"{len(names)} publishers of {address}: {', '.join(names)}. {FOLLOWED}"
+            surplus = Bounds(error=0.0)
+            judge.check(f"{address} surplus", max(0, len(names) - len(sharing)), surplus, told, at_once=True)
+            judge.note(f"{address} newest_stamp_s", followed[sharing[0]])
+        return judge.finish(clock, "one source for every topic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +88,11 @@ class ReceptionJudge:
     """Judges all input topics together."""
 
     def __init__(self) -> None:
-        self._judge = Judge("reception")
+        self._judge = ComponentJudge("reception")
         self._before: dict[str, Reception] = {}
 
     def status(self, topics: Mapping[str, Reception], thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the reception; `topics` by name, times as for `boom_twin.watch.sensor.SensorJudge`."""
+        """State of the reception; `topics` by name, times as for `boom_twin.diagnostics.sensor_status.SensorJudge`."""
         judge = self._judge
         judge.begin(now, thresholds)
         for name, each in topics.items():

@@ -1,16 +1,36 @@
-"""Whether one input topic is as it should be."""
+"""Status of input and output topics: rates, gaps, publishers and subscribers at the other end."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import nan
 
-from ..thresholds import Thresholds
-from .channel import NANO
-from .gate import Bounds
-from .judge import Judge
-from .peers import Peers
-from .status import Level, Status
-from .stream import StreamWatch
+from ..config.settings import Thresholds
+from .levels import Bounds, ComponentJudge, Level, Status
+from .stream_stats import NANO, StreamWatch
+
+
+@dataclass(frozen=True, slots=True)
+class Peers:
+    """The publishers of an input, or the subscribers of an output.
+
+    Attributes
+    ----------
+    address : str
+        Name of the topic as it is resolved.
+    names : sequence of str
+        Their nodes.
+    incompatible : sequence of str
+        Those of them that cannot hear or be heard for their quality of service, and why, in words.
+    ids : sequence of str
+        GIDs, hexadecimal, in the order of `names`.
+    """
+
+    address: str = ""
+    names: Sequence[str] = ()
+    incompatible: Sequence[str] = ()
+    ids: Sequence[str] = ()
 
 
 class TopicJudge:
@@ -25,7 +45,7 @@ class TopicJudge:
     """
 
     def __init__(self, name: str, required: bool) -> None:
-        self._judge, self._required = Judge(name), required
+        self._judge, self._required = ComponentJudge(name), required
         self._counted = (nan, 0)
 
     def status(
@@ -49,7 +69,7 @@ class TopicJudge:
             By how much the stamps are behind those of the strokes, s; NaN where it is not known.
         thresholds : Thresholds
         now, clock : float
-            As for `boom_twin.watch.sensor.SensorJudge`.
+            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
         other_boom : str
             That its messages are of another boom, in words; empty if they are not.
         """
@@ -85,3 +105,20 @@ class TopicJudge:
 def seconds(stamp: int | None) -> str:
     """A stamp (ns) in seconds, exactly."""
     return "nan" if stamp is None else f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d}"
+
+
+class OutputsJudge:
+    """Judges all output topics together."""
+
+    def __init__(self) -> None:
+        self._judge = ComponentJudge("outputs")
+
+    def status(self, peers: Iterable[Peers], thresholds: Thresholds, now: float, clock: float) -> Status:
+        """State of the outputs; `peers` are their subscribers, times as for `SensorJudge`."""
+        judge = self._judge
+        judge.begin(now, thresholds)
+        for each in peers:
+            judge.note(f"subscribers {each.address}", len(each.names))
+            if each.incompatible:
+                judge.fault(Level.WARN, f"{each.address}: incompatible QoS: {'; '.join(each.incompatible)}")
+        return judge.finish(clock, "offered")

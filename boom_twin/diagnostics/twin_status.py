@@ -1,4 +1,4 @@
-"""The twin and all that it listens to, judged together."""
+"""Status of the whole twin and of all that it listens to."""
 
 from __future__ import annotations
 
@@ -7,19 +7,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..records import Report, Residuals, Sample, Stream
-from ..thresholds import Thresholds
-from .health import HealthWatch, level_of
-from .model import ModelWatch
-from .outputs import OutputsJudge
-from .peers import Peers
-from .publishers import PublishersJudge
-from .reception import Reception, ReceptionJudge
-from .residual import ResidualJudge
-from .sensor import Sensor, SensorJudge
-from .status import Level, Status
-from .stream import StreamWatch
-from .topic import TopicJudge, seconds
+from ..config.settings import Thresholds
+from ..types import Report, Residuals, Sample, Stream
+from .levels import Level, Status
+from .model_status import HealthWatch, ModelWatch, ResidualJudge, level_of
+from .sensor_status import Sensor, SensorJudge
+from .source_status import PublishersJudge, Reception, ReceptionJudge
+from .stream_stats import StreamWatch
+from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
 
 
 class TwinWatch:

@@ -1,29 +1,59 @@
-"""The compiled boom under one load, as it follows strokes: from a sample's strokes to a `Prediction`."""
+"""Predict the boom from stroke samples: steps the compiled boom under one load and gives a `Prediction` for every sample."""
 
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 
-from .analysis.statics import outline, settle
-from .chain.program import State
-from .estimate.follower import Tuning, follow, new_track
-from .moments import moments_by_unknowns
-from .physics.linkage import cylinder_length
-from .plan.compile import compile_scene
-from .records import Array, Prediction
-from .scene.kinematics import joint_angles_of_strokes
-from .scene.parts import Scene
-from .settings import Settings
-from .undeflected import Undeflected
+from ..analysis.bending_moments import moments_by_unknowns
+from ..analysis.equilibrium import outline, set_undeformed, settle
+from ..compiler.compile import compile_scene
+from ..compiler.plan import Plan
+from ..config.settings import Settings
+from ..kernels.elements.linkage import cylinder_length
+from ..kernels.tables import State
+from ..kernels.transfer.forward_kinematics import place
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.schema import Scene
+from ..types import Array, Prediction
+from .look_ahead import Tuning, follow, new_track
+
+
+class UndeflectedPredictor:
+    """Where the points of `boom_twin.analysis.equilibrium.outline` are while nothing bends."""
+
+    def __init__(self, scene: Scene, plan: Plan) -> None:
+        self._plan, self._pivot = plan, np.array(scene.base.pivot)
+        self._lengths = np.array([section.length for section in scene.sections])
+        self._reach = np.concatenate([[0.0], np.cumsum(self._lengths)])
+        self._middle = np.radians([sum(joint.range_deg) / 2 for joint in scene.joints])
+
+    def at(self, angles: Array) -> Array:
+        """Points (k, 2), m, at relative joint `angles` (rad), shape (n,)."""
+        heading = np.cumsum(angles)
+        steps = self._lengths[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        pivots = self._pivot + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        return np.stack([np.interp(self._along, self._reach, column) for column in pivots.T], axis=1)
+
+    @cached_property
+    def _along(self) -> Array:
+        """How far along the sections every point is, m, shape (k,): all pivots are among the points."""
+        state, work = self._plan.state(), self._plan.work()
+        set_undeformed(self._plan, state, self._middle)
+        place(self._plan.tables, state, work)
+        line = outline(self._plan, state, work.position)
+        steps = np.hypot(*np.diff(line, axis=0, prepend=self._pivot[None, :]).T)
+        return np.asarray(np.cumsum(steps))
+
 
 PAUSE = 0.1  # s without strokes, after which
 TINY = 1e-12
 AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
 
-class Following:
+class BoomPredictor:
     """A boom that remembers how it moved.
 
     Parameters
@@ -46,7 +76,7 @@ class Following:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
         self._anchor, self._work = self.plan.state(), self.plan.work()
-        self._undeflected, self._bending = Undeflected(scene, self.plan), moments_by_unknowns(self.plan)
+        self._undeflected, self._bending = UndeflectedPredictor(scene, self.plan), moments_by_unknowns(self.plan)
         self._track = new_track(self.plan, np.array([section.length for section in scene.sections]))
         self._tuning = Tuning(
             settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
@@ -86,7 +116,7 @@ class Following:
         self._newest, self._paused = 0.0, -math.inf
 
     def step(self, time: float, strokes: Array) -> int:
-        """Go on to strokes (m; NaN = missing) measured at `time` (s since the start); a status of `chain.status`."""
+        """Go on to strokes (m; NaN = missing) measured at `time` (s since the start); a status of `kernels.tables`."""
         if time - self._newest > PAUSE:
             self._paused = time
         self._newest = time

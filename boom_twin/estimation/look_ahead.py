@@ -1,4 +1,4 @@
-"""The boom follows smoothed strokes: an anchor behind, and a look ahead from it to now.
+"""Step the boom along smoothed strokes to an anchor in the past, and from there ahead to the present.
 
 Strokes estimated at the instant they are measured carry noise that the boom's lightly damped modes collect. The same strokes
 seen 45 ms later are far quieter. So the boom that is remembered, the anchor, is stepped only as far as the smoother's
@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..chain.status import OK
-from ..chain.step import LONGEST_INCREMENT, advance, observe, observe_pins
-from ..physics.integrators import GENERALISED_ALPHA, REST, prepare
-from ..physics.jit import inner, kernel
-from ..physics.linkage import angle_of_length
-from ..plan.plan import Plan
-from ..records import Array
-from .smoother import add_node, drive_between, measure, start_node
+from ..compiler.plan import Plan
+from ..kernels.elements.linkage import angle_of_length
+from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
+from ..kernels.jit import inner, kernel
+from ..kernels.tables import OK
+from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe, observe_pins
+from ..types import Array
+from .stroke_filter import add_node, drive_between, measure, start_node
 
 TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left is about its square
 LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
@@ -32,7 +32,7 @@ WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
 
 
 class Tuning(NamedTuple):
-    """Numbers of the estimator; see `boom_twin.settings`. Lengths of time in s, variance in m^2, density in m^2/s^5."""
+    """Numbers of the estimator; see `boom_twin.config.settings`. Lengths of time in s, variance in m^2, density in m^2/s^5."""
 
     variance: float
     density: float
@@ -82,9 +82,9 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     The first sample of a track without nodes is taken as rest, in equilibrium; `anchor` holds a first guess of it.
 
     out : ndarray, shape (4 n + 11 + 4 pins,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
-    variances, tip of the rigid boom (2), pins with clearance (see `chain.step.observe_pins`).
+    variances, tip of the rigid boom (2), pins with clearance (see `kernels.transfer.time_step.observe_pins`).
 
-    Returns a status of `chain.status`.
+    Returns a status of `kernels.tables`.
     """
     add_sample(track, tuning, time, y)
     track.passes[0] = 0

@@ -1,10 +1,10 @@
-"""Fixed-lag Kalman smoother of the strokes: what every drive did lately, seen from now.
+"""Fixed-lag Kalman smoother of the cylinder strokes.
 
 Each stroke is an integrated white jerk of density q (m^2/s^5), measured with variance r (m^2). A node is a stamp in the
 window; for each stroke it holds the estimate x = (position, velocity, acceleration) given everything up to now, and the
 covariance C of that estimate's error with the newest one's:
 
-    predict:   x- = F x,  P- = F P F^T + q Q,  C_j <- C_j F^T           (newest node, then every older node j)
+predict:   x- = F x,  P- = F P F^T + q Q,  C_j <- C_j F^T           (newest node, then every older node j)
     measure:   nu = y - x-_0,  s = P-_00 + r,  x_j += C_j[:, 0] nu / s,  C_j <- C_j (I - k h^T)^T
 
 Node 0 is the newest, with C_0 = P. (Rauch-Tung-Striebel smoothing in its fixed-lag form; Anderson and Moore, Optimal
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from ..physics.jit import inner
+from ..kernels.jit import inner
 
 QUIET = 1e-12  # variance of velocity and acceleration at the start: the boom starts at rest
 

@@ -1,4 +1,4 @@
-"""Alarms in words: what is the matter, how much of it, what else may explain it, and which move would tell."""
+"""Text of alarms: what is the matter, how much of it, what else may explain it, and which move would tell."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..records import Alarm, Array, Ranked
-from ..scene.parts import Scene
-from .bank import UNKNOWN, Cause, Explanation, Verdict
-from .parameters import Form, Parameter, physical
-from .signatures import Signature, Signatures
+from ..scene.schema import Scene
+from ..types import Alarm, Array, Ranked
+from .inference.fault_catalogue import Form, Parameter, physical
+from .inference.hypotheses import UNKNOWN, Cause, Explanation, Verdict
+from .inference.sensitivities import Signature, Signatures
 
 NAMED, KEPT = 0.9, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
@@ -18,7 +18,7 @@ CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
 
-class Teller:
+class AlarmText:
     """Puts explanations into words.
 
     Parameters

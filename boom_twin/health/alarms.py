@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import nan
 
-from .records import Alarm, Health, Ranked
+from ..types import Alarm, Health, Ranked
 
 NANO = 1e-9
 PROBABILITY = ": probability"

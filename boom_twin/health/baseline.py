@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..config.settings import checked
+from ..config.yaml_text import read_plain
 from ..errors import UsageError
-from ..parameter_file import checked
-from ..plain import read_plain
-from ..records import Array
-from .parameters import Parameter, variances
+from ..types import Array
+from .inference.fault_catalogue import Parameter, variances
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "baseline.yaml"))
 REMEDY = "Give a file written by `boom_twin calibrate --baseline`."
@@ -26,7 +26,7 @@ Row = list[Finite]
 class Baseline(BaseModel):
     """A baseline as its file has it; SI units. Channels are ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``.
 
-    Without learning, parameters may be off by what `boom_twin.health.parameters` calls healthy.
+    Without learning, parameters may be off by what `boom_twin.health.inference.fault_catalogue` calls healthy.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
-from ..records import Array
+from ..types import Array
 
 ALLOWANCE = 1.0  # deviations by which the mean may be off
 CUT = 4.0  # a single innovation counts no more than this

@@ -13,13 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..errors import UsageError
-from ..records import Array
+from ..types import Array
 from .baseline import Baseline
-from .blocks import BLOCK, NANO
-from .linear import Problem
-from .parameters import Parameter
-from .regression import GATE, Regression
-from .whitening import Whitening
+from .inference.block_problem import BLOCK, NANO, BlockProblem
+from .inference.fault_catalogue import Parameter
+from .inference.hypotheses import GATE, Regression
+from .inference.innovation_filter import InnovationFilter
 
 SEARCHED = ("angle_error", "force_error", "angle_noise", "force_noise", "detuning")
 BOUNDS = {
@@ -31,7 +30,7 @@ ROUNDS = 2
 WIDER = 4.0  # times the covariance that is learnt, because the model is not exact
 LEAST = 45.0  # s
 
-Session = Sequence[Problem]
+Session = Sequence[BlockProblem]
 
 
 def learn(
@@ -98,7 +97,7 @@ def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int,
     regression, log = Regression(*Baseline().healthy(known)), 0.0
     errors2, noise2 = trial.errors(joints) ** 2, trial.noise(joints) ** 2
     for session in sessions:
-        whitening = Whitening(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning)
+        whitening = InnovationFilter(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning)
         for problem in session:
             whitening.tune(problem.modes)
             found = whitening.step(problem.table, problem.noise(noise2), errors2, problem.shaking, problem.travel)

@@ -1,24 +1,22 @@
-"""The judge of a rig's health: predictions and measurements in, alarms out. No ROS, no files, no clock."""
+"""Health monitor: predictions and measurements in, alarms out. No ROS, no files, no clock."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..analysis.noise import StrokeNoise
-from ..records import Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
-from ..scene.parts import Scene
-from ..settings import Settings
+from ..analysis.modal import StrokeNoise
+from ..config.settings import Settings
+from ..scene.schema import Scene
+from ..types import Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
 from .baseline import Baseline
-from .blocks import BLOCK, NANO, Block, Blocks, means, stacked
-from .linear import Means
-from .residual_watch import ResidualWatch
-from .sensor_watch import SensorWatch
-from .sensors import SensorCheck
+from .inference.block_problem import BLOCK, NANO, Block, BlockBuilder, BlockMeans, means, stacked
+from .residual_monitor import ResidualMonitor
+from .sensor_monitor import SensorCheck, SensorMonitor
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 
 
-class Judge:
+class HealthMonitor:
     """Follows one rig.
 
     Parameters
@@ -42,9 +40,9 @@ class Judge:
         absolute = np.array([mount is not None for mount in mounts])
         self._low[absolute], self._high[absolute] = -np.inf, np.inf
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
-        self.residuals = ResidualWatch(scene, settings, mounts, baseline, self.names)
-        self._angle_watch = SensorWatch(channels[Stream.ANGLES], "rad")
-        self._stroke_watch = SensorWatch(channels[Stream.STROKES], "m")
+        self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names)
+        self._angle_watch = SensorMonitor(channels[Stream.ANGLES], "rad")
+        self._stroke_watch = SensorMonitor(channels[Stream.STROKES], "m")
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -52,7 +50,7 @@ class Judge:
     def begin(self) -> None:
         """The boom starts from rest; alarms of sensors go on."""
         settings = self._settings
-        self._blocks = Blocks()
+        self._blocks = BlockBuilder()
         self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
         zero = np.zeros(self._n)
         self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
@@ -111,7 +109,7 @@ class Judge:
         told = self.residuals.take(self._means(block, left), self._noise)
         return news if told is None else [*news, told]
 
-    def _means(self, block: Block, left: Array) -> Means:
+    def _means(self, block: Block, left: Array) -> BlockMeans:
         settings, predictions = self._settings, block.predictions
         _, _, forces = stacked(block.forces, 2)
         angle, angle_count = means(left, settings.angle_variance**0.5)
@@ -121,7 +119,7 @@ class Judge:
         span = (last.stamp - first.stamp) * NANO
         rates = (last.joints - first.joints) / span if span > 0.0 else np.zeros(self._n)
         accelerations = np.array([prediction.tip_acceleration for prediction in predictions])
-        return Means(
+        return BlockMeans(
             start=block.number * BLOCK,
             left=np.concatenate([angle, force]),
             counts=np.concatenate([angle_count, force_count]),

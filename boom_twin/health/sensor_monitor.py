@@ -1,15 +1,46 @@
-"""What one sensor does that no boom can do: stuck, noisy, spikes, jumps, silence, readings out of range."""
+"""Monitor single sensors: stuck, noisy, spikes, jumps, silence, readings out of range."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import Array
-from ..watch.frozen import readings_of_frozen
+from ..types import Alarm, Array
+
+
+def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
+    """Equal readings in a row that white noise gives with a probability below `false_alarm`.
+
+    Noise of standard deviation s, read out in steps of q, repeats a reading with a probability of at most
+
+        p = erf(q / (2 sqrt(2) s)),
+
+    reached by a sensor that stands still in the middle of a step; N equal readings have p^(N - 1). A sensor that is coarse
+    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9); one without noise cannot be told
+    from a frozen one.
+
+    Parameters
+    ----------
+    sigma, resolution : float
+        Of the sensor, in its unit; the rule is as good as these. A sensor that is filtered repeats more often.
+    false_alarm : float
+        Probability for each reading.
+
+    Returns
+    -------
+    float
+        N >= 2; infinite without noise.
+    """
+    if sigma == 0.0:
+        return math.inf
+    missed = math.erfc(resolution / (2.0 * math.sqrt(2.0) * sigma))
+    if missed == 0.0:
+        return math.inf
+    return 2.0 if missed == 1.0 else max(2.0, 1.0 + math.ceil(math.log(false_alarm) / math.log1p(-missed)))
+
 
 Flags = NDArray[np.bool_]
 
@@ -25,7 +56,7 @@ MISSING = 0.1  # share of the readings
 
 
 @dataclass(frozen=True)
-class Findings:
+class SensorFindings:
     """By channel, in one block; shape (channels,) each."""
 
     stuck: Flags
@@ -68,7 +99,7 @@ class SensorCheck:
         self._heard = np.full(count, np.nan)
         self._power, self._missing = np.full(count, np.nan), np.zeros(count)
 
-    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> Findings:
+    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
 
         Parameters
@@ -91,7 +122,7 @@ class SensorCheck:
         self._listen(left[1:], span)
         steps = np.diff(left, axis=0)
         sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
-        findings = Findings(
+        findings = SensorFindings(
             stuck=self._stuck(times[2:], all_raw[2:]),
             noisy=self._power > (NOISY * self._sigma) ** 2,
             spikes=self._spikes(steps) if sudden else np.zeros(count, dtype=bool),
@@ -102,9 +133,9 @@ class SensorCheck:
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
         return findings
 
-    def _nothing(self, count: int, now: float) -> Findings:
+    def _nothing(self, count: int, now: float) -> SensorFindings:
         none = np.zeros(count, dtype=bool)
-        return Findings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
+        return SensorFindings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
 
     def _spikes(self, steps: Array) -> Flags:
         """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next."""
@@ -165,3 +196,83 @@ def repeats(sigma: float, resolution: float) -> int:
     """Times that a reading repeats with a probability below `FALSE_ALARM` while the sensor lives, within `REPEATS`."""
     least, most = REPEATS
     return int(min(max(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, least), most))
+
+
+SETTLED = 2_000_000_000  # ns without the fault after which it has ended
+TOLD = {
+    "stuck": "repeats one reading again and again",
+    "noise": "is noisier than stated",
+    "spikes": "has single readings far from their neighbours",
+    "jump": "jumped at once, which no boom can",
+    "dropout": "gives no readings",
+    "range": "reads out of its range",
+}
+
+
+@dataclass
+class _Fault:
+    alarm: Alarm
+    seen: int
+    offset: float = 0.0
+
+
+class SensorMonitor:
+    """Turns the findings about one stream into alarms.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of its channels.
+    unit : str
+        Of its readings.
+    """
+
+    def __init__(self, names: tuple[str, ...], unit: str) -> None:
+        self._names, self._unit = names, unit
+        self._faults: dict[tuple[int, str], _Fault] = {}
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Those that last."""
+        return tuple(fault.alarm for fault in self._faults.values())
+
+    @property
+    def masked(self) -> Flags:
+        """Channels that are not to be trusted, shape (channels,)."""
+        flags = np.zeros(len(self._names), dtype=bool)
+        for channel, kind in self._faults:
+            flags[channel] |= kind != "spikes"
+        return flags
+
+    def take(self, findings: SensorFindings, start: int, end: int) -> list[Alarm]:
+        """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended."""
+        news: list[Alarm] = []
+        for kind, flags in findings.by_kind().items():
+            for channel in np.flatnonzero(flags).tolist():
+                if kind == "jump" and self._is_wild(channel):
+                    continue
+                news += self._seen(channel, kind, start, end, findings.jumped)
+        for key, fault in list(self._faults.items()):
+            if key[1] != "jump" and end - fault.seen > SETTLED:
+                del self._faults[key]
+                news.append(replace(fault.alarm, until=fault.seen))
+        return news
+
+    def _is_wild(self, channel: int) -> bool:
+        """Whether the sensor has a fault in which jumps mean nothing more."""
+        return any((channel, kind) in self._faults for kind in ("noise", "spikes"))
+
+    def _seen(self, channel: int, kind: str, start: int, end: int, jumped: Array) -> list[Alarm]:
+        key = (channel, kind)
+        fault = self._faults.get(key)
+        size = float(jumped[channel]) if kind == "jump" else 0.0
+        if fault is not None:
+            if kind == "jump" and end - fault.seen > SETTLED // 10 and abs(fault.offset + size) < 0.3 * abs(fault.offset):
+                del self._faults[key]
+                return [replace(fault.alarm, until=end)]
+            fault.seen = end
+            return []
+        name = self._names[channel]
+        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._unit}" if size else "")
+        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size)
+        return [self._faults[key].alarm]

@@ -1,4 +1,4 @@
-"""Compiled kernels kept on disk: in which folder, whether it can be trusted, one checked file for every kernel and signature.
+"""Cache of compiled kernels on disk: its folder, its owner and mode, and the checksum of every file in it.
 
 Loading one runs machine code. So nobody but the user (and root) may be able to write it, and a file that is cut off or
 altered must not be taken: every file begins with the SHA-256 of the rest, and is written whole or not at all. numba's own
@@ -22,7 +22,7 @@ from tempfile import NamedTemporaryFile
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-KERNEL_FOLDERS = ("physics", "chain", "estimate")
+KERNEL_FOLDERS = ("kernels", "estimation")
 SUFFIX = ".kernel"
 _DIGEST = hashlib.sha256().digest_size
 

@@ -9,7 +9,7 @@ loops over all scalars do not know which scheme they run. A history is a column 
 
 and a step makes every row of it from the new x', v', a' and the old rows at or behind its own place, in that order.
 
-Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.notation`)
+Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.scene.notation`)
 
     x' = x + h v + h^2 ((1/2 - beta) p + beta p'),   v' = v + h ((1 - gamma) p + gamma p'),
     (1 - am) p' + am p = (1 - af) a' + af a;
@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..records import Array
+from ..types import Array
 from .jit import inner
 
 GENERALISED_ALPHA, NEWMARK, WILSON, HOUBOLT, PARK, REST = range(6)

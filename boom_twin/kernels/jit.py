@@ -1,7 +1,7 @@
-"""The one place that compiles: the decorators that every kernel wears.
+"""Compile kernels with numba, or run them as plain Python for debugging.
 
 numba is imported, and a kernel compiled, when Python first calls one: geometry that is only read stays plain Python. The
-compiled code is kept on disk, see `boom_twin.physics.kernel_cache`. ``fastmath`` stays off: it turns isfinite(nan) into
+compiled code is kept on disk, see `boom_twin.kernels.compiled_cache`. ``fastmath`` stays off: it turns isfinite(nan) into
 True. Kernels do not own memory (``_nrt=False``), so none can allocate, and passing a part of an array on costs no reference
 counting, which was nearly half of a step.
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from .kernel_cache import SUFFIX, KernelCache, cache_folder, fault_of
+from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 DOCUMENTED = frozenset({"nogil", "error_model"})

@@ -1,4 +1,5 @@
-"""What a compiled boom is: a list of operations along the chain, their tables, and the arrays they work on.
+"""Tables of a compiled boom: operations along the chain, records of each kind of element, work arrays, and status codes of
+kernels.
 
 The operations stand in the order from the base to the tip. Positions are placed in that order, forces are swept in against
 it, increments are swept out along it. A kind of element that a scene does not have is a table of length 0.
@@ -10,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..records import Array
+from ..types import Array
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
 
@@ -70,7 +71,7 @@ class Tables(NamedTuple):
     outlets: np.recarray
     cylinders: np.recarray
     parts: np.recarray
-    clearances: np.recarray  # pins that are not ideal, see `physics.contact`
+    clearances: np.recarray  # pins that are not ideal, see `kernels.elements.pin_contact`
     gravity: Array  # (2,), m/s^2
     moving: Array  # (unknowns,): 1 for coordinates, 0 for forces
     scale: Array  # (unknowns,): turns an increment into an angle, rad; 0 for forces
@@ -90,13 +91,13 @@ class State(NamedTuple):
     """What the boom remembers from step to step.
 
     z : (unknowns,) coordinates and forces, see the tables.
-    history : (depth, histories) of every unknown and then of every mass point; rows: see `physics.integrators`.
+    history : (depth, histories) of every unknown and then of every mass point; rows: see `kernels.integrators`.
     frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
     turns : (joints, 8) cosine and sine of a six-bar's head, section, link L, link R.
     pins : (cylinders, 4) ends C and R of every cylinder, m.
-    contacts : (clearances, 8) what pins with clearance remember, see `physics.contact`.
+    contacts : (clearances, 8) what pins with clearance remember, see `kernels.elements.pin_contact`.
     drives : (2, cylinders) length (m) and rate (m/s) of the drives at the newest history.
-    pace : (1,) ticks of the last sub-step, see `chain.step`.
+    pace : (1,) ticks of the last sub-step, see `kernels.transfer.time_step`.
     """
 
     z: Array
@@ -115,7 +116,7 @@ class Work(NamedTuple):
     position: Array  # (histories,)
     hat: Array
     offset: Array
-    weights: Array  # of the scheme, see `physics.integrators`
+    weights: Array  # of the scheme, see `kernels.integrators`
     finer: Array  # of a sub-step's
     s: Array  # (SLOTS, SLOTS)
     p: Array  # (SLOTS,)
@@ -132,7 +133,7 @@ class Work(NamedTuple):
     ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
     end_gains: Array  # (clearances, 2, 5), and its gains
     end_free: Array  # (clearances, 2)
-    hold: Array  # (clearances, 9) force, tangent and torque of a pin, see `physics.contact.bearing`
+    hold: Array  # (clearances, 9) force, tangent and torque of a pin, see `kernels.elements.pin_contact.bearing`
     apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
@@ -143,3 +144,14 @@ class Work(NamedTuple):
     drive_rate: Array  # (cylinders,), m/s
     dz: Array  # (unknowns,)
     cut: Array  # (SLOTS,)
+
+
+OK, NOT_CONVERGED, SINGULAR, NOT_FINITE, DIGITS_LOST = range(5)
+
+SENTENCES = {
+    OK: "ok",
+    NOT_CONVERGED: "the equations did not converge; take a smaller step or a smoother stroke, or keep off a dead centre",
+    SINGULAR: "the equations are singular: a linkage stands at its dead centre, or a part is neither held nor has mass",
+    NOT_FINITE: "the equations gave a value that is not finite; check the strokes and take a smaller step",
+    DIGITS_LOST: "the plain product of transfer matrices lost its digits; take the Riccati form or a larger step",
+}

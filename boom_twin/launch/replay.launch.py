@@ -13,8 +13,8 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.substitutions import FindPackageShare
 
-from boom_twin.child_process import python_command
-from boom_twin.io.sheet import kept
+from boom_twin.bag.session_sheet import kept
+from boom_twin.system.child_process import python_command
 
 ARGUMENTS = [
     DeclareLaunchArgument("bag", description="session to play: rosbag2 directory or .mcap file"),

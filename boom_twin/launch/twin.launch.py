@@ -11,9 +11,9 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from boom_twin.child_process import python_command
-from boom_twin.io.urdf import urdf
+from boom_twin.messages.urdf import urdf
 from boom_twin.scene import load_scene
+from boom_twin.system.child_process import python_command
 
 CONFIG = PathJoinSubstitution([FindPackageShare("boom_twin"), "msg_config"])
 ARGUMENTS = [

@@ -1,4 +1,4 @@
-"""Messages of the rig read from their bytes: numbers where they stand, as long as all before them is as it was.
+"""Read fields of CDR-encoded ROS messages in place, without decoding the whole message.
 
 A publisher sends the same names in every message. Decoding a message costs ten times as much as unpacking its numbers.
 """
@@ -9,11 +9,64 @@ import struct
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..records import Stream
-from .cdr import names_in, stamp_in
-from .topics import TYPES
+from mcap.records import Schema
+
+from ..types import Stream
+from .topic_table import TYPES
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
+_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
+_STAMPS = {order: struct.Struct(f"{order}iI") for order in "<>"}
+_LENGTHS = {order: struct.Struct(f"{order}I") for order in "<>"}
+
+
+def has_header(schema: Schema) -> bool:
+    """Whether messages of that definition begin with a ``std_msgs/Header``."""
+    for line in schema.data.decode(errors="replace").splitlines():
+        if words := line.split("#")[0].split():
+            return words[0] in ("std_msgs/Header", "std_msgs/msg/Header", "Header")
+    return False
+
+
+def stamp_in(data: bytes) -> int | None:
+    """``header.stamp`` in nanoseconds of a message that begins with a header; None if it is too short for one."""
+    order = _ORDERS.get(data[:2])
+    if order is None or len(data) < _ORIGIN + 8:
+        return None
+    seconds, nanoseconds = _STAMPS[order].unpack_from(data, _ORIGIN)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
+
+
+def names_in(data: bytes) -> tuple[tuple[str, ...], int]:
+    """``name`` of a sensor_msgs/JointState, and where it ends in `data`.
+
+    Raises
+    ------
+    ValueError, struct.error, KeyError
+        If the message is not whole.
+    """
+    length = _LENGTHS[_ORDERS[data[:2]]]
+    place = _string(data, _ORIGIN + 8, length)[1]  # after frame_id
+    place += -(place - _ORIGIN) % 4
+    (count,) = length.unpack_from(data, place)
+    place += 4
+    names = []
+    for _ in range(count):  # ends early with an error where the message is shorter than that
+        place += -(place - _ORIGIN) % 4
+        name, place = _string(data, place, length)
+        names.append(name)
+    return tuple(names), place
+
+
+def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
+    """The string at `place`, and where it ends."""
+    (size,) = length.unpack_from(data, place)
+    end = place + 4 + size
+    if end > len(data):
+        raise ValueError("a string ends after the message")
+    return data[place + 4 : max(place + 4, end - 1)].decode(), end
+
+
 _LITTLE = b"\x00\x01"
 _TIME = 8  # bytes of a stamp
 _BEFORE_FORCE = 25  # doubles of an Imu before its linear acceleration
@@ -58,7 +111,7 @@ class _Layout(NamedTuple):
         return is_alike and all(data[at : at + 4] == length for at, length in self.later)
 
 
-class Wire:
+class CdrDecoder:
     """Reads the messages of one topic.
 
     Parameters
@@ -75,7 +128,7 @@ class Wire:
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> tuple[int, Any]:
-        """Stamp (ns) and message, which has the fields that `boom_twin.io.intake.Intake` reads.
+        """Stamp (ns) and message, which has the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Read a mapping, a YAML file; whatever it leaves out is as usual."""
+"""Read a mapping file: which topics and sensors a rig has, and how their readings are converted."""
 
 from __future__ import annotations
 
@@ -10,10 +10,21 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..plain import read_plain
-from .sensors import Sensor, kind_faults, set_faults, stream_of, usual
-from .topics import TYPES, Qos, Topic, Topics, default_document, load_topics
+from .topic_table import (
+    TYPES,
+    Qos,
+    Sensor,
+    Topic,
+    Topics,
+    default_document,
+    kind_faults,
+    load_topics,
+    set_faults,
+    stream_of,
+    usual,
+)
 
 _REMEDIES = {
     "name": "Give the name as it is published.",

@@ -1,4 +1,4 @@
-"""The boom as markers: deflected, exaggerated, undeflected, its cylinders by force, the trace of its tip."""
+"""Encode the boom's shape as visualization markers: deflected, exaggerated, undeflected, cylinders by force, tip trace."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Array, Prediction
-from .factory import RosbagsTypes
-from .places import fill_xz
-from .template import Holes, Template, stamped
-from .topics import TYPES, Output
+from ..types import Array, Prediction
+from .cdr_encoder import NumberFields, RosbagsTypes, Template, stamped
+from .message_fields import fill_xz
+from .topic_table import TYPES, Output
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
@@ -73,7 +72,7 @@ class ShapeMarkers:
 
     def _new_template(self, points: int, cylinders: int) -> Template:
         """The message with a trace of one point; its lines have so many points."""
-        msg, holes = self._types.make(TYPES[Output.SHAPE]), Holes()
+        msg, holes = self._types.make(TYPES[Output.SHAPE]), NumberFields()
         msg.markers = [
             self._line("boom", 0, 0.12, BOOM, holes, points),
             self._line("boom_exaggerated", 0, 0.06, LARGE, holes, points),
@@ -100,7 +99,7 @@ class ShapeMarkers:
             self._past.popleft()
         self._past.append((stamp, POINT.pack(tip[0], 0.0, tip[1])))
 
-    def _line(self, namespace: str, number: int, width: float, colour: Colour | None, holes: Holes, points: int) -> Any:
+    def _line(self, namespace: str, number: int, width: float, colour: Colour | None, holes: NumberFields, points: int) -> Any:
         """A line of so many points; without a colour, that is one of four holes."""
         marker = self._marker(namespace, number, LINE_STRIP, colour or tuple(holes.single() for _ in range(4)))
         marker.scale.x = width
@@ -109,7 +108,7 @@ class ShapeMarkers:
             fill_xz(point, holes.row(2))
         return marker
 
-    def _label(self, namespace: str, number: int, text: str, holes: Holes) -> Any:
+    def _label(self, namespace: str, number: int, text: str, holes: NumberFields) -> Any:
         marker = self._marker(namespace, number, TEXT, LARGE)
         marker.scale.z, marker.text = TEXT_HEIGHT, text
         fill_xz(marker.pose.position, holes.row(2))

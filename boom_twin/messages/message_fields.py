@@ -1,11 +1,11 @@
-"""Stamps, frames and points in messages: the model plane in REP-103 axes."""
+"""Fill fields of ROS messages: header with stamp and frame, and the model plane in REP-103 axes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from ..records import Array
+from ..types import Array
 
 FRAME = "base_link"
 

@@ -1,4 +1,4 @@
-"""From a report of the twin to encoded messages.
+"""Encode a `Report` of the twin as ROS messages: tip, residuals, joint states, changes, health.
 
 The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
 """
@@ -11,22 +11,88 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Prediction, Report, Residuals
-from ..scene.parts import Scene
-from ..scene.passive import PassiveJoints
-from ..settings import Settings
-from .change_messages import encode_changes
-from .factory import RosbagsTypes
-from .health import encode_health
-from .markers import ShapeMarkers
-from .places import fill_xz
-from .template import Holes, Template, stamped
-from .topics import TYPES, Output
+from ..config.settings import Settings
+from ..errors import BagError, UsageError
+from ..health.alarms import alarm_of, values_of
+from ..scene.kinematics import PassiveJoints
+from ..scene.schema import Scene
+from ..types import Alarm, Change, Health, Prediction, Report, Residuals
+from .cdr_encoder import NumberFields, RosbagsTypes, Template, jazzy, stamped
+from .marker_encoder import ShapeMarkers
+from .message_fields import fill_header, fill_xz
+from .sample_decoder import stamp_of
+from .topic_table import TYPES, Output
+
+OK, WARN, ERROR = range(3)
+"""Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""
+
+
+def encode_health(health: Health) -> bytes:
+    """A diagnostic_msgs/DiagnosticArray in CDR, with the stamp of `health`; see ``topics.yaml`` for its values."""
+    types = RosbagsTypes()
+    msg = types.make(TYPES[Output.HEALTH])
+    fill_header(msg.header, health.stamp)
+    msg.status = [_status(alarm, types) for alarm in health.alarms]
+    return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
+
+
+def decode_health(msg: Any) -> tuple[Alarm, ...]:
+    """The alarms of such a message, see `boom_twin.health.alarms.alarm_of`; a status that is none is left out."""
+    found = []
+    for status in msg.status:
+        try:
+            found.append(alarm_of(status.name, status.message, {pair.key: pair.value for pair in status.values}))
+        except (KeyError, ValueError, ArithmeticError):
+            continue
+    return tuple(found)
+
+
+def _status(alarm: Alarm, types: RosbagsTypes) -> Any:
+    status = types.make("diagnostic_msgs/msg/DiagnosticStatus")
+    status.level = OK if alarm.until is not None else WARN if alarm.cause is None else ERROR
+    status.name, status.message = alarm.channel, alarm.told
+    for key, value in values_of(alarm).items():
+        pair = types.make("diagnostic_msgs/msg/KeyValue")
+        pair.key, pair.value = key, value
+        status.values.append(pair)
+    return status
+
+
+FROM_REST = "from_rest"
+
+
+def encode_changes(change: Change) -> bytes:
+    """The message of a change, in CDR."""
+    values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
+    types = RosbagsTypes()
+    msg = types.make(TYPES[Output.CHANGES])
+    fill_header(msg.header, change.stamp)
+    msg.name, msg.position = list(values), types.doubles(list(values.values()))
+    return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
+
+
+def decode_changes(msg: Any) -> Change:
+    """The change of a message.
+
+    Raises
+    ------
+    BagError
+        It has names or values that a change cannot have.
+    """
+    values = dict(zip(msg.name, map(float, msg.position), strict=False))
+    from_rest = bool(values.pop(FROM_REST, 0.0))
+    settings = {name: values.pop(name) for name in Settings.live_names() if name in values}
+    try:
+        Settings().tuned(settings)
+    except UsageError as error:
+        raise BagError(f"a message of changes cannot be used: {error}") from None
+    return Change(stamp_of(msg), from_rest, settings, {name: value for name, value in values.items() if value != 0.0})
+
 
 Messages = list[tuple[Output, bytes]]
 
 
-class Outlet:
+class ReportEncoder:
     """Writes messages as CDR, to be published or kept in a bag; the same reports in the same order give the same bytes.
 
     Parameters
@@ -79,8 +145,8 @@ class Outlet:
             messages.append((Output.SHAPE, self._markers.fill(p)))
         return messages
 
-    def _template(self, key: Output, put: Callable[[Any, Holes], None]) -> Template:
-        msg, holes = self._types.make(TYPES[key]), Holes()
+    def _template(self, key: Output, put: Callable[[Any, NumberFields], None]) -> Template:
+        msg, holes = self._types.make(TYPES[key]), NumberFields()
         stamped(msg.header)
         put(msg, holes)
         return Template(TYPES[key], msg, holes)
@@ -88,7 +154,7 @@ class Outlet:
     def _joint_states(self, names: list[str], count: int, passive: int) -> Template:
         """Joints first, cylinders after them, passive joints last; only cylinders have an effort."""
 
-        def put(msg: Any, holes: Holes) -> None:
+        def put(msg: Any, holes: NumberFields) -> None:
             msg.name, msg.position = names, self._types.doubles(holes.row(2 * count + passive))
             msg.effort = self._types.doubles([nan] * count + holes.row(count) + [nan] * passive)
 
@@ -104,7 +170,7 @@ class Outlet:
     def _fill_residuals(self, residuals: Residuals) -> bytes:
         """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
 
-        def put(msg: Any, holes: Holes) -> None:
+        def put(msg: Any, holes: NumberFields) -> None:
             msg.name = list(residuals.names)
             msg.position, msg.velocity, msg.effort = (self._types.doubles(holes.row(len(msg.name))) for _ in range(3))
 
@@ -115,14 +181,14 @@ class Outlet:
         return template.fill(residuals.stamp, numbers)
 
 
-def _fill_displacement(msg: Any, holes: Holes) -> None:
+def _fill_displacement(msg: Any, holes: NumberFields) -> None:
     fill_xz(msg.vector, holes.row(2))
 
 
-def _fill_position(msg: Any, holes: Holes) -> None:
+def _fill_position(msg: Any, holes: NumberFields) -> None:
     fill_xz(msg.point, holes.row(2))
 
 
-def _fill_acceleration(msg: Any, holes: Holes) -> None:
+def _fill_acceleration(msg: Any, holes: NumberFields) -> None:
     fill_xz(msg.accel.linear, holes.row(2))
     msg.accel.angular.y = holes.double()

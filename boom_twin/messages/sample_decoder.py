@@ -1,4 +1,4 @@
-"""From a message of the rig to a sample in the scene's order and units.
+"""Decode a sensor message into a `Sample` in the scene's order and units.
 
 Reads attributes only, so that messages of rclpy and of rosbags give the same numbers.
 """
@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..records import LIMIT, Sample, Stream
-from .sensors import factor
-from .topics import Topics, load_topics
+from ..types import LIMIT, Sample, Stream
+from .topic_table import Topics, factor, load_topics
 
 LATEST = 2**31 * 1_000_000_000
 """Stamps (ns) from here on have no place in a message."""
@@ -58,7 +57,7 @@ class _Channels:
         return [value if value is _ABSENT else (value - zero) * scale for value, (zero, scale) in pairs]
 
 
-class Intake:
+class SampleDecoder:
     """Maps messages to samples and counts what is odd about them.
 
     Parameters
@@ -87,7 +86,7 @@ class Intake:
         ``not finite``
             NaN or infinity; NaN in the sample.
         ``absurd magnitude``
-            Above `boom_twin.records.LIMIT`; NaN in the sample.
+            Above `boom_twin.types.LIMIT`; NaN in the sample.
         ``no measurement``
             An Imu that says by ``linear_acceleration_covariance[0] = -1`` that it has none (REP-145); no sample.
         ``no usable value``

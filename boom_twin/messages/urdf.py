@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from ..physics.linkage import LINK_L
-from ..scene.depth import section_depth
-from ..scene.kinematics import linkage
-from ..scene.parts import Cylinder, Scene
-from ..scene.passive import CYLINDER, LEFT, RIGHT
-from .places import FRAME
+from ..kernels.elements.linkage import LINK_L
+from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
+from ..scene.schema import Cylinder, Scene, section_depth
+from .message_fields import FRAME
 
 NAME = "boom"
 TIP = "tip"
@@ -53,7 +51,7 @@ def urdf(scene: Scene) -> str:
     """The URDF document of `scene`, with its links and joints explained in a comment at the top.
 
     The positions of its joints come in ``~/joint_states``, those of the passive ones from
-    `boom_twin.scene.passive.PassiveJoints`.
+    `boom_twin.scene.kinematics.PassiveJoints`.
     """
     robot = Element("robot", name=NAME)
     robot.append(ElementTree.Comment(ABOUT))

@@ -1,4 +1,4 @@
-"""Who may come in."""
+"""Access control of the live page: Host, Origin and token checks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def in_address(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-class Door:
+class AccessControl:
     """Checks every request.
 
     On loopback the ``Host`` must be `host` or a usual name of this machine, so that no page of another name that resolves to it

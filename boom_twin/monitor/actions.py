@@ -1,13 +1,68 @@
-"""What a viewer may do beyond looking."""
+"""Actions of a viewer: marks, acknowledgements, and recordings started and stopped from the page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import subprocess
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 from unicodedata import category
 
-from .feed import Feed
-from .recording import Recording
+from ..system.child_process import python_command
+from .data.feed import Feed
+
+PARTING = 10.0
+"""Seconds that it may take to complete its files."""
+
+
+class Recording:
+    """Runs one recorder at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        Every recording gets a directory in it, named by its time (UTC).
+    options : sequence of str
+        Further arguments of ``boom_twin record``.
+    """
+
+    def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
+        self._folder, self._options = folder, options
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a recorder runs."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> str:
+        """Start one, unless it runs already; gives what was done."""
+        if self.is_running:
+            return "recording already"
+        out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
+        note = ("--note", "started from the monitor")
+        command = python_command("boom_twin.cli.main", "record", "--out", str(out), *note, *self._options)
+        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+        return f"recording into {out}"
+
+    def stop(self) -> str:
+        """Stop it, without waiting for its end; gives what was done."""
+        if not self.is_running or self._process is None:
+            return "not recording"
+        self._process.send_signal(signal.SIGINT)
+        return "recording stopped"
+
+    def close(self) -> None:
+        """Stop it and wait until its files are complete."""
+        if self._process is not None:
+            self.stop()
+            try:
+                self._process.wait(PARTING)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+
 
 LONGEST = 500
 """Characters of a note."""
@@ -18,7 +73,7 @@ AT_NODE = "acknowledge-at-node"
 """Permits ``acknowledge``, and that it makes the node let go of alarms that ended."""
 
 
-class Desk:
+class ViewerActions:
     """Carries out what was permitted at start, and nothing else.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Connections to the page's server: how long one may be without a request, and how many there may be.
+"""Limit connections to the page's server: how long one may be idle, and how many an address may have.
 
 None is kept for a stranger. One that has sent no whole request has few seconds and few places, in which the newest drives out
 the oldest: a page sends its request at once, so that a thousand silent connections do not keep it out. Those whose request was
@@ -16,8 +16,8 @@ from typing import Any
 
 from aiohttp import web
 
-from ..printable import printable
-from .door import POLICY
+from ..system.terminal_text import printable
+from .access_control import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
 REQUEST_TIME = 5.0
@@ -28,7 +28,7 @@ MOST, MOST_OF_ONE = 256, 64
 """Connections of one kind, silent or let in; as many of one address."""
 
 
-class Places:
+class ConnectionCount:
     """Connections of one kind in the order in which they were last of use; the oldest makes room for a new one."""
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class Connections:
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
-        self._silent, self._let_in = Places(), Places()
+        self._silent, self._let_in = ConnectionCount(), ConnectionCount()
 
     def __call__(self) -> Connection:
         """A new one, as `asyncio.loop.create_server` asks for it."""

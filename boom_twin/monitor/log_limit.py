@@ -1,4 +1,4 @@
-"""Log lines of the monitor, of which nobody outside can cause a flood."""
+"""Limit the rate of the monitor's log lines, so that nobody outside can cause a flood of them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MOST = 3
 """Records of one logger written in a `PERIOD`."""
 
 
-class Limit(logging.Filter):
+class LogRateLimit(logging.Filter):
     """Lets `MOST` records of each logger through in a `PERIOD`; the first one after it says how many were left out."""
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Limit(logging.Filter):
 
 
 def write_log() -> None:
-    """Write warnings of all loggers of this process to its standard error, as many as `Limit` lets through."""
+    """Write warnings of all loggers of this process to its standard error, as many as `LogRateLimit` lets through."""
     handler = logging.StreamHandler(sys.stderr)
-    handler.addFilter(Limit())
+    handler.addFilter(LogRateLimit())
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -1,15 +1,46 @@
-"""The text messages to the page: plain values for JSON, where a number that is not known is null."""
+"""Protocol of the live page: binary and text messages to the browser.
+
+A message is a sequence of blocks, each of a multiple of 8 bytes, all numbers little endian:
+
+======  =====================  ==========================================================================
+offset  type                   meaning
+======  =====================  ==========================================================================
+0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram
+1       uint8                  number of the table, its place in the newest ``layout`` message
+2       uint16                 columns, c
+4       uint32                 rows, k
+8       float64 x k            kinds 1, 3: seconds since the session's epoch; kind 2: frequencies, Hz
+8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
+======  =====================  ==========================================================================
+
+A spectrum has one column for each column of the table that its number names; a spectrogram one for each of
+`boom_twin.monitor.data.spectrum.FREQUENCIES`. All else is JSON in text messages, with a key
+``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``answer``.
+"""
 
 from __future__ import annotations
 
 import json
+import struct
 from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from .alarms import Alarm
-from .lamps import HEALTH, Lamp, Level, overall, worst
-from .store import Store
+import numpy as np
+from numpy.typing import NDArray
+
+from .data.status import HEALTH, Alarm, Level, StatusLamp, overall, worst
+from .data.store import Store
+
+ROWS, SPECTRUM, SPECTROGRAM = 1, 2, 3
+HEAD = struct.Struct("<BBHI")
+
+
+def pack(kind: int, table: int, times: NDArray[np.float64], values: NDArray[np.float32]) -> bytes:
+    """One block: `times` (k,), `values` (k, c)."""
+    rows, columns = values.shape
+    body = values.T.astype("<f4").tobytes()
+    return HEAD.pack(kind, table, columns, rows) + times.astype("<f8").tobytes() + body + bytes(-len(body) % 8)
 
 
 def state(store: Store, now: float, time: float) -> dict[str, Any]:
@@ -37,7 +68,7 @@ def dump(message: Any) -> str:
     return json.dumps(_plain(message), allow_nan=False, separators=(",", ":"))
 
 
-def _with_alarms(lamps: list[Lamp], alarms: list[Lamp]) -> list[Lamp]:
+def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[StatusLamp]:
     """Lamps with the rig's health as the alarms that last; a lamp that stands for them goes, unless its node is silent."""
     health = next((lamp for lamp in lamps if lamp.name == HEALTH), None)
     if not alarms or (health is not None and health.level == Level.STALE):
@@ -45,7 +76,7 @@ def _with_alarms(lamps: list[Lamp], alarms: list[Lamp]) -> list[Lamp]:
     return [*alarms, *(lamp for lamp in lamps if lamp is not health)]
 
 
-def _group(lamps: list[Lamp]) -> dict[str, Any]:
+def _group(lamps: list[StatusLamp]) -> dict[str, Any]:
     lamp = worst(lamps)
     if lamp is None:
         return {"level": Level.OFF.name, "reason": "not there", "lamps": []}

@@ -1,4 +1,4 @@
-"""The server of the page: static files and one WebSocket for each viewer."""
+"""HTTP and WebSocket server of the live page."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 
 from aiohttp import web
 
-from .analyst import Analyst
+from .access_control import POLICY, AccessControl
+from .actions import ViewerActions
 from .connections import Connection
-from .desk import Desk
-from .door import POLICY, Door
-from .feed import Feed
+from .data.analyst import Analyst
+from .data.feed import Feed
 from .viewer import Viewer
 
 PAGE = Path(__file__).parent / "page"
@@ -36,11 +36,11 @@ class Server:
     Parameters
     ----------
     feed : Feed
-    desk : Desk
-    door : Door
+    desk : ViewerActions
+    door : AccessControl
     """
 
-    def __init__(self, feed: Feed, desk: Desk, door: Door) -> None:
+    def __init__(self, feed: Feed, desk: ViewerActions, door: AccessControl) -> None:
         self._feed, self._desk, self._door = feed, desk, door
         self._viewers: set[web.WebSocketResponse] = set()
 

@@ -1,4 +1,4 @@
-"""One open page: what it is sent and what it asks for.
+"""One viewer of the live page: what it is sent and what it asks for.
 
 Nothing is queued for it. What it is owed follows from what it has got: rows by their numbers, lamps and alarms by their newest
 state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
@@ -14,13 +14,11 @@ from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from .analyst import Analyst
-from .desk import Desk
-from .feed import Feed
-from .frames import ROWS, pack
-from .playback import Playback
-from .table import Table
-from .words import alarms, dump, layout, state
+from .actions import ViewerActions
+from .data.analyst import Analyst
+from .data.feed import Feed, Playback
+from .data.store import Table
+from .protocol import ROWS, alarms, dump, layout, pack, state
 
 PERIOD = 1.0 / 30.0
 """Seconds between two messages of rows."""
@@ -49,7 +47,7 @@ class Viewer:
         Common to all viewers.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: Desk, analyst: Analyst) -> None:
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: ViewerActions, analyst: Analyst) -> None:
         self._socket, self._feed, self._desk, self._analyst = socket, feed, desk, analyst
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}

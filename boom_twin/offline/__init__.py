@@ -1,1 +1,1 @@
-"""A recorded session through the twin."""
+"""A bag through the twin."""

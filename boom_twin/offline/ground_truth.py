@@ -1,4 +1,4 @@
-"""What the virtual rig knows of a synthetic session beyond its sensors: the true motion of the tip."""
+"""Ground truth of a synthetic session: the true motion of the tip, as the virtual rig made it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import BagError
-from .received import holds_file, open_received
-from .records import Array, Prediction
+from ..errors import BagError
+from ..system.received_files import holds_file, open_received
+from ..types import Array, Prediction
 
 FILE_NAME = "truth.csv.gz"
 LARGEST = 64 * 2**20

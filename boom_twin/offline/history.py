@@ -1,4 +1,4 @@
-"""From a replay to the arrays that its pictures are drawn from."""
+"""History of a replay as arrays, for pictures and reports."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from .deviations import specific_force
-from .offline.replay import Recording, Replay
-from .plan.compile import compile_scene
-from .records import Array, Residuals, Stream
-from .scene.kinematics import gravity_in_base
-from .scene.parts import Scene
-from .truth import TipTruth
-from .view import AlarmSpan, History, ImuTrace, Truth, replay_pictures
-from .view.records import Orbits
+from ..compiler.compile import compile_scene
+from ..plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
+from ..plots.history import Orbits
+from ..scene.kinematics import gravity_in_base
+from ..scene.schema import Scene
+from ..twin.expected_readings import specific_force
+from ..types import Array, Residuals, Stream
+from .ground_truth import TipTruth
+from .replay import Recording, Replay
 
 NANO = 1e-9
 

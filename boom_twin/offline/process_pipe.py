@@ -1,4 +1,4 @@
-"""A module of this package run as a process of its own, with pickled batches on its stdin and stdout.
+"""Pipe between processes: a module of this package run as a child process, with pickled batches on stdin and stdout.
 
 A replay reads, steps and writes; on two cores its ends can run beside the stepping. Every process has one reader and one
 writer, so order and bytes are those of doing it all in one place.
@@ -12,8 +12,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
-from ..child_process import python_command
 from ..errors import BagError
+from ..system.child_process import python_command
 
 READY = "ready"
 """First thing a process sends: its imports are done."""

@@ -1,28 +1,78 @@
-"""Read a session, and map its messages to samples, in a process ahead of the replay."""
+"""Reader process of a replay: reads a session and decodes its messages to samples and recorded changes."""
 
 from __future__ import annotations
 
 import pickle
 import sys
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
+from ..bag.reader import Session, read, scan
 from ..errors import BoomTwinError
-from ..records import Change, Sample, Stream
-from .changes import recorded_changes
-from .intake import Intake, stamp_of
-from .pipe import END, Pipe, post, say_ready
-from .reader import read, scan
-from .topics import Topics
+from ..messages.report_encoder import decode_changes
+from ..messages.sample_decoder import SampleDecoder, stamp_of
+from ..messages.topic_table import Output, Topics
+from ..types import Change, Sample, Stream
+from .process_pipe import END, Pipe, post, say_ready
+
+NEAR = 2_000_000_000
+"""Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
+
+A looped session repeats stamps; a stray stamp is far from its stream.
+"""
+
+
+class Changes:
+    """The changes of a session, each to be repeated before the stroke sample that it began with.
+
+    Parameters
+    ----------
+    logged : iterable of (int, Change)
+        With their log times (ns), in that order.
+    """
+
+    def __init__(self, logged: Iterable[tuple[int, Change]]) -> None:
+        self._waiting = deque(logged)
+        self._before = -1
+
+    def due(self, log: int, stamp: int) -> Iterable[Change]:
+        """Those that begin with a stroke sample of that log time and stamp (ns).
+
+        A change whose own sample was not recorded begins with the next one.
+        """
+        while self._waiting and self._begins(*self._waiting[0], log, stamp):
+            yield self._waiting.popleft()[1]
+        self._before = stamp
+
+    def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
+        if abs(log - logged) > NEAR:
+            return log > logged
+        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + NEAR
+
+
+def recorded_changes(session: Session, topics: Topics) -> Changes:
+    """What was changed while the session was recorded, its topics named by `topics`.
+
+    Raises
+    ------
+    BagError
+        The session cannot be read, or holds what is no change.
+    """
+    topic = topics.outputs[Output.CHANGES]
+    info = session.find(topic.absolute)
+    if info is None or info.count == 0:
+        return Changes([])
+    return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
+
 
 BATCH = 400  # samples in one pickle
 Packed = tuple[str, int, bytes] | Change | None
 
 
-class Ahead:
+class SampleReader:
     """The samples of a session; iterate once.
 
     Parameters
@@ -74,7 +124,7 @@ def main() -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
     path, topics, wanted, joints = pickle.load(sys.stdin.buffer)
     heard: dict[str, list[Stream]] = topics.heard
-    intake = Intake(joints, topics)
+    intake = SampleDecoder(joints, topics)
     say_ready()
     batch: list[Packed] = []
     try:

@@ -1,6 +1,7 @@
-"""Run the twin over a recorded session: the node's three calls for every message of a bag.
+"""Replay: run the twin over a recorded session, message by message as the node would.
 
-The first and the last of them run in processes of their own (`boom_twin.io.ahead`, `boom_twin.io.behind`).
+The first and the last of them run in processes of their own (`boom_twin.offline.reader_process`,
+`boom_twin.offline.writer_process`).
 """
 
 from __future__ import annotations
@@ -20,28 +21,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..alarms import Alarms
+from ..bag.joint_names import refuse_other_names
+from ..bag.reader import Session, scan
+from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of
+from ..bag.session_sheet import SessionSheet
+from ..bag.writer import FILE_NAME
+from ..config.settings import Settings
+from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
+from ..health.alarms import Alarms
 from ..health.baseline import Baseline
-from ..io.ahead import Ahead
-from ..io.atomic import write_atomic
-from ..io.behind import Behind
-from ..io.boom_names import refuse_other_names
-from ..io.reader import Session, scan
-from ..io.results import REPLAY, Building, result_folder
-from ..io.session_model import SessionScene, baseline_of, mapping_of, scene_of
-from ..io.sheet import Sheet
-from ..io.topics import Topics
-from ..io.writer import FILE_NAME
-from ..records import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
-from ..scene.parts import Scene
-from ..settings import Settings
-from ..study.rewrite import anew
-from ..truth import TipTruth, load_truth
-from ..watch.other_boom import OtherBoom
+from ..messages.topic_table import Topics
+from ..scene.edit import anew
+from ..scene.schema import Scene
+from ..system.atomic_files import write_atomic
+from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
+from ..types import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from .ground_truth import TipTruth, load_truth
+from .reader_process import SampleReader
+from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
-    from ..twin import Twin
+    from ..twin.twin import Twin
+
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 NANO = 1e-9
@@ -176,7 +178,7 @@ def replay(
 
 
 def replay_into(
-    building: Building,
+    building: UnfinishedResult,
     bag: str | Path,
     scene: Scene | SessionScene | None,
     settings: Settings | None = None,
@@ -229,7 +231,7 @@ def replay_into(
             "and stamps."
         )
     truth = load_truth(session.path)
-    Sheet(__version__, taken.text).write(out / "bag")
+    SessionSheet(__version__, taken.text).write(out / "bag")
     summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
         "scene": taken.source,
         "scene_sha256": taken.sha256,
@@ -245,7 +247,7 @@ def replay_into(
 
 
 def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene:
-    """The scene that a session is read with: as given, or if it is None as `boom_twin.io.session_model.scene_of` finds it."""
+    """The scene that a session is read with: as given, or if it is None as `boom_twin.bag.session_model.scene_of` finds it."""
     if scene is None:
         return scene_of(session)
     return scene if isinstance(scene, SessionScene) else SessionScene(scene, anew(scene), GIVEN)
@@ -268,11 +270,11 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
 
 @contextmanager
 def _ends(
-    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, building: Building
-) -> Iterator[tuple[Ahead, Behind]]:
+    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, building: UnfinishedResult
+) -> Iterator[tuple[SampleReader, ReportWriter]]:
     """The processes that read and write, as they start."""
-    ahead = Ahead(session.path, topics, wanted, len(scene.joints))
-    behind = Behind(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
+    ahead = SampleReader(session.path, topics, wanted, len(scene.joints))
+    behind = ReportWriter(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
     try:
         yield ahead, behind
     finally:
@@ -282,7 +284,7 @@ def _ends(
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
-    from ..twin import Twin
+    from ..twin.twin import Twin
 
     twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline)
     twin.warm_up()

@@ -1,4 +1,4 @@
-"""Encode messages and write a result bag in a process behind the replay."""
+"""Writer process of a replay: encodes reports and writes the result bag."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bag.writer import SessionWriter
+from ..config.settings import Settings
 from ..errors import BoomTwinError
-from ..records import Array, Change, Health, Prediction, Report, Residuals, Stream
-from ..scene.parts import Scene
-from ..settings import Settings
-from .outlet import Outlet
-from .pipe import END, Pipe, received, say_ready
-from .topics import Output, Topic, Topics
-from .writer import SessionWriter
+from ..messages.report_encoder import ReportEncoder
+from ..messages.topic_table import Output, Topic, Topics
+from ..scene.schema import Scene
+from ..types import Array, Change, Health, Prediction, Report, Residuals, Stream
+from .process_pipe import END, Pipe, received, say_ready
 
 BATCH = 200  # reports in one pickle
 Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
@@ -75,7 +75,7 @@ def _table(data: bytes, columns: int) -> Array:
     return np.frombuffer(data).reshape(-1, columns)
 
 
-class Behind:
+class ReportWriter:
     """The replay's end of the pipe.
 
     Parameters
@@ -91,7 +91,7 @@ class Behind:
     settings : Settings
         How it is drawn.
     lock : int
-        Descriptor that the process keeps open, see `boom_twin.io.results.Building`.
+        Descriptor that the process keeps open, see `boom_twin.system.result_folder.UnfinishedResult`.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def main(directory: Path) -> int:
     try:
         notes, topics, scene, settings = next(items)
         outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
-        outlet = Outlet(scene, settings)
+        outlet = ReportEncoder(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             for batch in items:

@@ -1,6 +1,8 @@
 """Arrays in, pictures out. The only package that imports a plotting library, and only when a picture is drawn."""
 
-from .records import AlarmSpan, History, ImuTrace, Truth
-from .replay import replay_pictures
+from __future__ import annotations
+
+from .history import AlarmSpan, History, ImuTrace, Truth
+from .session import replay_pictures
 
 __all__ = ["AlarmSpan", "History", "ImuTrace", "Truth", "replay_pictures"]

@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..records import Array
+from ..types import Array
 from .style import GREY, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+
 SIZE = 14.0  # of text, points
 
 
-def dimension(
-    axes: Axes, start: Array, stop: Array, text: str, shift: float, colour: str = INK, at: float = 0.5
-) -> None:
+def dimension(axes: Axes, start: Array, stop: Array, text: str, shift: float, colour: str = INK, at: float = 0.5) -> None:
     """Dimension line from `start` to `stop` (m), moved by `shift` (m) to the left of that direction.
 
     The text stands at the share `at` of the way, outside where that is below 0 or above 1.
@@ -54,9 +53,7 @@ def angle(axes: Axes, centre: Array, start: float, stop: float, radius: float, t
     _boxed(axes, centre + radius * np.array([np.cos(middle), np.sin(middle)]), text, colour)
 
 
-def name(
-    axes: Axes, point: Array, text: str, offset: tuple[float, float], colour: str = INK, weight: str = "bold"
-) -> None:
+def name(axes: Axes, point: Array, text: str, offset: tuple[float, float], colour: str = INK, weight: str = "bold") -> None:
     """Text beside a point, `offset` in points."""
     side = "left" if offset[0] > 0 else "right" if offset[0] < 0 else "center"
     axes.annotate(

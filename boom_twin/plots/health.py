@@ -1,4 +1,4 @@
-"""Picture of a session's health: alarms and gaps on the time line, and how near every channel was to an alarm."""
+"""Pictures of a session's health: alarms over time, natural frequencies, bending moments."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..records import Array
-from .records import AlarmSpan
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture
+from ..types import Array
+from .history import AlarmSpan, History
+from .residuals import running_mean
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 COLOURS = (BLUE, GREEN, PURPLE, SKY, INK, GREY)
 SMALLEST = 0.05
@@ -84,3 +86,59 @@ def _levels(axes: Axes, stamps: Array, names: tuple[str, ...], levels: Array) ->
     axes.set_ylim(SMALLEST, max(2.0, float(levels.max(initial=1.0)) * 1.5))
     if names:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderaxespad=0.1, handlelength=1.2)
+
+
+def frequency_picture(
+    path: Path, session: str, times: Array, model: Array, measured: list[tuple[float, float]], note: str
+) -> None:
+    """Write it.
+
+    Parameters
+    ----------
+    path : Path
+    session : str
+        Its name.
+    times, model : ndarray, shape (k,), (k, modes)
+        s, and the model's frequencies (Hz) then.
+    measured : list of (float, float)
+        Time (s) and frequency (Hz).
+    note : str
+    """
+    with picture(path, f"{session}: natural frequencies", note, (16.0, 6.0)) as figure:
+        axes = figure.add_subplot()
+        lines = axes.semilogy(times, model, color=BLUE)
+        if lines:
+            lines[0].set_label("model, in the posture of the moment")
+        if measured:
+            axes.plot(*zip(*measured, strict=True), "o", color=ORANGE, markersize=8, label="measured")
+        axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
+        axes.set_ylabel("frequency, Hz")
+        axes.set_xlabel("time since first sample, s")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
+
+
+SLOW = 4.0
+"""s of the running mean that stands for the static part."""
+
+
+def moment_picture(path: Path, session: str, history: History, rows: list[tuple[str, int]], note: str) -> None:
+    """Write it; `rows` are a name and the column of `history.moments` of every section."""
+    title, size = f"{session}: bending moment where each section is loaded most", (16.0, 1.4 + 2.1 * len(rows))
+    with picture(path, title, note, size) as figure:
+        panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (name, column) in zip(panels, rows, strict=True):
+            moment = 1e-3 * history.moments[:, column]
+            shade_gaps(axes, history.gaps)
+            axes.plot(history.stamps_s, moment, color=BLUE, linewidth=1.0, label="static and dynamic")
+            axes.plot(history.stamps_s, slow_part(history, column) * 1e-3, color=ORANGE, label=f"mean over {SLOW:g} s")
+            axes.set_ylim(*limits(moment))
+            axes.set_title(name)
+            axes.set_ylabel("moment, kN m")
+        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
+        panels[-1].set_xlim(history.stamps_s[0], max(history.stamps_s[-1], history.stamps_s[0] + 1e-3))
+        panels[-1].set_xlabel("time since first sample, s")
+
+
+def slow_part(history: History, column: int) -> Array:
+    """The static part of a moment (N m), shape (m,): its mean over `SLOW`."""
+    return running_mean(history.stamps_s, history.moments[:, column], SLOW)

@@ -1,4 +1,4 @@
-"""What a replay leaves behind for pictures: frozen arrays, times in seconds since the first sample."""
+"""Records that pictures are drawn from: frozen arrays, times in seconds since the first sample."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import Array
+from ..types import Array
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class History:
     alarms : list of AlarmSpan
         In the order of their beginning.
     moments : ndarray, shape (m, k)
-        Bending moments (N m) at the stations of `boom_twin.moments`.
+        Bending moments (N m) at the stations of `boom_twin.analysis.bending_moments`.
     orbits : Orbits or None
         Of the pins with clearance, if there are any.
     """

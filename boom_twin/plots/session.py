@@ -1,4 +1,4 @@
-"""Pictures of a calibration: residuals by channel before and after, and parameters with their intervals."""
+"""Pictures of whole sessions: all of one replay, two compared, a calibration."""
 
 from __future__ import annotations
 
@@ -8,9 +8,93 @@ from pathlib import Path
 
 import numpy as np
 
-from ..records import Array
-from .residuals import SIGMA, running_mean
-from .style import BLUE, GREY, ORANGE, SKY, picture
+from ..types import Array
+from .history import History, Truth
+from .posture import orbits_picture, posture_picture
+from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
+from .style import BLUE, GREEN, GREY, ORANGE, SKY, picture
+from .tip import tip_picture
+
+
+def replay_pictures(
+    directory: Path, history: History, truth: Truth | None = None, *, session: str = "session", note: str = ""
+) -> list[Path]:
+    """Draw what was replayed.
+
+    Parameters
+    ----------
+    directory : Path
+        Where the PNG files go; made if it is not there.
+    history : History
+    truth : Truth, optional
+        Drawn over the prediction, if known.
+    session : str
+        Name of the session, for the titles.
+    note : str
+        Small print on every picture, such as "synthetic session of a virtual rig".
+
+    Returns
+    -------
+    list of Path
+        ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
+        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same
+        arrays give the same bytes.
+    """
+    if len(history.stamps_s) == 0:
+        return []
+    directory.mkdir(parents=True, exist_ok=True)
+    tip_picture(directory / "tip.png", session, history, truth, note)
+    written = [directory / "tip.png"]
+    if history.residual_names:
+        written.append(directory / "residuals.png")
+        residual_picture(written[-1], session, history, note)
+    if history.shapes:
+        written.append(directory / "posture.png")
+        posture_picture(written[-1], session, history, note)
+    if has_spectrum(history):
+        written.append(directory / "spectrum.png")
+        spectrum_picture(written[-1], session, history, note)
+    if history.orbits is not None:
+        written.append(directory / "orbits.png")
+        orbits_picture(written[-1], f"{session}: journals in their bushes", history.orbits, note)
+    return written
+
+
+SHOWN = 30.0
+"""Standard deviations at which a bar is cut off, with its number beside it."""
+
+
+def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float, note: str = "") -> None:
+    """Write it: a bar for every figure.
+
+    Parameters
+    ----------
+    path : Path
+    title : str
+    names : list of str
+        Of the figures.
+    apart : list of float
+        B minus A, over the standard deviation of that.
+    sure : float
+        From where on a difference is no chance.
+    note : str
+    """
+    with picture(path, title, note, (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
+        axes = figure.add_subplot()
+        places = np.arange(len(names))
+        axes.axvspan(-sure, sure, color=GREEN, alpha=0.12, linewidth=0, label="may be chance")
+        colours = [ORANGE if abs(value) > sure else GREY for value in apart]
+        axes.barh(places, np.clip(apart, -SHOWN, SHOWN), height=0.7, color=colours)
+        for place, value in zip(places, apart, strict=True):
+            if abs(value) > SHOWN:
+                side = "left" if value > 0.0 else "right"
+                axes.annotate(f"{value:+.0f}", (np.sign(value) * SHOWN, place), va="center", ha=side)
+        axes.set_yticks(places, names)
+        axes.set_ylim(len(names) - 0.4, -0.6)
+        axes.set_xlim(-SHOWN - 4.0, SHOWN + 4.0)
+        axes.grid(axis="y", visible=False)
+        axes.set_xlabel("B minus A, standard deviations")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..io.atomic import write_atomic
-from ..printable import printable
-from ..records import Array
+from ..system.atomic_files import write_atomic
+from ..system.terminal_text import printable
+from ..types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .records import AlarmSpan
+    from .history import AlarmSpan
+
 
 # Okabe and Ito: told apart by every kind of colour vision
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..records import Array
-from .records import History, ImuTrace, Truth
+from ..types import Array
+from .history import History, ImuTrace, Truth
 from .style import BLUE, GREY, INK, ORANGE, PALE, broken, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 WINDOW = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 4))}

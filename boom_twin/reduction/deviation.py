@@ -1,21 +1,23 @@
-"""How far a model's tip is from the full model's: at rest in the scene's postures, and in a move."""
+"""Deviation and cost of a reduced model: how far its tip is from the full model's, and what a step takes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.frequencies import natural_modes
-from ..analysis.march import march
-from ..analysis.statics import settle
+from ..analysis.equilibrium import settle
+from ..analysis.methods import march
+from ..analysis.modal import natural_modes
+from ..analysis.motions import DURATION, Motion, motion_of
+from ..compiler.compile import compile_scene
+from ..compiler.plan import Plan
 from ..errors import SolverError
-from ..plan.compile import compile_scene
-from ..plan.plan import Plan
-from ..records import Array
+from ..kernels.elements.beam import USUAL
 from ..scene.kinematics import posture_angles, strokes_of_posture
-from ..scene.parts import Scene
-from .motion import DURATION, Motion, motion_of
+from ..scene.schema import Scene
+from ..types import Array
 
 STEP = 1e-3  # s
 EVERY = 4
@@ -24,7 +26,7 @@ WIDTH = 1e-7  # relative, of a frequency's bracket
 
 
 @dataclass(frozen=True)
-class Course:
+class StrokeCourse:
     """Where models are compared: strokes at rest and a move, the same for all.
 
     Attributes
@@ -47,7 +49,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Response:
     """What a model says on a course.
 
     Attributes
@@ -86,17 +88,17 @@ class Deviation:
         return max(self.rest, self.most)
 
 
-def course_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Course:
+def course_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> StrokeCourse:
     """All postures of a scene, and its `motion_of` from `posture` for `duration` (s)."""
     motion = motion_of(scene, posture, duration)
     names = tuple(scene.postures)
     strokes = [*(strokes_of_posture(scene, name) for name in names), motion.first]
     angles = [*(posture_angles(scene, name) for name in names), motion.angles]
     places = (*(f"posture {name}" for name in names), "the start of the move")
-    return Course(places, np.array(strokes), np.array(angles), motion)
+    return StrokeCourse(places, np.array(strokes), np.array(angles), motion)
 
 
-def answer(scene: Scene, course: Course, frequencies: int = 0) -> Answer:
+def answer(scene: Scene, course: StrokeCourse, frequencies: int = 0) -> Response:
     """Take a model through a course; a failure is a status, not an error."""
     try:
         plan = compile_scene(scene)
@@ -104,11 +106,11 @@ def answer(scene: Scene, course: Course, frequencies: int = 0) -> Answer:
         moved = march(scene, course.motion, course.motion.duration, course.step, course.every, angles=course.motion.angles)
     except SolverError as error:
         nothing = np.zeros((0, 2))
-        return Answer(nothing, np.zeros(0), nothing, np.nan, str(error))
-    return Answer(rest, found, moved.tip, moved.seconds, moved.status)
+        return Response(nothing, np.zeros(0), nothing, np.nan, str(error))
+    return Response(rest, found, moved.tip, moved.seconds, moved.status)
 
 
-def _at_rest(plan: Plan, course: Course, frequencies: int) -> tuple[Array, Array]:
+def _at_rest(plan: Plan, course: StrokeCourse, frequencies: int) -> tuple[Array, Array]:
     """Tips at rest (m + 1, 2), and frequencies (Hz) about the last of them."""
     state, work = plan.state(), plan.work()
     tips = np.empty((len(course.names), 2))
@@ -119,7 +121,7 @@ def _at_rest(plan: Plan, course: Course, frequencies: int) -> tuple[Array, Array
     return tips, np.array([mode.frequency for mode in modes])
 
 
-def deviation(model: Answer, full: Answer, course: Course) -> Deviation:
+def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviation:
     """Of a model from the full one."""
     if model.status != "ok":
         return Deviation(np.inf, "", np.inf, np.inf)
@@ -127,3 +129,38 @@ def deviation(model: Answer, full: Answer, course: Course) -> Deviation:
     move = np.linalg.norm(model.tip - full.tip, axis=1)
     worst = int(np.argmax(rest))
     return Deviation(float(rest[worst]), course.names[worst], float(np.sqrt(np.mean(move**2))), float(move.max()))
+
+
+# In unknowns, measured on the default boom (`test/bench/parts.py` shows how well they count):
+AXIAL = 0.35  # an axial coordinate; other unknowns count as one
+OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
+SHARE = 0.05  # a coordinate of a mass, or a point that turns finitely
+
+STEPS = 400  # that are timed
+
+
+def unknowns(scene: Scene) -> int:
+    """Unknowns of one step."""
+    return len(compile_scene(scene).names)
+
+
+def size(scene: Scene) -> float:
+    """Cost of a step, counted in unknowns: the same on every machine and at any load, so that choices can be made by it."""
+    plan = compile_scene(scene)
+    unknowns, beams = len(plan.names), plan.tables.beams
+    other = np.sum((beams.bending != USUAL.bending) | (beams.axial != USUAL.axial))
+    shares = len(plan.masses) - unknowns + beams.finite.sum()
+    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + SHARE * shares)
+
+
+def step_times(scenes: Sequence[Scene], course: StrokeCourse, rounds: int) -> Array:
+    """Time (s) of a step of every scene, shape (scenes,): the least of `rounds` interleaved runs.
+
+    Each steps the beginning of the move: short runs are more often left alone by what else the machine does.
+    """
+    motion, least = course.motion, np.full(len(scenes), np.inf)
+    for _ in range(rounds):
+        for k, scene in enumerate(scenes):
+            run = march(scene, motion, STEPS * course.step, course.step, every=STEPS, angles=motion.angles)
+            least[k] = min(least[k], run.seconds / run.steps)
+    return least

@@ -1,4 +1,4 @@
-"""The leanest model of a boom that keeps its tip within a stated distance of the full model's.
+"""Search for the leanest model that keeps the tip within a stated distance of the full model's.
 
 Parts are left out one after another, first what adds the least error for what it saves, and after each the error of all that
 is left out together is measured anew; errors of single parts are never added up. What costs nothing (damping, compliance of
@@ -15,11 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SolverError, UsageError
-from ..scene.parts import Scene
-from .cost import size, step_times, unknowns
-from .deviation import Answer, Course, Deviation, answer, course_of, deviation
-from .edits import Edit, edited, merged
-from .variants import FEWER_MODES, KINDS, Kind, Variant, without
+from ..scene.edit import Edit, edited, merged
+from ..scene.schema import Scene
+from .deviation import Deviation, Response, StrokeCourse, answer, course_of, deviation, size, step_times, unknowns
+from .variants import FEWER_MODES, KINDS, Variant, VariantKind, without
 
 GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
 ROUNDS = 30
@@ -39,7 +38,7 @@ class Proposal:
         From the scene that the search started from to the lean one.
     deviation : Deviation
         Of the tip from the full model's, all together.
-    course : Course
+    course : StrokeCourse
         On which it was measured.
     unknowns : tuple of int
         Of a step of the full and of the lean model.
@@ -52,7 +51,7 @@ class Proposal:
     scene: Scene
     edits: tuple[Edit, ...]
     deviation: Deviation
-    course: Course
+    course: StrokeCourse
     unknowns: tuple[int, int]
     seconds: tuple[float, float]
     next: tuple[str, float] | None
@@ -96,7 +95,7 @@ class _Search:
         self.start, self.most, self.progress = start, most, progress
         self.course = course_of(full)
         self.edits: tuple[Edit, ...] = ()
-        self.full: Answer = answer(full, self.course)
+        self.full: Response = answer(full, self.course)
         if self.full.status != "ok":
             raise SolverError(f"the full model itself fails: {self.full.status}")
         self.known: dict[tuple[Edit, ...], Deviation] = {}
@@ -112,7 +111,7 @@ class _Search:
         return edited(self.start, self.edits)
 
     def size(self, edits: tuple[Edit, ...]) -> float:
-        """Of the start after `edits`, see `study.cost`."""
+        """Of the start after `edits`, see `reduction.deviation`."""
         if edits not in self.sizes:
             self.sizes[edits] = size(edited(self.start, edits))
         return self.sizes[edits]
@@ -145,7 +144,7 @@ class _Search:
                 self.next = (variant.name, error)
         return self.edits != before
 
-    def _parts(self) -> Iterator[tuple[Kind, Sequence[int]]]:
+    def _parts(self) -> Iterator[tuple[VariantKind, Sequence[int]]]:
         """Every kind of part, everywhere and in every group of sections."""
         everywhere = range(len(self.start.sections))
         groups = [group.tolist() for group in np.array_split(everywhere, min(GROUPS, len(everywhere)))]
@@ -153,7 +152,7 @@ class _Search:
             for where in [everywhere, *groups] if len(groups) > 1 else [everywhere]:
                 yield kind, where
 
-    def _trial(self, kind: Kind, where: Sequence[int]) -> tuple[Variant, tuple[Edit, ...]] | None:
+    def _trial(self, kind: VariantKind, where: Sequence[int]) -> tuple[Variant, tuple[Edit, ...]] | None:
         """The present model without a part, and all its edits; None if the part is gone or costs nothing."""
         variant = without(self.model(), kind, where)
         if variant is None:
@@ -161,7 +160,9 @@ class _Search:
         edits = merged((*self.edits, *variant.edits))
         return (variant, edits) if self.size(edits) < self.size(self.edits) else None
 
-    def _priced(self, number: int, kind: Kind, where: Sequence[int]) -> tuple[float, int, Kind, Sequence[int]] | None:
+    def _priced(
+        self, number: int, kind: VariantKind, where: Sequence[int]
+    ) -> tuple[float, int, VariantKind, Sequence[int]] | None:
         """Entry of the queue, error added per size saved first; None if there is nothing to leave out."""
         trial = self._trial(kind, where)
         if trial is None:

@@ -1,7 +1,7 @@
-"""What can be left out of a scene, part by part: every variant is the scene after edits that a user could make.
+"""Variants of a scene with parts left out, as edits that a user could make.
 
-A kind of part (`Kind`) says which keys of one section, or of the joint that turns it, leave the part out. Payload and line
-fill are loads, not parts of the model, and stay.
+A kind of part (`VariantKind`) says which keys of one section, or of the joint that turns it, leave the part out. Payload
+and line fill are loads, not parts of the model, and stay.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from ..scene.parts import Scene
-from .edits import Edit, edited
+from ..scene.edit import Edit, edited
+from ..scene.schema import Scene
 
 MOST_MODES = 6  # bending coordinates per flexible part that are tried
 
@@ -83,7 +83,7 @@ def _fewer_modes(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 
 @dataclass(frozen=True)
-class Kind:
+class VariantKind:
     """A kind of part. `edits` (scene, section or joint from 0) leaves it out there; none where there is none.
 
     `phrase` completes "section 2" or "cylinder 2" (`owner`); `singly` says whether a study looks at each one by itself.
@@ -97,21 +97,21 @@ class Kind:
 
 
 KINDS = (
-    Kind("bending", "section", "rigid", _rigid, True),
-    Kind("axial coordinate", "section", "without axial coordinate", _axial, True),
-    Kind("geometric stiffness", "section", "without geometric stiffness", _geometric, True),
-    Kind("rotary inertia", "section", "without rotary inertia (rho_I)", _rotary, False),
-    Kind("beam damping", "section", "without beam damping (beta)", _beam_damping, False),
-    Kind("cylinder compliance", "cylinder", "incompressible", _compliance, True),
-    Kind("cylinder damping", "cylinder", "without oil damping (d)", _oil_damping, False),
-    Kind("link masses", "joint", "with massless links", _links, False),
-    Kind("barrel masses", "cylinder", "with a massless barrel", _barrel, False),
-    Kind("rod masses", "cylinder", "with a massless rod", _rod, False),
+    VariantKind("bending", "section", "rigid", _rigid, True),
+    VariantKind("axial coordinate", "section", "without axial coordinate", _axial, True),
+    VariantKind("geometric stiffness", "section", "without geometric stiffness", _geometric, True),
+    VariantKind("rotary inertia", "section", "without rotary inertia (rho_I)", _rotary, False),
+    VariantKind("beam damping", "section", "without beam damping (beta)", _beam_damping, False),
+    VariantKind("cylinder compliance", "cylinder", "incompressible", _compliance, True),
+    VariantKind("cylinder damping", "cylinder", "without oil damping (d)", _oil_damping, False),
+    VariantKind("link masses", "joint", "with massless links", _links, False),
+    VariantKind("barrel masses", "cylinder", "with a massless barrel", _barrel, False),
+    VariantKind("rod masses", "cylinder", "with a massless rod", _rod, False),
 )
-FEWER_MODES = Kind("modes", "section", "with one shape less", _fewer_modes, True)
+FEWER_MODES = VariantKind("modes", "section", "with one shape less", _fewer_modes, True)
 
 
-def without(scene: Scene, kind: Kind, where: Sequence[int]) -> Variant | None:
+def without(scene: Scene, kind: VariantKind, where: Sequence[int]) -> Variant | None:
     """The scene without a kind of part in the sections or joints `where` (from 0); None if there is none to leave out."""
     edits = tuple(edit for i in where for edit in kind.edits(scene, i))
     if not edits:

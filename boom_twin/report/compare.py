@@ -1,21 +1,94 @@
-"""Two sessions side by side: what differs, how sure that is, and whether it can be chance."""
+"""Compare two sessions: what differs, how sure that is, and whether it can be chance."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
+from pathlib import Path
 from typing import Any
 
-from ..offline.replay import alarm_as_text
-from .quantities import Quantity
-from .side import Side
+from ..bag.session_model import baseline_of
+from ..bag.session_sheet import incompleteness
+from ..bag.writer import FILE_NAME as RESULT
+from ..config.settings import Settings
+from ..errors import BagError
+from ..offline.history import history_of
+from ..offline.replay import Replay, alarm_as_text
+from ..plots import History
+from ..scene.schema import Scene
+from ..system.received_files import holds_file, open_received
+from .quantities import Quantity, quantities, read, write
+from .vibration import HoldInterval, holds
+
+
+@dataclass(frozen=True)
+class ComparedSession:
+    """What is known of one session.
+
+    Attributes
+    ----------
+    name : str
+    scene : str
+        Digest of its scene.
+    quantities : list of Quantity
+    alarms : list of dict
+        As in ``summary.json``.
+    incomplete : str
+        Why the session is not whole, in words; empty if nothing says that it is not.
+    """
+
+    name: str
+    scene: str
+    quantities: list[Quantity]
+    alarms: list[dict[str, Any]]
+    incomplete: str = ""
+
+
+def worked_out(
+    result: Replay, scene: Scene, settings: Settings, baseline: Path | None, folder: Path
+) -> tuple[History, list[HoldInterval], Path]:
+    """History and stretches of standing still of a replay; its figures are written into `folder`, as the path says."""
+    history = history_of(result.recording, scene)
+    still = holds(history, scene)
+    usual = baseline_of(result.session.path, baseline).baseline
+    found = quantities(result.recording, history, still, scene, settings, usual)
+    return history, still, write(folder, scene, found)
+
+
+def side_of(path: Path, replayed: Callable[[Path], Path]) -> ComparedSession:
+    """One side from a replay folder, or from a session, of which `replayed` makes a replay folder.
+
+    Raises
+    ------
+    BagError
+        The session cannot be replayed, or the folder is incomplete, lacks figures or has none that can be read.
+    """
+    if holds_file(path / "summary.json") and (told := incompleteness(path)):
+        raise BagError(f"{path}: {told}")
+    folder = path if holds_file(path / "summary.json") else replayed(path)
+    scene, found = read(folder)
+    try:
+        with open_received(folder / "summary.json") as file:
+            summary = json.load(file)
+        alarms, told = list(summary["alarms"]), summary["output_sha256"]
+        incomplete = str(summary.get("session_incomplete", ""))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
+    bag = folder / "bag" / RESULT
+    if bag.is_file() and hashlib.sha256(bag.read_bytes()).hexdigest() != told:
+        raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")
+    return ComparedSession(path.resolve().name, scene, found, alarms, incomplete)
+
 
 SURE = 4.0
 """Standard deviations from which a difference is no chance: one in a thousand for means of ten batches (t distribution)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ComparisonRow:
     """One figure of both sessions, None where a session has none of it.
 
     Attributes
@@ -38,25 +111,25 @@ class Row:
     is_significant: bool | None = None
 
 
-def rows_of(one: Side, other: Side) -> list[Row]:
+def rows_of(one: ComparedSession, other: ComparedSession) -> list[ComparisonRow]:
     """All figures that either has, in the order of the first."""
     left, right = ({each.name: each for each in side.quantities} for side in (one, other))
     return [_row(name, left.get(name), right.get(name)) for name in dict.fromkeys([*left, *right])]
 
 
-def _row(name: str, a: Quantity | None, b: Quantity | None) -> Row:
+def _row(name: str, a: Quantity | None, b: Quantity | None) -> ComparisonRow:
     if a is None or b is None:
         known = a or b
         assert known is not None
-        return Row(name, known.unit, a.value if a else None, b.value if b else None)
+        return ComparisonRow(name, known.unit, a.value if a else None, b.value if b else None)
     difference = b.value - a.value
     if a.sigma is None or b.sigma is None:
-        return Row(name, a.unit, a.value, b.value, difference)
+        return ComparisonRow(name, a.unit, a.value, b.value, difference)
     sigma = hypot(a.sigma, b.sigma)
-    return Row(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SURE * sigma)
+    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SURE * sigma)
 
 
-def flat(one: Side, other: Side, rows: list[Row]) -> dict[str, Any]:
+def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> dict[str, Any]:
     """As one flat object: every column of the table as a list, and the alarms in words."""
     columns = ("name", "unit", "a", "b", "difference", "sigma", "is_significant")
     return {
@@ -71,7 +144,7 @@ def flat(one: Side, other: Side, rows: list[Row]) -> dict[str, Any]:
     }
 
 
-def as_text(one: Side, other: Side, rows: list[Row]) -> list[str]:
+def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> list[str]:
     """A table, then the alarms."""
     lines = [f"{'':32s} {'A':>12s} {'B':>12s} {'B - A':>12s} {'+-':>10s}"]
     for row in rows:

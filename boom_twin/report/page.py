@@ -10,19 +10,16 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..io.atomic import write_atomic
 from ..offline.replay import NANO, Recording, Replay
-from ..records import Alarm, Array
-from ..scene.parts import Scene
-from ..twin import EVENTS
-from ..view import AlarmSpan, History
-from ..view.frequencies import frequency_picture
-from ..view.moments import moment_picture
-from ..view.timeline import timeline_picture
-from .decay import Vibration
+from ..plots import AlarmSpan, History
+from ..plots.health import frequency_picture, moment_picture, timeline_picture
+from ..scene.schema import Scene
+from ..system.atomic_files import write_atomic
+from ..twin.twin import EVENTS
+from ..types import Alarm, Array
 from .html import heading, image, page, paragraph, table
-from .loads import BOX, Load, loads
-from .vibration import LEAST, NEAR, Hold, course
+from .quantities import BOX, Load, loads
+from .vibration import LEAST, NEAR, HoldInterval, Vibration, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
@@ -42,7 +39,7 @@ class Subject:
     scene : Scene
     scene_name : str
         Path, or what else it is called.
-    still : list of Hold
+    still : list of HoldInterval
     heights : ndarray, shape (n,), or None
         Of the sections, m, where they are known.
     """
@@ -51,7 +48,7 @@ class Subject:
     history: History
     scene: Scene
     scene_name: str
-    still: list[Hold]
+    still: list[HoldInterval]
     heights: Array | None
 
     @property

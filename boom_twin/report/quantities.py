@@ -1,8 +1,9 @@
-"""The figures of a session, each with its standard deviation, so that two sessions can be compared."""
+"""Quantities of a session with their standard deviations, bending moments and stresses included, for comparisons."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -11,17 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BagError
+from ..analysis.bending_moments import Station, stations
+from ..config.settings import Settings
+from ..errors import BagError, UsageError
 from ..health.baseline import Baseline
-from ..io.atomic import write_atomic
-from ..moments import stations
 from ..offline.replay import Recording
-from ..received import open_received
-from ..records import Array, Stream, channels_of
-from ..scene.parts import Scene
-from ..settings import Settings
-from ..view import History
-from .vibration import Hold
+from ..plots import History
+from ..plots.health import slow_part
+from ..scene.schema import Scene
+from ..system.atomic_files import write_atomic
+from ..system.received_files import open_received
+from ..types import Array, Stream, channels_of
+from .vibration import HoldInterval
 
 FILE_NAME = "quantities.json"
 BATCHES = 10
@@ -41,7 +43,7 @@ class Quantity:
 
 
 def quantities(
-    recording: Recording, history: History, still: list[Hold], scene: Scene, settings: Settings, baseline: Baseline
+    recording: Recording, history: History, still: list[HoldInterval], scene: Scene, settings: Settings, baseline: Baseline
 ) -> list[Quantity]:
     """All figures of one replay."""
     return [
@@ -76,7 +78,7 @@ def batch_mean(values: Array) -> tuple[float, float]:
     return float(values.mean()), float(means.std(ddof=1) / sqrt(BATCHES))
 
 
-def _frequencies(still: list[Hold], detuning: float) -> Iterator[Quantity]:
+def _frequencies(still: list[HoldInterval], detuning: float) -> Iterator[Quantity]:
     """Of every mode that was seen: measured over model frequency, and damping.
 
     The ratio is that of the rig to the model in any posture, but for the `detuning` that the model may have in each.
@@ -161,3 +163,65 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
 def digest(scene: Scene) -> str:
     """Of everything in a scene."""
     return sha256(scene.model_dump_json().encode()).hexdigest()
+
+
+BOX = 2.4
+"""Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """The most loaded station of a section.
+
+    Attributes
+    ----------
+    station : Station
+    column : int
+        Of `History.moments`.
+    moment, time, static : float
+        The largest moment in magnitude (N m), when (s), and the static part of it then (N m).
+    height : float
+        Of the section, m.
+    stress : float
+        Of its outermost fibre by bending, Pa.
+    """
+
+    station: Station
+    column: int
+    moment: float
+    time: float
+    static: float
+    height: float
+    stress: float
+
+
+def loads(history: History, scene: Scene, heights: Array | None) -> list[Load]:
+    """One for every flexible section; `heights` (n,) of the sections in m, or None to take them for thin-walled boxes."""
+    places = stations(scene)
+    found = []
+    for section in sorted({station.section for station in places}):
+        columns = [i for i, station in enumerate(places) if station.section == section]
+        size = np.abs(history.moments[:, columns])
+        row, best = np.unravel_index(int(size.argmax()), size.shape)
+        column = columns[int(best)]
+        moment, part = float(history.moments[row, column]), scene.sections[section]
+        assert part.A is not None and part.I is not None
+        height = BOX * math.sqrt(part.I / part.A) if heights is None else float(heights[section])
+        static = float(slow_part(history, column)[row])
+        stress = abs(moment) * height / 2.0 / part.I
+        found.append(Load(places[column], column, moment, float(history.stamps_s[row]), static, height, stress))
+    return found
+
+
+def section_heights(text: str | None, scene: Scene) -> Array | None:
+    """Heights (m) of all sections from ``h1,h2,..``; UsageError unless there is one above 0 for each."""
+    if text is None:
+        return None
+    count = len(scene.sections)
+    try:
+        heights = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        heights = np.zeros(0)
+    if len(heights) != count or not (np.isfinite(heights) & (heights > 0.0)).all():
+        raise UsageError(f"--section-height {text}: give {count} heights above 0, in m, with commas between them.")
+    return heights

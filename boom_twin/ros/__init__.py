@@ -1,1 +1,1 @@
-"""The live side: everything that needs rclpy, and the only place that imports it."""
+"""The only folder that imports rclpy."""

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BoomTwinError
-from ..io.topics import Topics, load_topics
-from .require import require_rclpy
+from ..messages.topic_table import Topics, load_topics
+from .startup import require_rclpy
 
 USUAL, LARGEST = 101, 232
 """The last domain that people use, as the ROS 2 documentation has it, and the last one whose ports exist."""
@@ -104,7 +104,7 @@ def refuse_foreign(topics: Topics) -> None:
     """
     import rclpy
 
-    from .context import ros
+    from .runtime import ros
 
     with ros([]):
         node = rclpy.create_node("boom_twin_isolation")
@@ -121,7 +121,7 @@ def refuse_foreign(topics: Topics) -> None:
 
 def _foreign(node: Any, topics: Topics) -> list[str]:
     """Who publishes one of the topics, or listens to an input, in words."""
-    from .peers import node_name
+    from .node.diagnostics import node_name
 
     inputs, outputs = topics.inputs.values(), [*topics.outputs.values(), topics.events]
     of = {f"publishes {each.absolute}": node.get_publishers_info_by_topic(each.absolute) for each in [*inputs, *outputs]}

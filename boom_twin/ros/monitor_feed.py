@@ -1,4 +1,4 @@
-"""The twin's topics as a feed of the live page."""
+"""Feed of the live page from the twin's ROS topics."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
-from ..io.topics import NODE, Output, Topics
-from ..monitor.feed import Feed
-from ..monitor.store import Store
-from ..records import Stream
-from ..scene.parts import Scene
-from .qos import qos_profile
-from .types import message_class
+from ..messages.topic_table import NODE, Output, Topics
+from ..monitor.data.feed import Feed
+from ..monitor.data.store import Store
+from ..scene.schema import Scene
+from ..types import Stream
+from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
 DEPTH = 1000

@@ -1,16 +1,60 @@
-"""What spins the node: rclpy's events executor where it works, else its single-threaded one."""
+"""rclpy in a process: context, executor, message types and QoS."""
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
+import rclpy
+from rclpy.exceptions import ROSInterruptException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 
-from .context import STOPPED, one_line
-from .receive_queue import ReceiveQueue
+from ..errors import UsageError
+from ..messages.topic_table import Qos
+from .node.receive_queue import ReceiveQueue
+
+STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
+"""What ends a spinning process in order."""
+NO_PROFILES = "SKIP_DEFAULT_XML_FILE"
+"""Set to 1: Fast DDS does not take ``DEFAULT_FASTRTPS_PROFILES.xml``, which may name log files, from the working directory."""
+
+
+@contextmanager
+def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
+    """rclpy, started with the process's or the given ROS arguments, and shut down at the end.
+
+    rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
+    is going. What a signal does is up to Python, see `boom_twin.ros.startup`. Fast DDS takes its profiles from the file that
+    ``FASTRTPS_DEFAULT_PROFILES_FILE`` names, and none from the working directory, which may be a received session's.
+
+    Raises
+    ------
+    UsageError
+        The arguments after ``--ros-args`` cannot be used.
+    """
+    os.environ.setdefault(NO_PROFILES, "1")
+    try:
+        rclpy.init(args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy raises types of its C++ part here
+        raise UsageError(f"ROS arguments: {one_line(error)}. Check what follows --ros-args.") from error
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+def one_line(error: BaseException) -> str:
+    """The text of an error of rclpy without line breaks and what its C parts append."""
+    return " ".join(str(error).split(", at ./")[0].split()).rstrip(".") or type(error).__name__
+
 
 WAKE = 0.2
 """Time (s) between looks at whether it is over."""
@@ -60,3 +104,20 @@ def _take_over(executor: Any, queue: ReceiveQueue) -> None:
     while queue.is_behind and queue.received != before and time.monotonic() < end:
         before = queue.received
         executor.spin_once(timeout_sec=0.0)
+
+
+@cache
+def message_class(type_name: str) -> Any:
+    """The class of ``package/msg/Name``."""
+    package, folder, name = type_name.split("/")
+    return getattr(import_module(f"{package}.{folder}"), name)
+
+
+def qos_profile(qos: Qos, depth: int | None = None) -> QoSProfile:
+    """`qos` of ``topics.yaml``; with another depth, if one is given."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth or qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+    )

@@ -1,4 +1,4 @@
-"""What SIGINT and SIGTERM do to a process. Needs no rclpy, so that it can be set up before anything else."""
+"""Start of a ROS process: signal handling, and a clear error where rclpy is missing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from types import FrameType
+
+from ..errors import UsageError
 
 
 def on_stop_signal(act: Callable[[], None]) -> None:
@@ -24,7 +27,7 @@ def on_stop_signal(act: Callable[[], None]) -> None:
         signal.signal(each, stop)
 
 
-class Stop:
+class StopSignal:
     """A stop by SIGINT or SIGTERM: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
 
     An exception in the midst of a callback is reported by rclpy as a fault of the callback. Python handles a signal between two
@@ -65,3 +68,12 @@ class Stop:
     def over(self) -> None:
         """Interrupt nothing from now on: the process is ending."""
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def require_rclpy() -> None:
+    """Raise UsageError, with the remedy, where rclpy is not installed."""
+    if find_spec("rclpy") is None:
+        raise UsageError(
+            'rclpy is not installed, and this needs ROS 2. Run `pip install "boom_twin[ros]"`, '
+            "or source the setup file of a ROS 2 Jazzy installation."
+        )

@@ -1,6 +1,8 @@
 """What is there: validated parts and the boom, their words, units and bounds."""
 
+from __future__ import annotations
+
 from .load import load_scene
-from .parts import Scene
+from .schema import Scene
 
 __all__ = ["Scene", "load_scene"]

@@ -1,4 +1,4 @@
-"""Single parameters of a boom by the names that alarms, calibration and reports use.
+"""Change a scene: single parameters by name, keys as an editor would change them, the text with comments kept, another load.
 
 ``cylinder_i.k`` (N/m), ``cylinder_i.d`` (N s/m), ``section_i.EI`` (N m^2), ``section_i.beta`` (s), ``section_i.mass`` (kg, of
 all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m).
@@ -6,11 +6,21 @@ all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m).
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from ..errors import UsageError
-from .parts import Cylinder, RigidPart, Scene, Section, Tip
+from pydantic import BaseModel
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from ..config.yaml_text import with_value, yaml_text
+from ..errors import SceneError, UsageError
+from .load import structure
+from .schema import Cylinder, RigidPart, Scene, Section, Tip
+from .yaml_reader import Place, parse, with_end_mark, words
 
 _NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
 
@@ -118,3 +128,88 @@ def _parsed(scene: Scene, name: str) -> tuple[str, int, str]:
         known = ", ".join(parameter_names(scene))
         raise UsageError(f"{name}: the scene has no such parameter. It has {known}.")
     return found[1], int(found[2]) - 1, found[3]
+
+
+Value = bool | int
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One key of a scene, its place as in messages about scenes, and what it becomes; None takes it out of the file."""
+
+    place: Place
+    value: Value | None
+
+    def __str__(self) -> str:
+        if self.value is None:
+            return f"remove {words(self.place)}"
+        return f"{words(self.place)}: {yaml_text(self.value)}"
+
+
+def edited(scene: Scene, edits: Iterable[Edit]) -> Scene:
+    """The scene that the file describes after all `edits`."""
+    for edit in edits:
+        scene = _with(scene, edit.place, edit.value)
+    return scene
+
+
+def merged(edits: Iterable[Edit]) -> tuple[Edit, ...]:
+    """The same result with one edit a key, the last one, in the order of the places."""
+    last = {edit.place: edit for edit in edits}
+    return tuple(last[place] for place in sorted(last, key=lambda place: [str(step) for step in place]))
+
+
+def _with(part: Any, place: Sequence[str | int], value: Value | None) -> Any:
+    """`part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
+    if not place:
+        return value
+    step, rest = place[0], place[1:]
+    if isinstance(step, int):
+        return tuple(_with(item, rest, value) if i == step else item for i, item in enumerate(part))
+    assert isinstance(part, BaseModel)
+    return part.model_copy(update={step: _with(getattr(part, step, None), rest, value)})
+
+
+def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
+    """Text of a scene after `edits`; `scene` is what the text describes.
+
+    Where blocks share their text (YAML aliases) an edit of one would change the other too: then the result is written anew,
+    without comments.
+    """
+    edits = tuple(edits)
+    wanted = edited(scene, edits)
+    try:
+        for edit in edits:
+            text = with_value(text, edit.place, edit.value)
+        found, _, faults = structure(parse(text, "edited scene"))
+    except (YAMLError, SceneError):
+        return anew(wanted)
+    same = found is not None and not faults and found.model_dump() == wanted.model_dump()
+    return text if same else anew(wanted)
+
+
+def anew(scene: Scene) -> str:
+    """A scene as a file without comments."""
+    stream = io.StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.dump(_plain(scene.model_dump(exclude_none=True)), stream)
+    return with_end_mark(stream.getvalue())
+
+
+def _plain(value: object) -> object:
+    """Lists for tuples."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value
+
+
+def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:
+    """The scene with that payload (kg) and line fill (kg/m); below 0 its own."""
+    changes: dict[str, object] = {}
+    if payload >= 0.0:
+        changes["tip"] = (scene.tip or Tip()).model_copy(update={"payload": payload})
+    if line_fill >= 0.0:
+        changes["line_fill"] = line_fill
+    return scene.model_copy(update=changes)

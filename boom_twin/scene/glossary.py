@@ -1,23 +1,10 @@
-"""What every key of a scene means, for messages: a few words and the unit."""
+"""The meaning and unit of every key of a scene file, as error messages quote them."""
 
 from __future__ import annotations
 
 from pydantic import BaseModel
 
-from .parts import (
-    Base,
-    Clearance,
-    ContactLaw,
-    Cylinder,
-    CylinderPart,
-    Joint,
-    Material,
-    Pin,
-    RigidPart,
-    Scene,
-    Section,
-    Tip,
-)  # fmt: skip
+from .schema import Base, Clearance, ContactLaw, Cylinder, CylinderPart, Joint, Material, Pin, RigidPart, Scene, Section, Tip
 
 MEANING: dict[type[BaseModel], dict[str, str]] = {
     Scene: {

@@ -1,16 +1,23 @@
-"""Rigid kinematics of a scene: postures, joint angles and strokes of the undeformed boom."""
+"""Rigid kinematics of the undeformed boom: joint angles, strokes, passive link angles and the place of every pin.
+
+A URDF is a tree, a six-bar is not. Its links and cylinders hang in the tree by one pin each, and the positions of these
+pins close the loops.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 
 from ..errors import UsageError
-from ..physics.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angle_of_length, cylinder_length
-from ..records import Array
-from .parts import Base, Joint, Scene, Section
+from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angle_of_length, cylinder_length, link_angles
+from ..kernels.plane_algebra import turned
+from ..types import Array
+from .schema import Base, Joint, Scene, Section
 
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
@@ -96,3 +103,130 @@ def gravity_in_base(scene: Scene) -> Array:
     gx, gy = scene.gravity
     c, s = math.cos(scene.base.inclination), math.sin(scene.base.inclination)
     return np.array([c * gx + s * gy, c * gy - s * gx])
+
+
+CYLINDER, LEFT, RIGHT = "cylinder_{}_swivel", "link_l_{}_swivel", "link_r_{}_swivel"
+
+
+class PassiveJoints:
+    """Positions of the passive joints of one scene.
+
+    Attributes
+    ----------
+    names : tuple of str
+        ``cylinder_1_swivel``, then of every six-bar i ``cylinder_i_swivel``, ``link_l_i_swivel``, ``link_r_i_swivel``.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._rows = [(joint.kind == "A", _plain(linkage(scene, i))) for i, joint in enumerate(scene.joints)]
+        kinds = [(CYLINDER,) if joint.kind == "A" else (CYLINDER, LEFT, RIGHT) for joint in scene.joints]
+        self.names = tuple(name.format(i) for i, own in enumerate(kinds, start=1) for name in own)
+
+    def positions(self, angles: Array) -> list[float]:
+        """Angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (n,).
+
+        A barrel and link L are measured in the section before (the base for joint 1), link R in its own section. NaN where
+        the links do not close.
+        """
+        positions: list[float] = []
+        with np.errstate(invalid="ignore"):
+            for (direct, row), phi in zip(self._rows, angles.tolist(), strict=True):
+                positions += [_swivel_a(row, phi)] if direct else _swivels_b(row, phi)
+        return positions
+
+
+def _plain(row: np.record) -> SimpleNamespace:
+    """The fields of a record as Python numbers, which cost a tenth to read."""
+    return SimpleNamespace(**{name: row[name].item() for name in LINKAGE.names or ()})
+
+
+def _swivel_a(row: SimpleNamespace, phi: float) -> float:
+    x, y = turned(phi, row.ex, row.ey)
+    return math.atan2(y - row.cy, x - row.cx)
+
+
+def _swivels_b(row: SimpleNamespace, phi: float) -> list[float]:
+    left, right = link_angles(row, phi)
+    if row.mount == LINK_L:
+        (x, y), turn = (row.dx, row.dy), left
+    else:
+        (x, y), turn = turned(phi, row.ex, row.ey), right
+    dx, dy = turned(turn, row.along, row.left)
+    barrel = math.atan2(y + dy - row.cy, x + dx - row.cx)
+    return [barrel, float(left), math.remainder(right - phi, math.tau)]
+
+
+@dataclass(frozen=True)
+class JointPins:
+    """Pins of one joint in the model frame, m, each shape (2,); D, E, Q are None for kind A."""
+
+    kind: str
+    pivot: Array
+    barrel_pin: Array
+    rod_pin: Array
+    d: Array | None = None
+    e: Array | None = None
+    q: Array | None = None
+
+    @property
+    def links(self) -> list[list[Array]]:
+        """Corners of link L and of link R; three where the rod pin is on that link beside its ends."""
+        if self.d is None or self.e is None or self.q is None:
+            return []
+        left, right = [self.d, self.q], [self.e, self.q]
+        if self.kind == "B2":
+            left.append(self.rod_pin)
+        if self.kind == "B3":
+            right.append(self.rod_pin)
+        return [left, right]
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """An undeformed boom of n sections.
+
+    Attributes
+    ----------
+    headings : ndarray, shape (n,)
+        Orientation of every section, rad.
+    pivots : ndarray, shape (n + 1, 2)
+        Inboard pivots, then the tip, m.
+    joints : tuple of JointPins
+    """
+
+    headings: Array
+    pivots: Array
+    joints: tuple[JointPins, ...]
+
+    def point(self, section: int, x: float, y: float = 0.0) -> Array:
+        """A point given in the axes of `section` (0-based), m, in the model frame."""
+        return placed(self.pivots[section], float(self.headings[section]), (x, y))
+
+
+def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
+    """`point` of a frame at `origin` turned by `heading` (rad), shape (2,)."""
+    return np.asarray(origin + np.array(turned(heading, point[0], point[1])))
+
+
+def skeleton(scene: Scene, angles: Array) -> Skeleton:
+    """Pins of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
+    headings = np.cumsum(angles)
+    lengths = np.array([section.length for section in scene.sections])
+    steps = np.stack([lengths * np.cos(headings), lengths * np.sin(headings)], axis=1)
+    pivots = np.array(scene.base.pivot) + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+    joints = tuple(_pins(scene, i, pivots[i], headings) for i in range(len(headings)))
+    return Skeleton(headings, pivots, joints)
+
+
+def _pins(scene: Scene, i: int, pivot: Array, headings: Array) -> JointPins:
+    row, carrier = linkage(scene, i), float(headings[i - 1]) if i else 0.0
+    phi = float(headings[i]) - carrier
+    barrel_pin = placed(pivot, carrier, (row.cx, row.cy))
+    if scene.joints[i].kind == "A":
+        return JointPins("A", pivot, barrel_pin, placed(pivot, carrier + phi, (row.ex, row.ey)))
+    d, e = placed(pivot, carrier, (row.dx, row.dy)), placed(pivot, carrier + phi, (row.ex, row.ey))
+    left, right = link_angles(row, phi)
+    q = d + row.length_l * np.array([math.cos(carrier + left), math.sin(carrier + left)])
+    base, angle = (d, left) if row.mount == LINK_L else (e, right)
+    rod_pin = placed(base, carrier + angle, (row.along, row.left))
+    return JointPins(scene.joints[i].kind, pivot, barrel_pin, rod_pin, d, e, q)

@@ -29,7 +29,7 @@ Carried columns
 
 Time
     Every mass centre and every quadrature point carries its own history; an integrator gives, for each scalar of it,
-    acceleration a = A (x - x_hat) and velocity v = C x + D at the new time (notes at `boom_twin.physics.integrators`). With
+    acceleration a = A (x - x_hat) and velocity v = C x + D at the new time (notes at `boom_twin.kernels.integrators`). With
     A = C = 0 the same equations are statics; with A = -omega^2 and x_hat = x they are harmonic vibration.
 
 Symbols
@@ -46,3 +46,5 @@ Sources
     [AB] M. Arnold, O. Bruels: Convergence of the generalized-alpha scheme for constrained mechanical systems, Multibody
         System Dynamics 18 (2007).
 """
+
+from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The parts of a boom as a scene file names them: words, units and bounds of single values.
+"""The scene schema: every part of a boom as a validated pydantic model, with the unit and the bounds of each value.
 
 Frames, signs and the meaning of every point are told in the comments of the default scene (``boom_twin scene``).
 All values are SI. ``None`` means "not named, therefore not in the model".
@@ -6,11 +6,13 @@ All values are SI. ``None`` means "not named, therefore not in the model".
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..physics.contact import LAWS, restitution_of
+from ..errors import UsageError
+from ..kernels.elements.pin_contact import LAWS, restitution_of
 
 LARGEST = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
@@ -200,3 +202,23 @@ class Scene(Part):
     def is_flexible(self, index: int) -> bool:
         """Whether section `index` (0-based) bends."""
         return self.sections[index].beam is not None and self.modes_of(index) > 0
+
+
+DEEP = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
+SHARE = 0.05  # of its length, where a section has no A and I
+
+
+def section_depth(scene: Scene, i: int) -> float:
+    """Depth (m) to draw section `i` (0-based) with: that of a box with its A and I, else a share of its length."""
+    section = scene.sections[i]
+    if section.A is None or section.I is None:
+        return SHARE * section.length
+    return DEEP * math.sqrt(section.I / section.A)
+
+
+def refuse_clearance(scene: Scene, model: str) -> None:
+    """UsageError if `scene` has pins with clearance, which `model` (as a reader would call it) does not know."""
+    pins = () if scene.clearance is None else scene.clearance.pins
+    if pins:
+        names = ", ".join(pin.at for pin in pins)
+        raise UsageError(f"clearance.pins = {names}: {model} knows ideal pins only. Leave out the block `clearance`.")

@@ -1,4 +1,4 @@
-"""Where the beam of a section is split: at pins of cylinders that sit on its flexible part, and evenly on short booms.
+"""Split a section's beam into the parts that bend: at the pins of cylinders, and evenly on short booms.
 
 The fewer parts bend, the higher does each of them reach into the spectrum. With fewer than `LEAST` parts along the boom the
 longest ones are cut into equal pieces, one cut after the other, so that the lowest six frequencies keep their accuracy with
@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .parts import Scene
+from .schema import Scene
 
 SAME_PLACE = 1e-9  # m
 LEAST = 7  # flexible parts along a boom

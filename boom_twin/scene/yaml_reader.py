@@ -1,7 +1,10 @@
-"""From YAML text to plain values, with the line of every one of them.
+"""Read a scene file: YAML text to plain values, with the line of each for error messages.
 
 The text is composed to nodes and the nodes are turned into values here, so that no tag of the text can make an object:
 mappings become dict, sequences become tuple, scalars become float, int, bool, str or None.
+
+Both lines are comments, so that the file stays plain YAML, and blocks can still be written behind it. A file that says in
+its head that it has the mark is refused without it; one that says nothing can be used, with a warning.
 """
 
 from __future__ import annotations
@@ -15,9 +18,9 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
+from ..config.yaml_text import TAG, TYPED, BoundedComposer, typed_value
 from ..errors import Fault, SceneError
-from ..plain import TAG, TYPED, BoundedComposer, typed_value
-from ..printable import printable
+from ..system.terminal_text import printable
 
 Place = tuple[str | int, ...]
 
@@ -186,3 +189,31 @@ class _Reader:
 
     def _fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
         self.document.faults.append(self.document.fault(place, value, bound, remedy))
+
+
+PROMISE = '# This file ends with the line "# end of scene"; without it, it was cut off.'
+MARK = "# end of scene"
+
+
+def with_end_mark(text: str) -> str:
+    """The text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
+    kept = [line for line in text.splitlines() if line != MARK]
+    head = [] if PROMISE in kept else [PROMISE]
+    return "\n".join([*head, *kept]).rstrip() + f"\n\n{MARK}\n"
+
+
+def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
+    """What is wrong with the end of a scene file: a fault that stops, an oddity that only warns, or neither."""
+    lines = text.splitlines()
+    number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
+    last = lines[number - 1].strip() if number else ""
+    if last == MARK:
+        return None, None
+    if PROMISE in lines and MARK not in lines:
+        bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
+        remedy = "Fetch the whole file; or, if nothing is missing, add that line."
+        return Fault("end of the file", last, bound, remedy, number), None
+    bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
+    if text and not text.endswith("\n"):
+        bound = f"no line `{MARK}`, and not even an end of line: it may have been cut off"
+    return None, Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number)

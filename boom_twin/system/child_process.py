@@ -1,11 +1,11 @@
-"""The command line of a child process that runs a module of this package, and nothing from the working directory."""
+"""Command line of a child process that runs a module of this package, and nothing from the working directory."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).absolute().parents[1]
+ROOT = Path(__file__).absolute().parents[2]
 """The folder, or zip archive, from which this process has its ``boom_twin``."""
 
 _START = (

@@ -1,4 +1,4 @@
-"""Files of a folder that was received from somebody: only regular files that lie in it are opened.
+"""Open files of a folder that was received from a stranger: only regular files that lie in it.
 
 A link in such a folder can lead to any file of the reader, a pipe makes a program wait for ever, a device can be a disk.
 What the user names on the command line may be a link; what a folder brings along may not.
@@ -13,7 +13,7 @@ from errno import ENOENT
 from io import BufferedReader
 from pathlib import Path
 
-from .errors import BagError
+from ..errors import BagError
 
 _KINDS = (
     (stat.S_ISLNK, "a symbolic link"),

@@ -1,4 +1,5 @@
-"""Folders of results: built beside their place, renamed when they are whole, replaced only by their own command.
+"""Result folders: built beside their place, renamed when they are whole, replaced only by their own command; marks of
+incomplete ones.
 
 Beside ``OUT`` a command builds ``OUT.unfinished``. In it ``unfinished.json`` names the command; as long as one of the
 command's processes lives, that file is locked, so a second command is refused and what a killed one left is told from work
@@ -20,7 +21,7 @@ from hashlib import file_digest
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic import DRAFT, sync_folder, write_atomic
+from .atomic_files import DRAFT, sync_folder, write_atomic
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 BUILDING, REPLACED = ".unfinished", ".replaced"
@@ -32,7 +33,7 @@ _WRITABLE = 0o222  # mode of a folder that somebody may write to
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ResultKind:
     """What a command writes.
 
     Attributes
@@ -58,13 +59,13 @@ class Kind:
 _SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
 _RESULT_BAG = ("bag/session_0.mcap", "bag/metadata.yaml", "bag/session.yaml")
 _FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.*")
-REPLAY = Kind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
-RIG = Kind("rig", _SESSION, is_replaced=False)
-RECOVER = Kind("recover", _SESSION, is_replaced=False)
+REPLAY = ResultKind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
+RIG = ResultKind("rig", _SESSION, is_replaced=False)
+RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Building:
+class UnfinishedResult:
     """A result that is being built: its folder, and the descriptor that holds the lock, for child processes to inherit."""
 
     folder: Path
@@ -72,7 +73,7 @@ class Building:
 
 
 @contextmanager
-def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Building]:
+def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[UnfinishedResult]:
     """Build a folder of results; it becomes `out` when the block is left without an exception.
 
     After an exception nothing of it is kept, and `out` is as it was.
@@ -81,7 +82,7 @@ def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Bu
     ----------
     out : Path
         Not there, empty, or an earlier result of the same command.
-    kind : Kind
+    kind : ResultKind
     sources : sequence of Path
         What the command reads: none of it may lie in `out`, nor `out` in a session.
 
@@ -103,7 +104,7 @@ def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Bu
         try:
             _settle(place, replaced, kind)
             _clear(building, kind)
-            yield Building(building, lock)
+            yield UnfinishedResult(building, lock)
             _complete(building, kind)
         except BaseException:
             with suppress(OSError, BagError):
@@ -151,7 +152,7 @@ def _identity(path: Path) -> tuple[int, int]:
     return found.st_dev, found.st_ino
 
 
-def _check_earlier(folder: Path, kind: Kind) -> None:
+def _check_earlier(folder: Path, kind: ResultKind) -> None:
     """Refuse a folder that is neither empty nor a result of the same command, as it was written."""
     if folder.exists() and not folder.is_dir():
         raise BagError(f"{folder}: is no folder. Choose another name.")
@@ -209,7 +210,7 @@ def _sha256(path: Path) -> str:
 
 
 @contextmanager
-def _locked(building: Path, kind: Kind) -> Iterator[int]:
+def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
     """The folder to build in, which is made, locked and marked as unfinished."""
     marker = building / UNFINISHED
     try:
@@ -246,7 +247,7 @@ def _is_taken(lock: int, marker: Path) -> bool:
         raise BagError(f"{marker}: cannot be locked ({error.strerror}). Choose another disk.") from None
 
 
-def _check_left(building: Path, kind: Kind) -> None:
+def _check_left(building: Path, kind: ResultKind) -> None:
     """Refuse what no killed run of the same command can have left."""
     entries = _entries(building)
     remedy = "Move it away, or choose another folder: results are built there"
@@ -268,7 +269,7 @@ def _command(building: Path) -> str:
         return ""
 
 
-def _clear(building: Path, kind: Kind) -> None:
+def _clear(building: Path, kind: ResultKind) -> None:
     """Take away what a run has written, the manifest first, but not the marker."""
     _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
 
@@ -293,7 +294,7 @@ def _remove_empty(folder: Path) -> None:
 # -- completing -------------------------------------------------------------------------------------------------------
 
 
-def _complete(building: Path, kind: Kind) -> None:
+def _complete(building: Path, kind: ResultKind) -> None:
     """Put all on the disk, then list it in the manifest."""
     files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
     for name in files:
@@ -307,7 +308,7 @@ def _complete(building: Path, kind: Kind) -> None:
     write_atomic(building / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-def _settle(place: Path, replaced: Path, kind: Kind) -> None:
+def _settle(place: Path, replaced: Path, kind: ResultKind) -> None:
     """Put right what a kill left between two renames; refuse a place that is not free."""
     _check_earlier(replaced, kind)
     if replaced.exists() and not place.exists():
@@ -329,7 +330,7 @@ def _discard(folder: Path) -> None:
         raise BagError(f"{folder}: the earlier result cannot be removed ({error.strerror}). Remove it by hand.") from None
 
 
-def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: Kind) -> None:
+def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: ResultKind) -> None:
     """Rename a whole result to its place."""
     try:
         _check_earlier(place, kind)  # again: somebody may have put something there meanwhile

@@ -1,4 +1,4 @@
-"""Text from files and messages made safe to show: what would steer a terminal is written out as an escape."""
+"""Escape text from files and messages that would steer a terminal."""
 
 from __future__ import annotations
 

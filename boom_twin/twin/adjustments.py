@@ -1,4 +1,5 @@
-"""How far sensors were from the prediction within the last second, from which their zeros are found."""
+"""Adjustments of a running twin: sensor zeros, recent residuals from which they are found, and requests of load, limits and
+restarts."""
 
 from __future__ import annotations
 
@@ -6,20 +7,70 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping
 
-from .errors import UsageError
-from .records import Array, Stream
+import numpy as np
+
+from ..config.settings import Settings
+from ..errors import UsageError
+from ..types import Array, Change, Stream
+
+KEPT = 16  # sets of zeros that late samples may still need
+
+
+class SensorZeros:
+    """The zeros of all sensors.
+
+    Parameters
+    ----------
+    channels : dict of Stream to tuple of str
+        See `boom_twin.types.channels_of`.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        The newest ones, by channel: m, rad, m/s^2.
+    """
+
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+        self._channels = channels
+        self.values: dict[str, float] = {}
+        self._past: deque[tuple[int, dict[Stream, Array]]] = deque([(0, {})], maxlen=KEPT)
+
+    def put(self, stamp: int, values: Mapping[str, float]) -> bool:
+        """Others from `stamp` (ns) on; samples of earlier stamps keep what they had. Tells whether those of strokes differ."""
+        before, self.values = self.values, dict(values)
+        rows = {}
+        for stream, names in self._channels.items():
+            row = np.array([self.values.get(name, 0.0) for name in names])
+            if row.any():
+                rows[stream] = row
+        self._past.append((stamp, rows))
+        return any(before.get(name) != values.get(name) for name in self._channels[Stream.STROKES])
+
+    def forget_past(self) -> None:
+        """The newest zeros hold for every stamp."""
+        rows = self._past[-1][1]
+        self._past.clear()
+        self._past.append((0, rows))
+
+    def of(self, stream: Stream, stamp: int) -> Array | None:
+        """What is to be taken from a sample; None where nothing is."""
+        for since, rows in reversed(self._past):
+            if since <= stamp:
+                return rows.get(stream)
+        return None
+
 
 SPAN = 1_000_000_000  # ns
 FEWEST = 5  # readings that make a mean
 
 
-class Recent:
+class ResidualBuffer:
     """Measured minus predicted, without any zero, in the order in which it became known.
 
     Parameters
     ----------
     channels : dict of Stream to tuple of str
-        See `boom_twin.records.channels_of`.
+        See `boom_twin.types.channels_of`.
     """
 
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
@@ -36,9 +87,7 @@ class Recent:
         """Forget everything."""
         self._past.clear()
 
-    def zeros_of(
-        self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]
-    ) -> dict[str, float]:
+    def zeros_of(self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]) -> dict[str, float]:
         """The zeros of a sensor, by channel, that the second before `now` (ns) tells.
 
         Parameters
@@ -74,3 +123,51 @@ class Recent:
             told = f"{channel}: {len(values)} residuals in the last second, {FEWEST} are needed"
             raise UsageError(f"{told}. Let its sensor and the strokes run, then ask again.")
         return math.fsum(values) / len(values)
+
+
+class Requests:
+    """Collects what is asked for between two stroke samples.
+
+    Attributes
+    ----------
+    settings : Settings
+    zeros : dict of str to float
+        As they will be.
+    from_rest : bool
+        Whether a start from rest is asked for.
+    due : bool
+        Whether anything waits.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.zeros: dict[str, float] = {}
+        self.from_rest = self.due = False
+
+    def tune(self, live: Mapping[str, float]) -> None:
+        """Other live settings.
+
+        Raises
+        ------
+        UsageError
+            A value is out of bounds, or cannot change while the twin runs.
+        """
+        self.settings, self.due = self.settings.tuned(live), True
+
+    def zero(self, values: Mapping[str, float]) -> None:
+        """Other zeros of some sensors."""
+        self.zeros, self.due = {**self.zeros, **values}, True
+
+    def rest(self) -> None:
+        """A start of the model from rest."""
+        self.from_rest = self.due = True
+
+    def repeat(self, change: Change) -> None:
+        """All that was done to another twin with the sample of that stamp; UsageError as for `tune`."""
+        self.settings = self.settings.tuned(change.settings)
+        self.zeros, self.from_rest, self.due = change.zeros, change.from_rest, True
+
+    def take(self) -> bool:
+        """Nothing waits any more; tells whether a start from rest was asked for."""
+        from_rest, self.from_rest, self.due = self.from_rest, False, False
+        return from_rest

@@ -1,18 +1,65 @@
-"""How far measured values may be from predicted ones while all is well: sensor noise, and stroke noise through the model."""
+"""Expected readings and their standard deviations, kept for samples that arrive later than the stroke they belong to."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
-from .analysis.noise import StrokeNoise, stroke_noise
-from .chain.program import State
-from .estimate.follower import copy_state
-from .physics.linkage import cylinder_length
-from .plan.plan import Plan
-from .records import Array, Prediction
-from .settings import Settings
+from ..analysis.modal import StrokeNoise, stroke_noise
+from ..compiler.plan import Plan
+from ..config.settings import Settings
+from ..estimation.look_ahead import copy_state
+from ..kernels.elements.linkage import cylinder_length
+from ..kernels.tables import State
+from ..types import Array, Prediction
+
+SPAN = 2_000_000_000  # ns
+
+
+class Expected(NamedTuple):
+    """What sensors should read at a stamp (ns): angles (n,) rad, force (2,) m/s^2, deviations of both; strokes (n,) m."""
+
+    stamp: int
+    angles: Array
+    force: Array
+    angle_sigmas: Array
+    force_sigmas: Array
+    strokes: Array
+
+
+class PredictionBuffer:
+    """Expected readings by stamp, the last `SPAN` of them."""
+
+    def __init__(self) -> None:
+        self._past: deque[Expected] = deque()
+
+    def add(self, expected: Expected) -> None:
+        """Remember; stamps only grow."""
+        self._past.append(expected)
+        while self._past[0].stamp < expected.stamp - SPAN:
+            self._past.popleft()
+
+    def at(self, stamp: int) -> Expected | None:
+        """Linear between the two predictions around `stamp`, with the deviations of the later one; None outside."""
+        after: Expected | None = None
+        for entry in reversed(self._past):
+            if entry.stamp == stamp:
+                return entry
+            if entry.stamp < stamp:
+                return None if after is None else _between(entry, after, stamp)
+            after = entry
+        return None
+
+
+def _between(old: Expected, new: Expected, stamp: int) -> Expected:
+    share = (stamp - old.stamp) / (new.stamp - old.stamp)
+    angles = old.angles + share * (new.angles - old.angles)
+    force, strokes = old.force + share * (new.force - old.force), old.strokes + share * (new.strokes - old.strokes)
+    return Expected(stamp, angles, force, new.angle_sigmas, new.force_sigmas, strokes)
+
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 INTERVAL_STEP = 0.2  # of the time between samples, likewise
@@ -52,9 +99,7 @@ class Deviations:
         self._joints = np.zeros(plan.joints)
         self._force = np.zeros(2)
 
-    def at(
-        self, prediction: Prediction, interval: float, variances: Array, live: State, angles: Array
-    ) -> tuple[Array, Array]:
+    def at(self, prediction: Prediction, interval: float, variances: Array, live: State, angles: Array) -> tuple[Array, Array]:
         """Deviations of the joint angles (n,) in rad, and of the specific force (2,) in m/s^2.
 
         Parameters

@@ -1,4 +1,4 @@
-"""The twin's edge: refuses samples that a program made wrongly, with what to do about it."""
+"""Check the samples that a program gives the twin: types, shapes, units and stamps, with the remedy in the error."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import UsageError
-from .records import Array, Sample, Stream
+from ..errors import UsageError
+from ..types import Array, Sample, Stream
 
 FLOAT = np.dtype(float)
 FIRST = 100  # samples of strokes that differ in their stamps by less than
@@ -17,13 +17,13 @@ SHORTEST = 20_000  # ns from one to the next are no rig's
 LIMIT = 2**63  # ns
 
 
-class Edge:
+class SampleCheck:
     """Looks at samples before anything is done with them.
 
     Parameters
     ----------
     channels : dict of Stream to tuple of str
-        See `boom_twin.records.channels_of`.
+        See `boom_twin.types.channels_of`.
     """
 
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
@@ -38,7 +38,7 @@ class Edge:
         Raises
         ------
         UsageError
-            See `boom_twin.twin.Twin.update`.
+            See `boom_twin.twin.twin.Twin.update`.
         """
         stream, stamp, values = sample.stream, sample.stamp, sample.values
         if (

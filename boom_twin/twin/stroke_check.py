@@ -1,12 +1,12 @@
-"""Keeps single wrong strokes from the model, and holds a stroke that has fallen silent."""
+"""Check strokes against what the cylinders can do: range, rate and, with a baseline, the angles."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import Array
-from .settings import Settings
+from ..config.settings import Settings
+from ..types import Array
 
 MOST = 5  # readings in a row that are not believed; the next one is
 FAR = 8.0  # deviations of the noise
@@ -15,7 +15,7 @@ NANO = 1e-9
 Flags = NDArray[np.bool_]
 
 
-class Plausible:
+class StrokeCheck:
     """Looks at the strokes of one run, sample by sample.
 
     Attributes

@@ -10,27 +10,23 @@ from operator import gt, lt
 
 import numpy as np
 
-from .analysis.validity import SHARE
-from .chain.status import OK, SENTENCES
-from .deviations import Deviations, specific_force
-from .edge import SHORTEST, Edge
-from .errors import BoomTwinError, SolverError, UsageError
-from .following import Following
-from .health.baseline import Baseline
-from .health.judge import Judge
-from .load import loaded
-from .memory import Expected, Memory
-from .mounting import Mounting
-from .plausible import FAR, Plausible
-from .recent import Recent
-from .records import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
-from .requests import Requests
-from .scene.kinematics import stroke_curve
-from .scene.parts import Scene
-from .settings import Settings
-from .stamps import LASTING, Stamps
-from .time_step import TimeStep, explain, goes_on, is_close, jerk_densities, surprise
-from .zeros import Zeros
+from ..analysis.equilibrium import SHARE
+from ..config.settings import Settings
+from ..errors import BoomTwinError, SolverError, UsageError
+from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.sensor_model import Mounting
+from ..health.baseline import Baseline
+from ..health.monitor import HealthMonitor
+from ..kernels.tables import OK, SENTENCES
+from ..scene.edit import loaded
+from ..scene.kinematics import stroke_curve
+from ..scene.schema import Scene
+from ..types import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from .adjustments import Requests, ResidualBuffer, SensorZeros
+from .expected_readings import Deviations, Expected, PredictionBuffer, specific_force
+from .sample_check import SHORTEST, SampleCheck
+from .stamp_check import LASTING, StampCheck, TimeStep, explain, goes_on, is_close, jerk_densities, surprise
+from .stroke_check import FAR, StrokeCheck
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -76,8 +72,8 @@ class _Run:
     is_again: bool
     interval: float = 0.0
     slot: int = -1
-    memory: Memory = field(default_factory=Memory)
-    plausible: Plausible = field(default_factory=Plausible)
+    memory: PredictionBuffer = field(default_factory=PredictionBuffer)
+    plausible: StrokeCheck = field(default_factory=StrokeCheck)
     prediction: Prediction | None = None
 
     def rebase(self, shift: int) -> None:
@@ -85,7 +81,7 @@ class _Run:
         self.epoch += shift
         self.newest += shift
         self.deviations.rebase(shift)
-        self.memory = Memory()
+        self.memory = PredictionBuffer()
 
 
 class Twin:
@@ -99,7 +95,7 @@ class Twin:
         Noise of the sensors, tuning of the estimator, limits on time.
     mounts : sequence of Mount or None, optional
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
-        `boom_twin.mounting.Mounting`.
+        `boom_twin.estimation.sensor_model.Mounting`.
     baseline : Baseline, optional
         What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
 
@@ -112,7 +108,7 @@ class Twin:
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
-    judge : Judge or None
+    judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
 
     Notes
@@ -133,22 +129,26 @@ class Twin:
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._build()
         self._channels = channels_of(self.plan.joints)
-        self._lines = {stream: Stamps(self.settings) for stream in Stream}
+        self._lines = {stream: StampCheck(self.settings) for stream in Stream}
         self._beyond = FAR * self.settings.stroke_variance**0.5
         self._shortest = [-self._beyond] * len(scene.joints)
         self._longest = [joint.cylinder.max_stroke + self._beyond for joint in scene.joints]
-        self._edge = Edge(self._channels)
+        self._edge = SampleCheck(self._channels)
         self._run: _Run | None = None
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._pending: deque[Sample] = deque()
-        self.requests, self._zeros, self._recent = Requests(self.settings), Zeros(self._channels), Recent(self._channels)
+        self.requests, self._zeros, self._recent = (
+            Requests(self.settings),
+            SensorZeros(self._channels),
+            ResidualBuffer(self._channels),
+        )
 
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
         self._speeds = None
-        self._lines = {stream: Stamps(self.settings) for stream in Stream}
+        self._lines = {stream: StampCheck(self.settings) for stream in Stream}
         self._pending = deque()
 
     def rezero(self, sensor: str) -> dict[str, float]:
@@ -179,9 +179,9 @@ class Twin:
     def _build(self) -> None:
         """The model under the present load."""
         scene = loaded(self.scene, *self.settings.load)
-        self._boom, self._valid = Following(scene, self.settings), SHARE * scene.reach
+        self._boom, self._valid = BoomPredictor(scene, self.settings), SHARE * scene.reach
         self.plan = self._boom.plan
-        self.judge = None if self.baseline is None else Judge(scene, self.settings, self.mounts, self.baseline)
+        self.judge = None if self.baseline is None else HealthMonitor(scene, self.settings, self.mounts, self.baseline)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -272,7 +272,7 @@ class Twin:
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
 
-    def _is_apart(self, line: Stamps, sample: Sample) -> bool:
+    def _is_apart(self, line: StampCheck, sample: Sample) -> bool:
         """Whether no cylinder is so fast as to come here from the strokes that are held."""
         if not line.held:
             return False
@@ -287,14 +287,14 @@ class Twin:
         then = run.memory.at(stamp)
         return then is None or is_close(values, then.strokes, run.interval, self.settings)
 
-    def _explain(self, run: _Run, line: Stamps) -> TimeStep:
+    def _explain(self, run: _Run, line: StampCheck) -> TimeStep:
         """Why the stamps of what is held are not those that were to come."""
         (first, _), (later, _) = line.held[:2]
         values = self._zeroed(first), self._zeroed(later)
         span, apart = (first.stamp - run.newest) * NANO, (later.stamp - first.stamp) * NANO
         return explain(self._boom, run.strokes, values, span, apart, line.usual * NANO or apart, self.settings)
 
-    def _step_in_time(self, run: _Run, line: Stamps, why: TimeStep) -> Report:
+    def _step_in_time(self, run: _Run, line: StampCheck, why: TimeStep) -> Report:
         """Follow the samples that were held, now that the newest confirms them."""
         held, usual = self._released(line), round(line.usual)
         span = held[0].stamp - run.newest
@@ -329,7 +329,7 @@ class Twin:
         after = np.abs(last.values - first.values) / ((last.stamp - first.stamp) * NANO)
         return np.asarray(np.fmin(np.fmax(before, after), self.settings.stroke_rate))
 
-    def _released(self, line: Stamps) -> list[Sample]:
+    def _released(self, line: StampCheck) -> list[Sample]:
         """Samples that were held; what those before the newest were told to be counts no more."""
         held = line.release()
         self.counts.subtract(event for _, event in held[:-1])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from boom_twin.analysis.rows import first_row, taken_apart
-from boom_twin.analysis.statics import settle
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main
 from boom_twin.errors import SolverError
 from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
 
 ABSURD = {
     "barrel": ("barrel: {mass: 12.0, inertia: 0.6", "barrel: {mass: 12.0, inertia: 1e+300"),

@@ -8,9 +8,9 @@ from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin.analysis.batch import Batch
-from boom_twin.analysis.march import march
+from boom_twin.analysis.methods import march
+from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import UsageError
-from boom_twin.plan.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 

@@ -8,13 +8,13 @@ from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 
-from boom_twin.analysis.march import march
-from boom_twin.analysis.statics import statics
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
-from boom_twin.peers.play.contact import Contact, stiffness
-from boom_twin.physics.contact import SMOOTH
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.methods import march
+from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.contact import Contact, stiffness
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 CLEARANCE, STEP = 1e-4, 1e-9
 

@@ -12,11 +12,11 @@ from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, tip_shift
 from oracle.clearance.scenes import LINKS, RADII, RODS, with_pins
 
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
-from boom_twin.peers.play.contact import Contact, stiffness
-from boom_twin.physics.contact import LEAST_GAP, SMOOTH
-from boom_twin.scene.parts import IDEAL_BELOW
+from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
+from boom_twin.scene.schema import IDEAL_BELOW
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.contact import Contact, stiffness
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 DOCUMENT = booms.document()

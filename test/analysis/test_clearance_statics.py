@@ -8,14 +8,14 @@ from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
-from boom_twin.analysis.statics import settle, statics
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
-from boom_twin.peers.play.contact import HYSTERESIS, Contact
-from boom_twin.physics.contact import LEAST_GAP, SMOOTH
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.parts import IDEAL_BELOW
+from boom_twin.scene.schema import IDEAL_BELOW
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 POSTURES = ("horizontal", "arch", "high", "low")
 LOAD = 0.5  # kg, of payload, for the change of a pin's force with the load

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boom_twin.analysis.march import Method, march
+from boom_twin.analysis.methods import Method, march
+from boom_twin.analysis.motions import motion_of
 from boom_twin.scene import load_scene
-from boom_twin.study.motion import motion_of
-from boom_twin.study.stability_motions import dead_stop, smooth
-from boom_twin.study.stability_scenes import cylinders
+from boom_twin.validation.study.stability.setups import cylinders, dead_stop, smooth
 
 SCENE = load_scene()
 

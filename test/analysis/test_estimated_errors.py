@@ -11,7 +11,7 @@ from boom_twin.analysis.simulate import simulate
 from boom_twin.cli.main import main
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.parts import Clearance
+from boom_twin.scene.schema import Clearance
 
 SCENE = load_scene()
 ARCH, ANGLES = strokes_of_posture(SCENE, "arch"), posture_angles(SCENE, "arch")

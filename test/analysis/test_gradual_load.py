@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.errors import SolverError
 from boom_twin.scene import load_scene
-from boom_twin.study import stability_scenes as made
+from boom_twin.validation.study.stability import setups as made
 
 
 @pytest.mark.parametrize(

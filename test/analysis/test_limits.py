@@ -7,8 +7,8 @@ import pytest
 from convergence import motions
 from oracle import booms, segments
 
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
 
 DECADES = 10.0 ** np.arange(0, 6)
 
@@ -146,9 +146,9 @@ def test_more_modes_converge_from_above():
 
 
 def test_both_bases_have_the_same_limit():
-    from boom_twin.analysis.frequencies import natural_modes
-    from boom_twin.analysis.statics import settle
-    from boom_twin.plan.compile import compile_scene
+    from boom_twin.analysis.equilibrium import settle
+    from boom_twin.analysis.modal import natural_modes
+    from boom_twin.compiler.compile import compile_scene
     from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
     found = []

@@ -7,11 +7,10 @@ import pytest
 from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
-from boom_twin.analysis.frequencies import natural_modes
-from boom_twin.analysis.noise import damping_ratio
-from boom_twin.analysis.statics import settle, statics
+from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin.analysis.modal import damping_ratio, natural_modes
+from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.plan.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import stroke_curve
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.analysis.statics import settle
-from boom_twin.moments import PLACES, moments_by_unknowns, stations
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.bending_moments import PLACES, moments_by_unknowns, stations
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.compiler.compile import compile_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SCENE = load_scene()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from boom_twin.analysis.pchip import pchip
+from boom_twin.analysis.drive import pchip
 
 
 @pytest.mark.parametrize("rows", [2, 3, 4, 50])

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
 from boom_twin.scene import load_scene
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"

@@ -11,9 +11,9 @@ import pytest
 from fuzz.mcap_files import rewrite
 from mcap.writer import IndexType
 
-from boom_twin.io.reader import Session, read
-from boom_twin.io.session import write_session
-from boom_twin.io.writer import FILE_NAME
+from boom_twin.bag.reader import Session, read
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.writer import FILE_NAME
 
 NOTES = {"origin": "synthetic, made for a test"}
 JOINT_STATE = "sensor_msgs/msg/JointState"

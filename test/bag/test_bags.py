@@ -16,16 +16,15 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 
+from boom_twin.bag.metadata import read_metadata, write_metadata
+from boom_twin.bag.reader import Session, read, scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.errors import BagError, UsageError
-from boom_twin.io.bagmeta import read_metadata, write_metadata
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.reader import Session, read, scan
-from boom_twin.io.recover import recover
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import Qos, Topic, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.writer import FILE_NAME, SessionWriter
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.topic_table import Qos, Topic, load_topics
+from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 POINT = Topic(
@@ -82,9 +81,7 @@ def test_same_input_gives_same_bytes(bag: Path, tmp_path: Path, arrays: dict[str
     other = tmp_path / "elsewhere" / "under another name"
     write_session(other, **arrays, description={"origin": "synthetic, made for a test"})
     for name in (FILE_NAME, "metadata.yaml"):
-        assert (
-            hashlib.sha256((bag / name).read_bytes()).digest() == hashlib.sha256((other / name).read_bytes()).digest()
-        )
+        assert hashlib.sha256((bag / name).read_bytes()).digest() == hashlib.sha256((other / name).read_bytes()).digest()
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
@@ -134,9 +131,7 @@ def test_file_is_as_the_contract_says(bag: Path) -> None:
     assert {channel.message_encoding for channel in summary.channels.values()} == {"cdr"}
     definition = next(schema.data.decode() for schema in summary.schemas.values() if "Joint" in schema.name)
     assert "MSG: std_msgs/Header" in definition and "MSG: builtin_interfaces/Time" in definition
-    assert [(record.name, record.metadata) for record in notes] == [
-        ("boom_twin", {"origin": "synthetic, made for a test"})
-    ]
+    assert [(record.name, record.metadata) for record in notes] == [("boom_twin", {"origin": "synthetic, made for a test"})]
     root = YAML(typ="safe").load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert (root["version"], root["storage_identifier"], root["ros_distro"]) == (9, "mcap", "jazzy")
     assert root["custom_data"] == {"origin": "synthetic, made for a test"}

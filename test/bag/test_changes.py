@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import _Messages
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
-from boom_twin.io.change_messages import decode_changes, encode_changes
-from boom_twin.io.changes import Changes
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import _Messages
-from boom_twin.io.topics import TYPES, Output, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.writer import SessionWriter
-from boom_twin.records import Change, Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.report_encoder import decode_changes, encode_changes
+from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.offline.reader_process import Changes
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
-from boom_twin.settings import Settings
+from boom_twin.types import Change, Stream
 
 TYPE = TYPES[Output.CHANGES]
 SECOND = 1_000_000_000

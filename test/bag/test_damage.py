@@ -13,11 +13,11 @@ from fuzz.mcap_files import joined, records
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 
+from boom_twin.bag.reader import Session, read, scan
+from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.errors import BagError
-from boom_twin.io.reader import Session, read, scan
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import FILE_NAME, SessionWriter
-from boom_twin.records import Stream
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 JOINT_STATE = "sensor_msgs/msg/JointState"

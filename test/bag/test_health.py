@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from boom_twin.io.health import decode_health, encode_health
-from boom_twin.io.topics import TYPES, Output
-from boom_twin.io.typestore import jazzy
-from boom_twin.records import Alarm, Health, Ranked
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.report_encoder import decode_health, encode_health
+from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.types import Alarm, Health, Ranked
 
 BEGIN = 1_700_000_000_123_000_000
 RANKED = (

@@ -13,19 +13,19 @@ from typing import Any
 
 import pytest
 
-from boom_twin import truth
+from boom_twin.bag import mcap_records as blocks
+from boom_twin.bag.metadata import FILE_NAME as METADATA
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_sheet import FILE_NAME as SHEET
+from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
+from boom_twin.config.yaml_text import MOST, plain
 from boom_twin.errors import BagError, SceneError
-from boom_twin.io import blocks
-from boom_twin.io.bagmeta import FILE_NAME as METADATA
-from boom_twin.io.reader import read, scan
-from boom_twin.io.recover import recover
-from boom_twin.io.sheet import FILE_NAME as SHEET
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import SessionWriter
-from boom_twin.plain import MOST, plain
-from boom_twin.records import Stream
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.offline import ground_truth as truth
 from boom_twin.scene import load_scene
+from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
 MEGABYTES = 400  # most that a command may take on any of these

@@ -12,14 +12,14 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from boom_twin.bag.advice import missing, names_extra, names_missing, remarks
+from boom_twin.bag.inspect import inspect
+from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.info import inspect
-from boom_twin.io.needs import missing, names_extra, names_missing, remarks
-from boom_twin.io.places import fill_header
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import FILE_NAME, SessionWriter
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.types import Stream
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 STEP = 5_000_000

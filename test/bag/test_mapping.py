@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
+from boom_twin.bag.metadata import dump
+from boom_twin.bag.session_model import DEFAULT_MAPPING, mapping_of
+from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet
 from boom_twin.errors import BagError, UsageError
-from boom_twin.io.bagmeta import dump
-from boom_twin.io.mapping import load_mapping
-from boom_twin.io.session_model import DEFAULT_MAPPING, mapping_of
-from boom_twin.io.sheet import FILE_NAME, Sheet
-from boom_twin.io.topics import DEFAULT_FILE, load_topics
-from boom_twin.records import Stream
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.topic_table import DEFAULT_FILE, load_topics
+from boom_twin.types import Stream
 
 EXAMPLE = """
 inputs:
@@ -141,7 +141,7 @@ def test_whatever_stands_in_a_mapping_is_used_or_refused(document: dict[str, Any
 
 def recorded(directory: Path, mapping: str) -> Path:
     directory.mkdir(exist_ok=True)
-    Sheet("1", "scene", "parameters", mapping, {}).write(directory)
+    SessionSheet("1", "scene", "parameters", mapping, {}).write(directory)
     return directory
 
 

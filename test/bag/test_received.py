@@ -11,17 +11,17 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin.bag.reader import scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_model import mapping_of
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.io.reader import scan
-from boom_twin.io.recover import recover
-from boom_twin.io.session_model import mapping_of
-from boom_twin.received import holds_file, open_received
+from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
+from boom_twin.offline.ground_truth import load_truth
+from boom_twin.report.compare import side_of
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read
-from boom_twin.report.side import side_of
-from boom_twin.truth import FILE_NAME as TRUTH
-from boom_twin.truth import load_truth
+from boom_twin.system.received_files import holds_file, open_received
 
 MCAP, METADATA, SHEET, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
 LINK = "a symbolic link"
@@ -130,6 +130,6 @@ def test_a_file_is_opened_and_nothing_is_nothing(tmp_path: Path) -> None:
 def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "secret").write_bytes(b"abc")
     (tmp_path / "a").symlink_to(tmp_path / "secret")
-    monkeypatch.setattr("boom_twin.received.holds_file", lambda path: True)  # as it was when it was looked at
+    monkeypatch.setattr("boom_twin.system.received_files.holds_file", lambda path: True)  # as it was when it was looked at
     with pytest.raises(OSError, match="symbolic links"):
         open_received(tmp_path / "a")

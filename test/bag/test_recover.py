@@ -20,14 +20,13 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 from rosbags.highlevel import AnyReader
 
+from boom_twin.bag import mcap_records as content
+from boom_twin.bag.reader import scan
+from boom_twin.bag.recovery.recover import Recovery, recover
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.writer import FILE_NAME
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.io import content
-from boom_twin.io.outcome import Outcome
-from boom_twin.io.reader import scan
-from boom_twin.io.recover import recover
-from boom_twin.io.session import write_session
-from boom_twin.io.writer import FILE_NAME
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 Row = tuple[str, str, int, int, int, bytes]
@@ -49,7 +48,7 @@ def is_part_of(some: list[Row], whole: list[Row]) -> bool:
     return all(row in rest for row in some)
 
 
-def check(outcome: Outcome, out: Path, whole: list[Row]) -> None:
+def check(outcome: Recovery, out: Path, whole: list[Row]) -> None:
     """Saved is what went in, as often as is said, for every reader."""
     found = [row for file in sorted(out.glob("*.mcap")) for row in rows(file)]
     assert is_part_of(found, whole)
@@ -74,7 +73,7 @@ def damaged(tmp_path: Path, data: bytes) -> Path:
     return path
 
 
-def rescue(tmp_path: Path, data: bytes, **options: Any) -> tuple[Outcome, Path]:
+def rescue(tmp_path: Path, data: bytes, **options: Any) -> tuple[Recovery, Path]:
     """Rescue of a file with those bytes, which stays as it is."""
     path, out = damaged(tmp_path, data), tmp_path / "out"
     shutil.rmtree(out, ignore_errors=True)

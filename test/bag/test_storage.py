@@ -14,19 +14,16 @@ from pathlib import Path
 import pytest
 from rosbags.highlevel import AnyReader
 
+from boom_twin.bag import async_writer as module
+from boom_twin.bag.async_writer import Split, Storage
+from boom_twin.bag.metadata import Recorded, read_metadata
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.writer import BagWriter, recorded
 from boom_twin.errors import BagError
-from boom_twin.io import storage as module
-from boom_twin.io.bagmeta import read_metadata
-from boom_twin.io.bagwriter import BagWriter
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.reader import read, scan
-from boom_twin.io.recorded import Recorded
-from boom_twin.io.recover import recover
-from boom_twin.io.storage import Split, Storage
-from boom_twin.io.topics import load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.writer import recorded
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.types import Stream
 
 TOPIC = load_topics().inputs[Stream.STROKES]
 STEP = 5_000_000
@@ -58,7 +55,7 @@ def test_all_that_is_put_is_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("split", "files"), [(Split(duration=0.5), 5), (Split(size=9_000), None)])
 def test_splits(tmp_path: Path, split: Split, files: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.io.bagwriter.CHUNK_SIZE", 4096)
+    monkeypatch.setattr("boom_twin.bag.writer.CHUNK_SIZE", 4096)
     fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), split, pytest.fail), 500)
     metadata = read_metadata(tmp_path / "bag" / "metadata.yaml")
     assert len(metadata.relative_file_paths) == (files or len(metadata.files)) > 1

@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 
 from boom_twin.analysis.batch import Batch
-from boom_twin.analysis.march import march
-from boom_twin.plan.compile import compile_scene
-from boom_twin.plan.plan import Plan
+from boom_twin.analysis.methods import march
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import Plan
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from calibrate.sessions import ENCODERS, made, off
+from calibration.sessions import ENCODERS, made, off
 
 from boom_twin import load_scene
 from boom_twin.cli.main import main

@@ -13,18 +13,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from calibrate.sessions import cut_to, made, off
+from calibration.sessions import cut_to, made, off
 
-from boom_twin import rig
-from boom_twin.calibrate.blocks import blocks_of, channel_names
-from boom_twin.calibrate.course import course_of
-from boom_twin.calibrate.fit import fitted
-from boom_twin.calibrate.measured import Measured, Series
-from boom_twin.calibrate.problem import Problem
-from boom_twin.calibrate.unknowns import unknowns_of, usual_names
-from boom_twin.records import Stream
-from boom_twin.scene.named import parameter
-from boom_twin.settings import Settings
+from boom_twin.calibration.forward_model import CalibrationProblem
+from boom_twin.calibration.least_squares import fitted
+from boom_twin.calibration.noise_model import blocks_of, channel_names
+from boom_twin.calibration.sessions import MeasuredSession, Series, course_of
+from boom_twin.calibration.unknowns import unknowns_of, usual_names
+from boom_twin.config.settings import Settings
+from boom_twin.scene.edit import parameter
+from boom_twin.types import Stream
+from boom_twin.validation import rig
 
 FIRST = 100  # seed
 
@@ -40,10 +39,10 @@ def run(sets: int) -> None:
     for seed in range(FIRST, FIRST + sets):
         seen = rig.observe(short.truth, short.programme, short.rows, rig.Sensors(), seed)
         values = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: seen.imu}
-        session = Measured("made", "", {stream: Series(seen.stamps, rows) for stream, rows in values.items()})
+        session = MeasuredSession("made", "", {stream: Series(seen.stamps, rows) for stream, rows in values.items()})
         course = course_of(session, settings)
         blocks = blocks_of(session, course, 0.05, True, [None, None])
-        fit = fitted(Problem(scene, unknowns, [(course, blocks)], channel_names(2, True), settings), lambda: None)
+        fit = fitted(CalibrationProblem(scene, unknowns, [(course, blocks)], channel_names(2, True), settings), lambda: None)
         found = np.array([u.value(d) for u, d in zip(unknowns, fit.deviations, strict=True)])
         scores.append((found - truth) / scale / np.sqrt(np.diag(fit.covariance())))
         print(f"{len(scores)} sets: {100 * np.mean(np.abs(scores) < 1.96):.0f} % of {np.size(scores)}", flush=True)

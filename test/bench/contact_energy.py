@@ -17,14 +17,14 @@ from oracle import booms, energy
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, contact_energy, with_pins
 
-from boom_twin.analysis.course import PASSES, TOLERANCE
-from boom_twin.analysis.rows import row_width
+from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
-from boom_twin.analysis.statics import settle
-from boom_twin.chain.step import run
-from boom_twin.physics.contact import LOST
-from boom_twin.physics.integrators import GENERALISED_ALPHA
-from boom_twin.plan.compile import compile_scene
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import row_width
+from boom_twin.kernels.elements.pin_contact import LOST
+from boom_twin.kernels.integrators import GENERALISED_ALPHA
+from boom_twin.kernels.transfer.time_step import run
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 PULSE, DURATION = np.array([0.03, -0.02, 0.03, 0.02]), 0.4  # m, s: a jerk of all four cylinders

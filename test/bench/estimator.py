@@ -16,9 +16,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
-from boom_twin.io.intake import Intake, stamp_of
-from boom_twin.io.reader import read, scan
-from boom_twin.truth import load_truth
+from boom_twin.bag.reader import read, scan
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.offline.ground_truth import load_truth
 
 ROOT = Path(__file__).parents[2]
 SESSION = ROOT / "bags" / "arch_session"
@@ -30,7 +30,7 @@ STEPS = ((0.0025, 0.013), (0.005, 0.013), (0.005, 0.026), (0.005, 0.05), (0.0101
 def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
     """Stamps, measured strokes and true strokes."""
     scene, truth = load_scene(), np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
-    intake, stamps, measured = Intake(len(scene.joints)), [], []
+    intake, stamps, measured = SampleDecoder(len(scene.joints)), [], []
     for _, _, message in read(scan(SESSION), {"cylinder_strokes": "sensor_msgs/msg/JointState"}):
         sample = intake.put(Stream.STROKES, stamp_of(message), message)
         stamps.append(sample.stamp)

@@ -79,7 +79,9 @@ def run(sources: list[list[str]], seconds: float) -> str:
     """One case, in words."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"
-        node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.main"], stdout=log.open("w"), stderr=subprocess.STDOUT)
+        node = subprocess.Popen(
+            [sys.executable, "-m", "boom_twin.ros.node.main"], stdout=log.open("w"), stderr=subprocess.STDOUT
+        )
         sending: list[Any] = []
         try:
             while "active;" not in log.read_text():

@@ -70,10 +70,10 @@ def counted() -> Counter[str]:
     import numpy as np
 
     from boom_twin import load_scene
-    from boom_twin.analysis.statics import settle
-    from boom_twin.chain.step import advance
-    from boom_twin.physics.integrators import GENERALISED_ALPHA, prepare
-    from boom_twin.plan.compile import compile_scene
+    from boom_twin.analysis.equilibrium import settle
+    from boom_twin.compiler.compile import compile_scene
+    from boom_twin.kernels.integrators import GENERALISED_ALPHA, prepare
+    from boom_twin.kernels.transfer.time_step import advance
     from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
     scene = load_scene()
@@ -140,7 +140,7 @@ def measured(counts: Counter[str]) -> None:
     import numpy as np
 
     from boom_twin import load_scene
-    from boom_twin.analysis.march import march
+    from boom_twin.analysis.methods import march
     from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
     scene = load_scene()

@@ -31,7 +31,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
-from boom_twin.io.cdr import stamp_in
+from boom_twin.messages.cdr_decoder import stamp_in
 from boom_twin.ros.isolation import isolated
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -165,7 +165,7 @@ def memory(process: subprocess.Popen) -> float:
 def run(who: str, rate: float, duration: float, arguments: list[str]) -> dict[str, float]:
     """One answering process with source and listener."""
     own = [sys.executable, __file__]
-    command = [sys.executable, "-m", "boom_twin.ros.main", *arguments] if who == "node" else [*own, who]
+    command = [sys.executable, "-m", "boom_twin.ros.node.main", *arguments] if who == "node" else [*own, who]
     with tempfile.TemporaryDirectory() as folder:
         log, out = Path(folder) / "log", Path(folder) / "heard"
         answering = subprocess.Popen(command, stdout=log.open("w"), stderr=subprocess.STDOUT)

@@ -14,18 +14,18 @@ import time
 
 import numpy as np
 
-from boom_twin.analysis.course import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
-from boom_twin.analysis.statics import settle
-from boom_twin.chain.program import State
-from boom_twin.chain.step import run
-from boom_twin.physics.integrators import GENERALISED_ALPHA
-from boom_twin.plan.compile import compile_scene
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.integrators import GENERALISED_ALPHA
+from boom_twin.kernels.tables import State
+from boom_twin.kernels.transfer.time_step import run
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.parts import Scene
-from boom_twin.scene.splits import LEAST
-from boom_twin.study.long_booms import long_boom
-from boom_twin.study.stability_step import one_step
+from boom_twin.scene.schema import Scene
+from boom_twin.scene.segmentation import LEAST
+from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.stability.exact_step import one_step
 
 SECTIONS = (2, 5, 10, 20, 50, 100, 150, 200)
 KINDS = ("B1", "B2", "B3")

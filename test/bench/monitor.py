@@ -21,12 +21,12 @@ from typing import Any
 from aiohttp import ClientSession, web
 from playwright.sync_api import sync_playwright
 
-from boom_twin.io.topics import load_topics
-from boom_twin.monitor.desk import Desk
-from boom_twin.monitor.door import Door
-from boom_twin.monitor.feed import Feed
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.access_control import AccessControl
+from boom_twin.monitor.actions import ViewerActions
+from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import Server
-from boom_twin.monitor.store import Store
 
 RATE = 200
 CHROMIUM = Path("/usr/bin/chromium")
@@ -58,7 +58,9 @@ def serve(feed: Feed, ready: threading.Event, port: list[int]) -> None:
     """In a thread, for ever."""
 
     async def run() -> None:
-        runner = web.AppRunner(Server(feed, Desk(feed, frozenset()), Door("127.0.0.1")).application(), access_log=None)
+        runner = web.AppRunner(
+            Server(feed, ViewerActions(feed, frozenset()), AccessControl("127.0.0.1")).application(), access_log=None
+        )
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
         port.append(runner.addresses[0][1])

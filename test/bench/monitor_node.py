@@ -38,9 +38,9 @@ GARBAGE = ("{", "[" * 4000, '{"do": "format"}', b"\0" * 100)
 
 def timed_node(out: str) -> None:
     """The node, whose steps are written down as end (ns) and duration (s)."""
-    from boom_twin import twin
-    from boom_twin.records import Stream
-    from boom_twin.ros.main import main
+    from boom_twin.ros.node.main import main
+    from boom_twin.twin import twin
+    from boom_twin.types import Stream
 
     rows: list[tuple[int, float]] = []
     update = twin.Twin.update

@@ -6,9 +6,8 @@ Run ``python test/bench/parts.py`` on an idle machine; least of 30 interleaved r
 from __future__ import annotations
 
 from boom_twin import load_scene
-from boom_twin.study.cost import size, step_times, unknowns
-from boom_twin.study.deviation import course_of
-from boom_twin.study.variants import KINDS, without
+from boom_twin.reduction.deviation import course_of, size, step_times, unknowns
+from boom_twin.reduction.variants import KINDS, without
 
 ROUNDS = 30
 BARE = ("link masses", "barrel masses", "rod masses")

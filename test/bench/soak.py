@@ -44,7 +44,7 @@ def samples(rate: float, duration: float) -> list[tuple[float, float]]:
     """Time (s) since the first message, and resident memory (MB), every second while messages come."""
     live = [sys.executable, str(Path(__file__).with_name("live.py"))]
     with tempfile.TemporaryFile("w+") as nowhere:
-        node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.main"], stdout=nowhere, stderr=nowhere)
+        node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.node.main"], stdout=nowhere, stderr=nowhere)
         listener = subprocess.Popen([*live, "listen", "boom_twin", "forget"], stdout=nowhere)
         source = subprocess.Popen([*live, "source", str(rate), str(duration)], stdout=subprocess.PIPE, text=True)
         try:

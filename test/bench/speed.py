@@ -50,8 +50,8 @@ def main() -> None:
     print("| what | measured |\n|---|---|")
     print(f"| a step of {1e3 * STEP:g} ms, start-up of `simulate` included | {1e6 * ours:.1f} us |")
     try:
-        from boom_twin.rig import Move, Programme
-        from boom_twin.rig import simulate as peer
+        from boom_twin.validation.rig import Move, Programme
+        from boom_twin.validation.rig import simulate as peer
 
         first = strokes[0]
         programme = Programme(tuple(first), (Move(0, 0.0, 1.5, first[0] + 0.05), Move(2, 0.0, 1.5, first[2] + 0.03)))

@@ -6,10 +6,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from calibrate.sessions import Made, cut_to, made, off
+from calibration.sessions import Made, cut_to, made, off
 
 from boom_twin import load_scene
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
 
 
 @pytest.fixture(scope="session")

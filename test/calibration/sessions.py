@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from oracle import booms
 
-from boom_twin import rig
-from boom_twin.io.session import write_session
-from boom_twin.scene.named import parameter, with_parameters
-from boom_twin.scene.parts import Scene
+from boom_twin.bag.session_files import write_session
+from boom_twin.scene.edit import parameter, with_parameters
+from boom_twin.scene.schema import Scene
+from boom_twin.validation import rig
 
 ENCODERS = np.radians([0.1, -0.1, 0.1, -0.1])
 

@@ -10,7 +10,7 @@ import pytest
 from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.health.baseline import load_baseline
-from boom_twin.health.parameters import parameters
+from boom_twin.health.inference.fault_catalogue import parameters
 
 BAG = Path(__file__).parents[2] / "bags" / "arch_session"
 

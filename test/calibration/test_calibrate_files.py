@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene
-from boom_twin.calibrate import run
+from boom_twin.calibration import run
 from boom_twin.cli.main import main
-from boom_twin.io.mapping import load_mapping
-from boom_twin.scene.named import parameter
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.scene.edit import parameter
 
 TEXT = """# my boom
 description: "a test boom"

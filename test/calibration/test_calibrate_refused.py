@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, rig
-from boom_twin.calibrate import Choice, calibrate
+from boom_twin import load_scene
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.session_sheet import SessionSheet
+from boom_twin.calibration import Choice, calibrate
 from boom_twin.errors import BagError, UsageError
-from boom_twin.io.session import write_session
-from boom_twin.io.sheet import Sheet
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.validation import rig
 
 SECOND = 200  # rows
 
@@ -65,7 +66,7 @@ def test_a_session_that_never_rests(two_sections, tmp_path):
 
 def test_sessions_with_different_mappings(short, two_sections, tmp_path):
     bags = [short.write(tmp_path / name, 0) for name in ("a", "b")]
-    Sheet("test", "", "", "sensors: {joint_1: {zero: 0.1}}", {}).write(bags[1])
+    SessionSheet("test", "", "", "sensors: {joint_1: {zero: 0.1}}", {}).write(bags[1])
     with pytest.raises(UsageError, match=r"another mapping than .*--mapping"):
         calibrate(bags, two_sections)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibrate.sessions import ENCODERS, cut_to, made, off
+from calibration.sessions import ENCODERS, cut_to, made, off
 
 from boom_twin import load_scene
-from boom_twin.calibrate import Choice, calibrate
-from boom_twin.scene.named import parameter
+from boom_twin.calibration import Choice, calibrate
+from boom_twin.scene.edit import parameter
 
 
 def expected(name, truth, zeros):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from boom_twin.calibrate.whitening import whitening_of
+from boom_twin.calibration.noise_model import whitening_of
 
 
 def ringing(rng, kinds, count):

@@ -15,7 +15,7 @@ import pytest
 from hostile import Trap
 
 import boom_twin
-from boom_twin.monitor.recording import Recording
+from boom_twin.monitor.actions import Recording
 
 PACKAGE = Path(boom_twin.__file__).parent
 BUNDLED = PACKAGE.parent / "bags" / "arch_session"
@@ -48,7 +48,7 @@ def test_the_page_of_a_session_runs_nothing_of_the_folder(trap: Trap, tmp_path: 
         while "open http" not in log.read_text() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.1)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        is_read = any("boom_twin.io.ahead" in Path(f"/proc/{pid}/cmdline").read_text() for pid in children)
+        is_read = any("boom_twin.offline.reader_process" in Path(f"/proc/{pid}/cmdline").read_text() for pid in children)
         process.terminate()
     assert trap.sprung() == "" and "open http" in log.read_text(), log.read_text()
     assert is_read
@@ -66,7 +66,7 @@ def test_a_recorder_of_the_page_runs_nothing_of_the_folder(trap: Trap, tmp_path:
 def told_by(child_of: str, code: str, folder: Path, variables: dict[str, str]) -> str:
     """What a parent says whose program is `code`."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | variables
-    program = f"{code}\nimport subprocess\nfrom boom_twin.child_process import python_command\n" + child_of
+    program = f"{code}\nimport subprocess\nfrom boom_twin.system.child_process import python_command\n" + child_of
     return subprocess.check_output([sys.executable, "-P", "-c", program], cwd=folder, env=environment, text=True, timeout=100)
 
 
@@ -94,8 +94,9 @@ def test_a_childs_path_is_its_parents(tmp_path: Path) -> None:
     """Neither the working directory nor the folder that the package is in is on it; what PYTHONPATH names is."""
     package = tmp_path / "elsewhere" / "boom_twin"
     package.mkdir(parents=True)
-    for name in ("__init__.py", "child_process.py"):
-        shutil.copy(PACKAGE / name, package)
+    (package / "system").mkdir()
+    for name in ("__init__.py", "system/__init__.py", "system/child_process.py"):
+        shutil.copy(PACKAGE / name, package / name)
     (package / "show.py").write_text("import json, sys\nprint(json.dumps(sys.path))\n")
     code = f"import json, sys; plain = list(sys.path); sys.path.insert(0, {str(package.parent)!r})"
     shown = "child = subprocess.check_output(python_command('boom_twin.show'))\nprint(json.dumps([plain, json.loads(child)]))"

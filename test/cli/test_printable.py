@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from boom_twin.errors import UsageError
-from boom_twin.printable import printable
 from boom_twin.scene.load import default_text
+from boom_twin.system.terminal_text import printable
 
 SCENES = {
     "description": 'description: "\\e[2J\\e]0;owned\\a\\u202Egnp \\x9b31m"\n' + default_text(),

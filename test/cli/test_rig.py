@@ -16,8 +16,8 @@ from ruamel.yaml import YAML
 
 pytest.importorskip("exudyn")
 
+from boom_twin.bag.reader import scan
 from boom_twin.cli.main import main
-from boom_twin.io.reader import scan
 from boom_twin.scene.load import default_text
 
 SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.chain import program
-from boom_twin.plan.compile import compile_scene
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels import tables as program
 from boom_twin.scene import load_scene
-from boom_twin.scene.splits import flexible_parts
+from boom_twin.scene.segmentation import flexible_parts
 
 
 def total_mass(scene):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.analysis.course import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
-from boom_twin.analysis.statics import settle
-from boom_twin.chain.step import observe, run
-from boom_twin.physics.integrators import GENERALISED_ALPHA
-from boom_twin.plan.compile import compile_scene
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.integrators import GENERALISED_ALPHA
+from boom_twin.kernels.transfer.time_step import observe, run
 
 
 def smooth_drive(start, travel, duration):

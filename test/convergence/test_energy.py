@@ -7,11 +7,11 @@ import pytest
 from convergence import motions
 from oracle import booms, energy, segments
 
-from boom_twin.analysis.course import PASSES, TOLERANCE
-from boom_twin.analysis.statics import settle
-from boom_twin.chain.step import LONGEST_INCREMENT, advance
-from boom_twin.physics.integrators import GENERALISED_ALPHA, prepare
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.integrators import GENERALISED_ALPHA, prepare
+from boom_twin.kernels.transfer.time_step import LONGEST_INCREMENT, advance
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 
@@ -27,9 +27,7 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
     powers, gaps, done, lost = [(0.0, 0.0)], [], 0.0, 0.0
     for k in range(1, round(duration / step) + 1):
         length, rate, _ = drive(k * step)
-        status, _, _ = advance(
-            plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None
-        )
+        status, _, _ = advance(plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
         assert status == 0
         powers.append((energy.power_of_drives(plan, state, rate), energy.dissipation(plan, state, rate)))
         done += 0.5 * step * (powers[-1][0] + powers[-2][0])

@@ -6,17 +6,15 @@ from math import inf, nan
 
 import pytest
 
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch.gate import Bounds, Gate, Patience
-from boom_twin.watch.judge import Judge
-from boom_twin.watch.status import Level
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.levels import Bounds, ComponentJudge, Hysteresis, Level, Persistence
 
-BOUNDS, PATIENCE = Bounds(warn=1.0, error=2.0), Patience(raise_after=2.0, clear_after=5.0, release=0.8)
+BOUNDS, PATIENCE = Bounds(warn=1.0, error=2.0), Persistence(raise_after=2.0, clear_after=5.0, release=0.8)
 
 
-def levels(values: list[float], patience: Patience = PATIENCE) -> str:
+def levels(values: list[float], patience: Persistence = PATIENCE) -> str:
     """First letters of the levels at one value a second."""
-    gate = Gate()
+    gate = Hysteresis()
     return "".join(gate.update(value, BOUNDS, patience, float(now)).name[0] for now, value in enumerate(values))
 
 
@@ -37,7 +35,7 @@ def test_a_level_must_last(values: list[float], expected: str) -> None:
     assert levels(values) == expected
 
 
-NONE = Patience(0.0, 0.0, 0.8)
+NONE = Persistence(0.0, 0.0, 0.8)
 
 
 def test_without_patience_a_level_counts_at_once() -> None:
@@ -45,13 +43,13 @@ def test_without_patience_a_level_counts_at_once() -> None:
 
 
 def test_a_quantity_of_which_little_is_bad() -> None:
-    gate, bounds = Gate(), Bounds(warn=100.0, error=10.0, low=True)
+    gate, bounds = Hysteresis(), Bounds(warn=100.0, error=10.0, low=True)
     values = [inf, 101.0, 99.0, 9.0, 11.0, 13.0, 120.0, 126.0]
     assert "".join(gate.update(value, bounds, NONE, 0.0).name[0] for value in values) == "OOWEEWWO"
 
 
 def test_a_status_tells_value_limit_and_since_when() -> None:
-    judge, thresholds = Judge("pump"), Thresholds(raise_after=0.0, clear_after=0.0)
+    judge, thresholds = ComponentJudge("pump"), Thresholds(raise_after=0.0, clear_after=0.0)
 
     def look(now: float, value: float) -> tuple[Level, str, dict[str, object]]:
         judge.begin(now, thresholds)
@@ -68,7 +66,7 @@ def test_a_status_tells_value_limit_and_since_when() -> None:
 
 
 def test_the_worst_fault_is_told_first() -> None:
-    judge = Judge("pump")
+    judge = ComponentJudge("pump")
     judge.begin(0.0, Thresholds())
     judge.check("a", 5.0, Bounds(warn=1.0), "first", at_once=True)
     judge.check_age(5.0, 1.0, "second")

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from boom_twin.records import Alarm, Health
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch.health import HealthWatch
-from boom_twin.watch.status import Level, Status
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.model_status import HealthWatch
+from boom_twin.types import Alarm, Health
 
 SECOND = 1_000_000_000
 BIAS = Alarm("joint_3", "bias", 15 * SECOND, None, "joint_3.sensor", "joint_3.sensor bias: +0.0035 rad")

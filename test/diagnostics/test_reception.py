@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from boom_twin.records import Stream
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch.peers import Peers
-from boom_twin.watch.publishers import PublishersJudge
-from boom_twin.watch.reception import Reception, ReceptionJudge
-from boom_twin.watch.status import Level, Status
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.source_status import PublishersJudge, Reception, ReceptionJudge
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.types import Stream
 
 T = Thresholds()
 

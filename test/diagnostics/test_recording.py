@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch.recording import DiskState, RecordingJudge, TopicState
-from boom_twin.watch.status import Level, Status
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.recorder_status import DiskState, RecordingJudge, TopicState
 
 TOPICS = {"/a": TopicState(500, 0), "/b": TopicState(30, None)}
 DISK = {"lag": 0.3, "waiting": 0, "written": 1000, "free": 10**9, "left": inf}

@@ -7,15 +7,12 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from boom_twin.records import Sample, Stream
+from boom_twin.config.settings import Settings, Thresholds
+from boom_twin.diagnostics.levels import Level
+from boom_twin.diagnostics.sensor_status import Sensor, SensorJudge, sensors_of
+from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch.channel import Channel, Figures
-from boom_twin.watch.sensor import Sensor, SensorJudge
-from boom_twin.watch.sensors import sensors_of
-from boom_twin.watch.status import Level
-from boom_twin.watch.stream import StreamWatch
+from boom_twin.types import Sample, Stream
 
 SECOND = 1_000_000_000
 NOISE = np.random.default_rng(0).normal(0.0, 1.0, 200)
@@ -23,7 +20,7 @@ STAMPS = SECOND + 5_000_000 * np.arange(200)
 ALL = dict.fromkeys(Stream, True)
 
 
-def look(stamps: np.ndarray = STAMPS, values: np.ndarray = NOISE, refused: int = 0) -> Figures:
+def look(stamps: np.ndarray = STAMPS, values: np.ndarray = NOISE, refused: int = 0) -> ChannelStats:
     return Channel(-4.0, 4.0).look(np.asarray(stamps, dtype=np.int64), np.asarray(values, dtype=float), refused, 0.1)
 
 
@@ -96,13 +93,13 @@ def test_lags_tell_how_clocks_are_apart() -> None:
 
 
 SENSOR = Sensor("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
-GOOD = Figures(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
+GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 
 
 def judged(changes: dict[str, float], age: float = 0.0, sensor: Sensor = SENSOR) -> tuple[Level, str]:
     """Level and message after ten seconds of it."""
     judge = SensorJudge(sensor)
-    figures = Figures(**{name: changes.get(name, getattr(GOOD, name)) for name in Figures.__dataclass_fields__})
+    figures = ChannelStats(**{name: changes.get(name, getattr(GOOD, name)) for name in ChannelStats.__dataclass_fields__})
     for now in range(10):
         status = judge.status(figures, age, Thresholds(), float(now), 1e9 + now)
     return status.level, status.message

@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.records import Report, Residuals, Sample, Stream
+from boom_twin.config.settings import Settings, Thresholds
+from boom_twin.diagnostics import twin_status as module
+from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.sensor_status import sensors_of
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
-from boom_twin.thresholds import Thresholds
-from boom_twin.watch import twin as module
-from boom_twin.watch.peers import Peers
-from boom_twin.watch.sensors import sensors_of
-from boom_twin.watch.status import Level, Status
-from boom_twin.watch.twin import TwinWatch
+from boom_twin.types import Report, Residuals, Sample, Stream
 
 NAMES = {stream: stream.value for stream in Stream}
 REQUIRED = {stream: stream is not Stream.IMU for stream in Stream}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.estimate.smoother import QUIET, add_node, drive_between, measure, start_node
+from boom_twin.estimation.stroke_filter import QUIET, add_node, drive_between, measure, start_node
 
 VARIANCE, DENSITY = 4e-10, 50.0
 rng = np.random.default_rng(3)
@@ -79,8 +79,7 @@ def test_quintic_meets_both_nodes_and_its_rate_is_its_slope():
         slope = (sides[0][0] - sides[1][0]) / (2 * size * span)
         assert drive_between(old, new, span, share)[1] == pytest.approx(slope, rel=1e-5, abs=1e-5)
     bends = [
-        (drive_between(old, new, span, share + size)[1] - drive_between(old, new, span, share - size)[1])
-        / (2 * size * span)
+        (drive_between(old, new, span, share + size)[1] - drive_between(old, new, span, share - size)[1]) / (2 * size * span)
         for share in (0.0, 1.0)
     ]
     assert bends == pytest.approx([old[2], new[2]], rel=1e-4, abs=2e-3 * np.abs(new).max() / span)

@@ -21,12 +21,12 @@ from mcap.opcode import Opcode
 from numpy.random import Generator
 
 from boom_twin import load_scene
+from boom_twin.bag.integrity import blame
+from boom_twin.bag.mcap_records import heads
+from boom_twin.bag.reader import Session, scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_files import write_session
 from boom_twin.errors import BagError, BoomTwinError
-from boom_twin.io.blocks import heads
-from boom_twin.io.damage import blame
-from boom_twin.io.reader import Session, scan
-from boom_twin.io.recover import recover
-from boom_twin.io.session import write_session
 from boom_twin.offline.replay import replay
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 

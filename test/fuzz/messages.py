@@ -18,19 +18,19 @@ import numpy as np
 from numpy.random import Generator
 
 from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.bag.integrity import STUMBLES
+from boom_twin.bag.session_files import _Messages
+from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline
-from boom_twin.io.damage import STUMBLES
-from boom_twin.io.intake import Intake
-from boom_twin.io.outlet import Outlet
-from boom_twin.io.session import _Messages
-from boom_twin.io.topics import TYPES, Output, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.wire import Wire
-from boom_twin.monitor.feed import Feed
-from boom_twin.monitor.store import Store
-from boom_twin.monitor.words import alarms, dump, layout, state
+from boom_twin.messages.cdr_decoder import CdrDecoder
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.sample_decoder import SampleDecoder
+from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.protocol import alarms, dump, layout, state
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.settings import Settings
 
 from .mutate import damaged, pick
 from .verdict import Kind, Verdict
@@ -80,7 +80,7 @@ def _encoded(sample: Sample) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, outlet, found = Twin(scene, baseline=load_baseline(None)), Outlet(scene, Settings()), {}
+    twin, outlet, found = Twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
     for number in range(400):
         for stream in Stream:
             for key, data in outlet.fill(twin.update(_true(random, number, stream))):
@@ -171,9 +171,9 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._intake = Twin(scene, baseline=load_baseline(None)), Intake(4, topics)
+        self._twin, self._intake = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
         self._decoders = {stream: _decoder(TYPES[stream]) for stream in Stream}
-        self._wires = {stream: Wire(TYPES[stream], self._decoders[stream]) for stream in Stream}
+        self._wires = {stream: CdrDecoder(TYPES[stream], self._decoders[stream]) for stream in Stream}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 
     def told(self) -> str:

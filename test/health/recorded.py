@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.bag.reader import read, scan
+from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline
-from boom_twin.io.reader import read, scan
-from boom_twin.records import Alarm, Health, Report
-from boom_twin.settings import Settings
+from boom_twin.types import Alarm, Health, Report
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 NANO = 1e-9

@@ -7,9 +7,9 @@ import pytest
 from health.gaussian import covariance_of, log_density
 from scipy.integrate import quad
 
-from boom_twin.health.bank import UNKNOWN, UNKNOWN_PRIOR, Bank, Evidence
-from boom_twin.health.case import drifts_from
-from boom_twin.health.parameters import Form, Parameter
+from boom_twin.health.inference.fault_catalogue import Form, Parameter
+from boom_twin.health.inference.hypotheses import UNKNOWN, UNKNOWN_PRIOR, Evidence, HypothesisTest
+from boom_twin.health.residual_monitor import drifts_from
 
 KNOWN = (
     Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, one_sided=True),
@@ -18,7 +18,7 @@ KNOWN = (
     Parameter("joint_2.sensor", "bias", Form.ANGLE, 1, "rad", 0.1, 3.0),
     Parameter("section_1.mass", "changed", Form.SCENE, 0, "", 0.2, 0.0),
 )
-BANK, SIZE = Bank(KNOWN), len(KNOWN)
+BANK, SIZE = HypothesisTest(KNOWN), len(KNOWN)
 
 
 class Problem:

@@ -11,7 +11,7 @@ from health.gaussian import covariance_of
 from boom_twin import load_scene
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.health.parameters import parameters, variances
+from boom_twin.health.inference.fault_catalogue import parameters, variances
 
 KNOWN = parameters(load_scene())
 NAMES = ("cylinder_2.k:softer", "joint_1.sensor:bias")

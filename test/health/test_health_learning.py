@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from boom_twin.errors import UsageError
+from boom_twin.health.inference.block_problem import BlockProblem
+from boom_twin.health.inference.fault_catalogue import Form, Parameter
+from boom_twin.health.inference.innovation_filter import REACH, REST, ModalStates
 from boom_twin.health.learning import LEAST, learn
-from boom_twin.health.linear import Problem
-from boom_twin.health.parameters import Form, Parameter
-from boom_twin.health.whitening import REACH, REST, Modes
 
 BLOCK, JOINTS, TRAVEL = 0.1, 2, 0.01
 KNOWN = (
@@ -21,10 +21,10 @@ KNOWN = (
     Parameter("joint_1.sensor", "drift", Form.DRIFT, 0, "rad/s", 0.0, 3e-4),
 )
 THETA = np.array([0.03, -1.2, 1.5e-4, 0.0])
-STILL = Modes(np.zeros(0), *(np.zeros((0, 0)) for _ in range(4)), np.zeros((JOINTS + 2, 0)), np.zeros(JOINTS + 2))
+STILL = ModalStates(np.zeros(0), *(np.zeros((0, 0)) for _ in range(4)), np.zeros((JOINTS + 2, 0)), np.zeros(JOINTS + 2))
 
 
-def session(seed: int, blocks: int, angle_error: float = 2e-4, angle_noise: float = 1.0) -> list[Problem]:
+def session(seed: int, blocks: int, angle_error: float = 2e-4, angle_noise: float = 1.0) -> list[BlockProblem]:
     """A boom that moves slowly: signatures turn, model errors are forgotten on the way."""
     rng, found = np.random.default_rng(seed), []
     errors, own = np.array([angle_error] * 2 + [0.02] * 2), np.array([4e-5] * 2 + [0.011] * 2)
@@ -39,7 +39,7 @@ def session(seed: int, blocks: int, angle_error: float = 2e-4, angle_noise: floa
         columns[0, 2], columns[0, 3] = 1.0, k * BLOCK
         noise = own * np.array([angle_noise] * 2 + [1.9] * 2) * rng.normal(size=4)
         table = np.column_stack([columns @ THETA + error + noise, columns])
-        found.append(Problem(k, table, own**2, np.zeros((4, 4)), 0.0, TRAVEL, STILL))
+        found.append(BlockProblem(k, table, own**2, np.zeros((4, 4)), 0.0, TRAVEL, STILL))
     return found
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from health.gaussian import covariance_of, log_density
 
-from boom_twin.health.regression import GATE, Regression
+from boom_twin.health.inference.hypotheses import GATE, Regression
 
 
 @pytest.mark.parametrize("seed", range(5))

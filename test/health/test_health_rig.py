@@ -10,15 +10,13 @@ pytest.importorskip("exudyn")
 from health.recorded import run
 
 from boom_twin import Twin, load_scene
+from boom_twin.bag.session_files import samples_of
+from boom_twin.calibration.baseline import learn_baseline
+from boom_twin.config.settings import Settings
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import Baseline
-from boom_twin.io.session import samples_of
-from boom_twin.learn import learn_baseline
-from boom_twin.rig import Scheme, Sensors, at_rest, move, observe, random_programme
-from boom_twin.rig.faults import parse
-from boom_twin.rig.faulty_scene import with_faults
-from boom_twin.rig.wrong import wrong_by
-from boom_twin.settings import Settings
+from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
+from boom_twin.validation.rig.faults import parse, with_faults, wrong_by
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)  # see test/bench/health/sessions.py
 pytestmark = pytest.mark.slow

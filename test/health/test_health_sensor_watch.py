@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.health.sensor_watch import SETTLED, TOLD, SensorWatch
-from boom_twin.health.sensors import Findings
+from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorFindings, SensorMonitor
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
 
-def findings(channel: int | None = None, kind: str = "", jump: float = 0.0) -> Findings:
+def findings(channel: int | None = None, kind: str = "", jump: float = 0.0) -> SensorFindings:
     flags = {each: np.zeros(2, dtype=bool) for each in TOLD}
     jumped = np.zeros(2)
     if kind == "jump":
         jumped[channel] = jump
     elif kind:
         flags[kind][channel] = True
-    return Findings(flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"])
+    return SensorFindings(flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"])
 
 
 class Watched:
     """Takes block after block."""
 
     def __init__(self) -> None:
-        self.watch, self.block = SensorWatch(NAMES, "rad"), 0
+        self.watch, self.block = SensorMonitor(NAMES, "rad"), 0
 
-    def take(self, found: Findings):
+    def take(self, found: SensorFindings):
         self.block += 1
         return self.watch.take(found, (self.block - 1) * BLOCK, self.block * BLOCK)
 

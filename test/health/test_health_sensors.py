@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.sensors import SensorCheck, repeats
+from boom_twin.health.sensor_monitor import SensorCheck, repeats
 
 SIGMA, RESOLUTION, PERIOD, ROWS = 1.745e-4, 8.727e-5, 0.005, 20
 LOW, HIGH = np.full(4, -1.0), np.full(4, 1.0)

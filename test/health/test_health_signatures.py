@@ -9,12 +9,12 @@ import pytest
 from oracle import booms
 
 from boom_twin import load_scene
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.errors import BoomTwinError
-from boom_twin.health.parameters import Form, parameters, physical, step_of
-from boom_twin.health.signatures import Signatures
+from boom_twin.health.inference.fault_catalogue import Form, parameters, physical, step_of
+from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.named import parameter, with_parameters
 
 CLOSE = 0.02  # of the largest entry of a column: central differences of large steps against small forward ones
 

@@ -11,15 +11,23 @@ from health.gaussian import covariance_of, is_white, log_density
 from scipy.linalg import expm
 
 from boom_twin import load_scene
-from boom_twin.analysis.frequencies import joint_increments
-from boom_twin.analysis.noise import stroke_noise
-from boom_twin.analysis.statics import settle
-from boom_twin.health.reading import Reading
-from boom_twin.health.whitening import HIGHEST, KEEPS_STEP, REACH, REST, SHAPE, Modes, Whitening, modes_of, oscillation
-from boom_twin.mounting import Mounting
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.analysis.modal import joint_increments, stroke_noise
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.config.settings import Settings
+from boom_twin.estimation.sensor_model import Mounting, Reading
+from boom_twin.health.inference.innovation_filter import (
+    HIGHEST,
+    KEEPS_STEP,
+    REACH,
+    REST,
+    SHAPE,
+    InnovationFilter,
+    ModalStates,
+    modes_of,
+    oscillation,
+)
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.settings import Settings
 
 BLOCK, CHANNELS, DETUNING = 0.1, 3, 0.02
 ERRORS2 = np.array([0.5, 1.0, 2.0]) ** 2
@@ -84,11 +92,11 @@ def test_modes_keep_their_signs(boom):
     again = modes_of(*other, before)
     assert again.shown == pytest.approx(before.shown, rel=1e-6, abs=1e-12)
     tables = np.random.default_rng(1).normal(0.0, 1e-4, (20, 6, 1))
-    one, two = (filtered(Whitening(6, 1, BLOCK, 0.01), [before, each], tables) for each in (before, again))
+    one, two = (filtered(InnovationFilter(6, 1, BLOCK, 0.01), [before, each], tables) for each in (before, again))
     assert one == pytest.approx(two, rel=1e-6)
 
 
-def filtered(whitening: Whitening, modes, tables):
+def filtered(whitening: InnovationFilter, modes, tables):
     """Innovations of all tables, the modes changed in the middle."""
     size, found = tables.shape[1], []
     whitening.tune(modes[0])
@@ -102,7 +110,7 @@ def filtered(whitening: Whitening, modes, tables):
 # -- the filter on made-up modes -----------------------------------------------------------------------------------------
 
 
-def made(*frequencies: float) -> Modes:
+def made(*frequencies: float) -> ModalStates:
     """Modes that three channels read, of unit variance at rest."""
     size, rng = len(frequencies), np.random.default_rng(9)
     turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
@@ -114,13 +122,13 @@ def made(*frequencies: float) -> Modes:
         driven[at, at] = 100.0 * np.array([[BLOCK**3 / 3.0, BLOCK**2 / 2.0], [BLOCK**2 / 2.0, BLOCK]])
     shown = np.zeros((CHANNELS, 2 * size))
     shown[:, ::2] = rng.normal(size=(CHANNELS, size))
-    return Modes(np.array(frequencies), turn, least, driven, rest, shown, rng.uniform(1.0, 2.0, CHANNELS))
+    return ModalStates(np.array(frequencies), turn, least, driven, rest, shown, rng.uniform(1.0, 2.0, CHANNELS))
 
 
 class Source:
     """The very model of the filter."""
 
-    def __init__(self, modes: Modes, seed: int, travel: float, shaking: float) -> None:
+    def __init__(self, modes: ModalStates, seed: int, travel: float, shaking: float) -> None:
         self.modes, self.rng, self.travel, self.shaking = modes, np.random.default_rng(seed), travel, shaking
         self.noise = covariance_of(np.random.default_rng(8), CHANNELS, 0.7)
         self.kept = math.exp(-(travel + REST * BLOCK) / REACH)
@@ -154,12 +162,12 @@ class Source:
                 carried = turn @ carried
         return found
 
-    def whitening(self, columns: int = 1) -> Whitening:
-        whitening = Whitening(CHANNELS, columns, BLOCK, DETUNING)
+    def whitening(self, columns: int = 1) -> InnovationFilter:
+        whitening = InnovationFilter(CHANNELS, columns, BLOCK, DETUNING)
         whitening.tune(self.modes)
         return whitening
 
-    def innovations(self, whitening: Whitening, table: np.ndarray):
+    def innovations(self, whitening: InnovationFilter, table: np.ndarray):
         return whitening.step(table, self.noise, ERRORS2, self.shaking, self.travel)
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.chain.place import place
-from boom_twin.chain.program import JOINT_B
-from boom_twin.chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from boom_twin.kernels.tables import JOINT_B
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 NUDGE = 2e-4  # rad, of differences whose error is of its fourth power
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from boom_twin.physics import contact
+from boom_twin.kernels.elements import pin_contact as contact
 
 STEEL = 2.0 * (1.0 - 0.3**2) / 2.06e11  # s_i + s_j of two bodies of steel, 1/Pa
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernels.journal import Journal, bearing, memory, row
 from oracle.clearance.drop import restitution
-from physics.journal import Journal, bearing, memory, row
 
-from boom_twin.peers.play.impacts import follow
-from boom_twin.physics import contact
+from boom_twin.kernels.elements import pin_contact as contact
+from boom_twin.validation.reference.worn_pin.impacts import follow
 
 WITHIN = 0.005  # of a coefficient of restitution
 rng = np.random.default_rng(4)

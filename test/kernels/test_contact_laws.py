@@ -9,8 +9,8 @@ from oracle.clearance.drop import rebound, restitution
 from oracle.clearance.scenes import RODS, with_pins
 from scipy.integrate import solve_ivp
 
-from boom_twin.peers.play.contact import HYSTERESIS, Contact
-from boom_twin.physics.contact import (
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.elements.pin_contact import (
     APPROACH,
     CLOSED,
     COLUMNS,
@@ -23,8 +23,8 @@ from boom_twin.physics.contact import (
     contact_stiffness,
     limited,
     restitution_of,
-)  # fmt: skip
-from boom_twin.plan.compile import compile_scene
+)
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact
 
 PUBLISHED = [
     *(("lankarani-nikravesh", e, kept) for e, kept in ((0.95, 0.954), (0.9, 0.913), (0.8, 0.847), (0.5, 0.725), (0.3, 0.684))),

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernels.journal import Journal, row
 from oracle.clearance.slider_crank import demonstration
-from physics.journal import Journal, row
 
-from boom_twin.physics import contact
+from boom_twin.kernels.elements import pin_contact as contact
 
 LAWS = [("lankarani-nikravesh", 0.9), ("flores", 0.5), ("hertz", 1.0), ("hunt-crossley", 0.7)]
 SOFTNESS = 2.0 * (1.0 - 0.3**2) / 207e9  # the demonstration's steel, 1/Pa

@@ -9,10 +9,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.chain.program import Motion
-from boom_twin.peers.jets import coordinates, cos, sin
-from boom_twin.physics import algebra, beam, cylinder, modes, rigid
-from boom_twin.physics.rotation import turned
+from boom_twin.kernels import plane_algebra as algebra
+from boom_twin.kernels.elements import beam, cylinder
+from boom_twin.kernels.elements import beam_shapes as modes
+from boom_twin.kernels.elements import rigid_body as rigid
+from boom_twin.kernels.plane_algebra import turned
+from boom_twin.kernels.tables import Motion
+from boom_twin.validation.reference.segments.equations import coordinates, cos, sin
 
 GRAVITY = np.array([0.7, -9.5])
 GAIN, RATE = 3.0e3, 90.0

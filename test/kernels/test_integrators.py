@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.physics.integrators import (
+from boom_twin.kernels.integrators import (
     GENERALISED_ALPHA,
     HAT,
     HOUBOLT,

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from boom_twin.physics import kernel_cache
-from boom_twin.physics.kernel_cache import ROOT, cache_folder, fault_of, read_checked, source_hash, write_checked
+from boom_twin.kernels import compiled_cache as kernel_cache
+from boom_twin.kernels.compiled_cache import ROOT, cache_folder, fault_of, read_checked, source_hash, write_checked
 
 PROGRAM = """
 import logging, sys
 {before}
-from boom_twin.physics.jit import inner, kernel
+from boom_twin.kernels.jit import inner, kernel
 @inner
 def twice(x):
     return 2.0 * x
@@ -165,13 +165,13 @@ def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: 
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     before = source_hash(tmp_path)
     assert before == source_hash()
-    (tmp_path / "chain" / "deeper").mkdir()
-    (tmp_path / "chain" / "deeper" / "step.py").write_text("a = 1\n")
+    (tmp_path / "kernels" / "deeper").mkdir()
+    (tmp_path / "kernels" / "deeper" / "step.py").write_text("a = 1\n")
     deeper = source_hash(tmp_path)
-    (tmp_path / "chain" / "deeper" / "step.py").write_text("a = 2\n")
-    (tmp_path / "chain" / "other").mkdir()
+    (tmp_path / "kernels" / "deeper" / "step.py").write_text("a = 2\n")
+    (tmp_path / "kernels" / "other").mkdir()
     edited = source_hash(tmp_path)
-    (tmp_path / "chain" / "deeper" / "step.py").rename(tmp_path / "chain" / "other" / "step.py")
+    (tmp_path / "kernels" / "deeper" / "step.py").rename(tmp_path / "kernels" / "other" / "step.py")
     assert len({before, deeper, edited, source_hash(tmp_path)}) == 4
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert cache_folder() == tmp_path / before

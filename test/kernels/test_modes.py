@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.physics import modes
+from boom_twin.kernels.elements import beam_shapes as modes
 
 
 @pytest.mark.parametrize("count", [2, 5, 9])

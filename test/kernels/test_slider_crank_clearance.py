@@ -12,8 +12,8 @@ from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 from oracle.clearance.slider_crank import demonstration, phases
 
-from boom_twin.physics.contact import APPROACH, CLOSED, COLUMNS, SMOOTH, bearing
-from boom_twin.plan.compile import compile_scene
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, SMOOTH, bearing
 
 
 @dataclass(frozen=True)

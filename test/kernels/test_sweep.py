@@ -6,18 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from chain.dense import Dense, riccati_pass
+from kernels.dense import Dense, riccati_pass
 from oracle import booms
 
-from boom_twin.analysis.posture import set_undeformed
-from boom_twin.analysis.statics import settle
-from boom_twin.chain.place import place
-from boom_twin.chain.plain import new_product
-from boom_twin.chain.program import Motion
-from boom_twin.chain.status import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR
-from boom_twin.chain.step import advance
-from boom_twin.physics.integrators import GENERALISED_ALPHA, REST, A, X, prepare
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.equilibrium import set_undeformed, settle
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.integrators import GENERALISED_ALPHA, REST, A, X, prepare
+from boom_twin.kernels.tables import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, Motion
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.matrix_product import new_product
+from boom_twin.kernels.transfer.time_step import advance
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 

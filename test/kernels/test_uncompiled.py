@@ -14,9 +14,9 @@ PROGRAM = """
 import json, sys
 import numpy as np
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.scene import load_scene
-from boom_twin.scene.parts import Clearance, ContactLaw, Pin
+from boom_twin.scene.schema import Clearance, ContactLaw, Pin
 scene, count, pins = load_scene(), int(sys.argv[1]), sys.argv[2:]
 if pins:
     worn = [Pin(at=at, pin_radius=0.025, radial_clearance=1e-4) for at in pins]

@@ -12,11 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.intake import LONGEST, Intake, stamp_of
-from boom_twin.io.sensors import Sensor, channels, usual
-from boom_twin.io.topics import Topics, load_topics
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes
+from boom_twin.messages.sample_decoder import LONGEST, SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import Sensor, Topics, channels, load_topics, usual
+from boom_twin.types import Stream
 
 TYPES = RosbagsTypes()
 FINITE = st.floats(-1e6, 1e6)
@@ -44,7 +43,7 @@ def imu(x: float, z: float) -> Any:
 def test_any_order_and_extra_names(values: list[float], others: list[tuple[str, float]], data: st.DataObject) -> None:
     pairs = [(f"joint_{i}", value) for i, value in enumerate(values, 1)] + others
     mixed = data.draw(st.permutations(pairs))
-    intake = Intake(len(values))
+    intake = SampleDecoder(len(values))
     sample = intake.put(Stream.ANGLES, 12, joint_state([n for n, _ in mixed], [v for _, v in mixed]))
     assert sample is not None and (sample.stream, sample.stamp) == (Stream.ANGLES, 12)
     assert sample.values.tolist() == values
@@ -61,7 +60,7 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
     """Whatever is wrong with a message: a value in the sample is the one under that name, or NaN."""
     names = [f"cylinder_{i + 1}" for i in sorted(present)]
     positions = [values[i] for i in sorted(present)][:cut]
-    sample = Intake(3).put(Stream.STROKES, 1, joint_state(names, positions))
+    sample = SampleDecoder(3).put(Stream.STROKES, 1, joint_state(names, positions))
     usable = {i: values[i] for i in sorted(present)[:cut] if abs(values[i]) <= 1e6}
     if not usable:
         assert sample is None
@@ -94,7 +93,7 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
 def test_oddities_are_counted_by_name(
     names: list[str], positions: list[float], expected: list[float] | None, oddities: dict[str, int]
 ) -> None:
-    intake = Intake(2)
+    intake = SampleDecoder(2)
     sample = intake.put(Stream.STROKES, 5, joint_state(names, positions))
     assert dict(intake.oddities) == oddities
     if expected is None:
@@ -105,20 +104,20 @@ def test_oddities_are_counted_by_name(
 
 
 def test_imu_gives_x_and_z() -> None:
-    sample = Intake(4).put(Stream.IMU, 9, imu(0.25, 9.81))
+    sample = SampleDecoder(4).put(Stream.IMU, 9, imu(0.25, 9.81))
     assert sample is not None and sample.stream is Stream.IMU
     assert sample.values.tolist() == [0.25, 9.81]
 
 
 def test_imu_without_acceleration_gives_nothing() -> None:
-    intake, msg = Intake(4), imu(0.0, 0.0)
+    intake, msg = SampleDecoder(4), imu(0.0, 0.0)
     msg.linear_acceleration_covariance[0] = -1.0
     assert intake.put(Stream.IMU, 9, msg) is None
     assert dict(intake.oddities) == {"no measurement": 1}
 
 
 def test_imu_with_one_bad_axis_keeps_the_other() -> None:
-    intake = Intake(4)
+    intake = SampleDecoder(4)
     sample = intake.put(Stream.IMU, 9, imu(nan, 9.7))
     assert sample is not None
     np.testing.assert_array_equal(sample.values, [nan, 9.7])
@@ -126,7 +125,7 @@ def test_imu_with_one_bad_axis_keeps_the_other() -> None:
 
 
 def test_counts_add_up_over_messages() -> None:
-    intake = Intake(1)
+    intake = SampleDecoder(1)
     for _ in range(3):
         intake.put(Stream.STROKES, 1, joint_state(["x"], [1.0]))
     assert dict(intake.oddities) == {"unknown names only": 3}
@@ -136,19 +135,19 @@ def test_messages_of_rclpy_give_the_same() -> None:
     """They hold ``array.array`` where rosbags has numpy; nothing else differs for a reader."""
     names, positions = ["joint_2", "other", "joint_1"], [0.1 + 0.2, 5.0, -1 / 3]
     foreign = SimpleNamespace(name=names, position=array("d", positions))
-    one = Intake(2).put(Stream.ANGLES, 1, joint_state(names, positions))
-    other = Intake(2).put(Stream.ANGLES, 1, foreign)
+    one = SampleDecoder(2).put(Stream.ANGLES, 1, joint_state(names, positions))
+    other = SampleDecoder(2).put(Stream.ANGLES, 1, foreign)
     assert one is not None and other is not None
     assert one.values.tobytes() == other.values.tobytes()
 
 
 def test_real_messages_of_rclpy_are_taken() -> None:
     messages = pytest.importorskip("sensor_msgs.msg")
-    sample = Intake(2).put(Stream.ANGLES, 1, messages.JointState(name=["joint_2", "joint_1"], position=[0.2, 0.1]))
+    sample = SampleDecoder(2).put(Stream.ANGLES, 1, messages.JointState(name=["joint_2", "joint_1"], position=[0.2, 0.1]))
     assert sample is not None and sample.values.tolist() == [0.1, 0.2]
     force = messages.Imu()
     force.linear_acceleration.x, force.linear_acceleration.z = 1.5, 9.5
-    sample = Intake(2).put(Stream.IMU, 1, force)
+    sample = SampleDecoder(2).put(Stream.IMU, 1, force)
     assert sample is not None and sample.values.tolist() == [1.5, 9.5]
 
 
@@ -160,7 +159,7 @@ def test_stamp_of_is_exact() -> None:
 
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
-    intake = Intake(1)
+    intake = SampleDecoder(1)
     message = RosbagsTypes().make("sensor_msgs/msg/JointState")
     message.name, message.position = ["cylinder_1"], np.array([0.1])
     assert intake.put(Stream.STROKES, stamp, message) is None
@@ -168,7 +167,7 @@ def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
 
 
 def test_a_flood_of_names_is_not_looked_through() -> None:
-    intake = Intake(1)
+    intake = SampleDecoder(1)
     names = [*(f"x{i}" for i in range(LONGEST)), "cylinder_1"]
     assert intake.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
     assert intake.oddities == {"too many names": 1}
@@ -197,7 +196,7 @@ def mapped(sensors: dict[str, Any], **names: str) -> Topics:
 def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], reading: float, expected: float) -> None:
     stream = Stream.STROKES if channel.startswith("cyl") else Stream.ANGLES
     other = {"cylinder_2": "cylinder_1", "joint_1": "joint_2"}[channel]
-    sample = Intake(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
+    sample = SampleDecoder(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
     assert sample is not None
     values = dict(zip(channels(stream, 2), sample.values.tolist(), strict=True))
     assert values == {channel: pytest.approx(expected, rel=1e-12), other: 0.7}
@@ -206,14 +205,14 @@ def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], rea
 def test_an_imu_may_lie_on_its_side() -> None:
     topics = mapped({"tip_imu_x": {"name": "y", "sign": -1}, "tip_imu_z": {"name": "x", "unit": "g", "zero": 0.02}})
     msg = imu(1.02, 5.0)
-    sample = Intake(1, topics).put(Stream.IMU, 1, msg)
+    sample = SampleDecoder(1, topics).put(Stream.IMU, 1, msg)
     assert sample is not None
     np.testing.assert_allclose(sample.values, [-77.0, 9.80665], rtol=1e-12)
 
 
 def test_one_topic_for_both_kinds() -> None:
     """A message feeds the streams that it has values of, and a stream without any is nothing odd."""
-    intake = Intake(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
+    intake = SampleDecoder(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
     both = joint_state(["other", "a", "cylinder_1"], [9.0, 0.1, 0.2])
     angles, strokes, neither = joint_state(["a"], [0.3]), joint_state(["cylinder_1"], [0.4]), joint_state(["joint_1"], [1.0])
     samples = [intake.put(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.markers import TRACE, ShapeMarkers, force_colour
-from boom_twin.io.topics import TYPES, Output
-from boom_twin.io.typestore import jazzy
-from boom_twin.records import Prediction
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Prediction
 
 FACTOR, FULL = 7.5, 5.0e4  # N
 PERIOD = 5_000_000  # ns

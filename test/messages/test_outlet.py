@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.behind import pack, unpack
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.outlet import Outlet
-from boom_twin.io.topics import TYPES, Output
-from boom_twin.io.typestore import jazzy
-from boom_twin.records import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
+from boom_twin.config.settings import Settings
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.offline.writer_process import pack, unpack
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
+from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
 
 STAMP = 1_700_000_000_123_456_789
 
@@ -71,11 +70,11 @@ def judged(*alarms: Alarm) -> Report:
     return replace(report(), health=health)
 
 
-def outlet() -> Outlet:
+def outlet() -> ReportEncoder:
     """One for the first three sections of the default boom."""
     scene = load_scene()
     three = scene.model_copy(update={"sections": scene.sections[:3], "joints": scene.joints[:3], "postures": {}})
-    return Outlet(three, Settings())
+    return ReportEncoder(three, Settings())
 
 
 def decoded(messages: list[tuple[Output, bytes]]) -> dict[Output, Any]:
@@ -223,7 +222,7 @@ def test_the_bytes_are_those_of_rosbags() -> None:
 
 def test_rclpy_reads_the_same_numbers() -> None:
     serialization = pytest.importorskip("rclpy.serialization")
-    types = pytest.importorskip("boom_twin.ros.types")
+    types = pytest.importorskip("boom_twin.ros.runtime")
     for key, data in outlet().fill(judged(ALARM)):
         assert_same(
             jazzy().deserialize_cdr(data, TYPES[key]),

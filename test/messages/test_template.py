@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.template import Holes, Template, stamped
-from boom_twin.io.typestore import jazzy
+from boom_twin.messages.cdr_encoder import NumberFields, RosbagsTypes, Template, jazzy, stamped
 
 MARKER = "visualization_msgs/msg/Marker"
 
 
-def marker(holes: Holes) -> Any:
+def marker(holes: NumberFields) -> Any:
     """Holes of both widths, made in another order than they stand in."""
     msg = RosbagsTypes().make(MARKER)
     stamped(msg.header)
@@ -25,7 +23,7 @@ def marker(holes: Holes) -> Any:
 
 
 def test_numbers_come_in_the_order_of_their_holes() -> None:
-    template = Template(MARKER, marker(holes := Holes()), holes)
+    template = Template(MARKER, marker(holes := NumberFields()), holes)
     for stamp, doubles, singles in (
         (1_999_999_999, [0.1, np.nan], [0.5, 0.25]),
         (2**31 * 10**9 - 1, [-np.inf, 5e-324], [1.0, 0.0]),
@@ -38,7 +36,7 @@ def test_numbers_come_in_the_order_of_their_holes() -> None:
 
 
 def test_a_hole_that_is_in_no_message_is_refused() -> None:
-    holes = Holes()
+    holes = NumberFields()
     msg = marker(holes)
     holes.double()
     with pytest.raises(ValueError, match="2 of 3 holes"):

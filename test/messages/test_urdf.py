@@ -11,15 +11,13 @@ import pytest
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.cli.main import main
-from boom_twin.io.outlet import Outlet
-from boom_twin.io.topics import TYPES, Output
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.urdf import urdf
-from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.parts import Scene
-from boom_twin.scene.passive import PassiveJoints
-from boom_twin.settings import Settings
-from boom_twin.view.skeleton import skeleton
+from boom_twin.config.settings import Settings
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.urdf import urdf
+from boom_twin.scene.kinematics import PassiveJoints, skeleton, strokes_of_posture
+from boom_twin.scene.schema import Scene
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
 # (name: fewest, most), all else refused.
@@ -187,7 +185,7 @@ def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
 def test_joint_states_drive_every_joint() -> None:
     """A message that comes with a shape names each joint of the URDF that can move, and no other."""
     scene = load_scene()
-    twin, outlet = Twin(scene), Outlet(scene, Settings())
+    twin, outlet = Twin(scene), ReportEncoder(scene, Settings())
     report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
     msg = jazzy().deserialize_cdr(dict(outlet.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
     robot = ElementTree.fromstring(urdf(scene))

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.intake import Intake, stamp_of
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import load_topics
-from boom_twin.monitor.bag import BagFeed, bag_feed
-from boom_twin.monitor.feed import Feed
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.config.settings import Settings
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.data.bag_feed import BagFeed, bag_feed
+from boom_twin.monitor.data.feed import Feed
 from boom_twin.offline.replay import replay
-from boom_twin.records import Stream
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
+from boom_twin.types import Stream
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
@@ -48,7 +48,7 @@ def drifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
     """The bundled session's first 40 s with a gap, its joint angles spoilt by a function of times (s) and angles (rad)."""
-    topics, intake = load_topics().inputs, Intake(4)
+    topics, intake = load_topics().inputs, SampleDecoder(4)
     values: dict[Stream, list[Any]] = {stream: [] for stream in Stream}
     names = {topic.absolute: stream for stream, topic in topics.items()}
     stamps = []

@@ -12,21 +12,18 @@ import pytest
 from monitor.conftest import read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import TYPES, Output, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.monitor.alarms import Alarm
-from boom_twin.monitor.bag import ENOUGH, bag_feed
-from boom_twin.monitor.feed import Feed
-from boom_twin.monitor.lamps import Level, overall
-from boom_twin.monitor.playback import Playback
-from boom_twin.monitor.words import state
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
+from boom_twin.monitor.data.feed import Feed, Playback
+from boom_twin.monitor.data.status import Alarm, Level, overall
+from boom_twin.monitor.protocol import state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from boom_twin.monitor.feed import Feed
+from boom_twin.monitor.data.feed import Feed
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
 CHROMIUM = Path("/usr/bin/chromium")

@@ -20,8 +20,8 @@ import pytest
 from aiohttp import ClientSession, WSMsgType
 
 from boom_twin.monitor import connections
-from boom_twin.monitor.door import POLICY
-from boom_twin.printable import printable
+from boom_twin.monitor.access_control import POLICY
+from boom_twin.system.terminal_text import printable
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 HALF_OPEN = 1000

@@ -15,21 +15,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.health import encode_health
-from boom_twin.io.topics import TYPES, Output, Topic, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.monitor import catch as catching
-from boom_twin.monitor import log
-from boom_twin.monitor.analyst import Analyst
-from boom_twin.monitor.dropped import LONGEST
-from boom_twin.monitor.feed import Feed
-from boom_twin.monitor.lamps import MOST_NODES
-from boom_twin.monitor.spectrogram import spectrogram
-from boom_twin.monitor.spectrum import MOST_POINTS, spacing, spectrum
-from boom_twin.monitor.store import Store
-from boom_twin.monitor.words import dump, layout, state
-from boom_twin.records import Alarm, Health, Ranked, Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
+from boom_twin.messages.report_encoder import encode_health
+from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
+from boom_twin.monitor import log_limit as log
+from boom_twin.monitor.data import topic_rows as catching
+from boom_twin.monitor.data.analyst import Analyst
+from boom_twin.monitor.data.dropped_messages import LONGEST
+from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.spectrum import MOST_POINTS, spacing, spectrogram, spectrum
+from boom_twin.monitor.data.status import MOST_NODES
+from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.protocol import dump, layout, state
+from boom_twin.types import Alarm, Health, Ranked, Stream
 
 TOPICS, MAKE = load_topics(), RosbagsTypes()
 EPOCH, STEP = 1_700_000_000 * 10**9, 5_000_000

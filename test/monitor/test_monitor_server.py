@@ -14,12 +14,12 @@ from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
 
-from boom_twin.io.topics import load_topics
-from boom_twin.monitor.desk import Desk
-from boom_twin.monitor.door import Door, is_loopback
-from boom_twin.monitor.feed import Feed
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.access_control import AccessControl, is_loopback
+from boom_twin.monitor.actions import ViewerActions
+from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MOST_VIEWERS, Server
-from boom_twin.monitor.store import Store
 from boom_twin.scene import load_scene
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]
@@ -55,8 +55,8 @@ def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), host: str = "
     """Run `talk` with a session and the address of a server of `feed`."""
 
     async def run() -> None:
-        door = Door(host)
-        application = Server(feed, Desk(feed, frozenset(permitted)), door).application()
+        door = AccessControl(host)
+        application = Server(feed, ViewerActions(feed, frozenset(permitted)), door).application()
         async with TestServer(application) as server, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
             await asyncio.wait_for(talk(session, str(server.make_url("/"))), 60.0)
 
@@ -211,12 +211,12 @@ def test_another_name_that_resolves_to_this_machine_is_refused() -> None:
 
 
 def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
-    assert not Door("127.0.0.1").token and not Door("::1").token and len(Door("0.0.0.0").token) >= 32
+    assert not AccessControl("127.0.0.1").token and not AccessControl("::1").token and len(AccessControl("0.0.0.0").token) >= 32
     assert not is_loopback("rig.local")
 
     async def run() -> None:
-        door, feed = Door("0.0.0.0"), Made()
-        async with TestServer(Server(feed, Desk(feed, frozenset()), door).application()) as server:
+        door, feed = AccessControl("0.0.0.0"), Made()
+        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), door).application()) as server:
             url = str(server.make_url("/"))
             async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
                 for path in ("", "page/main.js", "?token=wrong"):
@@ -234,8 +234,8 @@ def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
 @pytest.mark.parametrize("path", ["/", "//evil.example/path", "/%5cevil.example/", "/page/x"])
 def test_with_a_token_one_is_led_to_the_page_and_nowhere_else(path: str) -> None:
     async def run() -> None:
-        door, feed = Door("0.0.0.0"), Made()
-        async with TestServer(Server(feed, Desk(feed, frozenset()), door).application()) as server:
+        door, feed = AccessControl("0.0.0.0"), Made()
+        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), door).application()) as server:
             head = await ask(server, f"{path}?token={door.token}")
             assert " 302 " in head and "\r\nLocation: /\r\n" in head and "Content-Security-Policy" in head
             head = await ask(server, "/", "Cookie: boom_twin_monitor=\xff")
@@ -285,7 +285,7 @@ def test_a_mark_and_an_acknowledgement_are_published() -> None:
             await socket.send_json({"do": "mark", "note": "hose moved"})
             assert (await until(socket, "answer"))["done"]
             await socket.send_json({"do": "acknowledge", "number": number})
-            assert (await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"]))
+            assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
         assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
 
     feed = Made()

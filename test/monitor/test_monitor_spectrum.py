@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from boom_twin.monitor.modes import Modes
-from boom_twin.monitor.spectrogram import FREQUENCIES, spectrogram
-from boom_twin.monitor.spectrum import SEGMENT, spectrum
+from boom_twin.monitor.data.analyst import ModeList
+from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -65,7 +64,7 @@ def test_less_than_a_segment_has_no_spectrum() -> None:
 
 def test_natural_frequencies_follow_the_posture() -> None:
     scene = load_scene()
-    modes, strokes = Modes(scene), strokes_of_posture(scene, "arch")
+    modes, strokes = ModeList(scene), strokes_of_posture(scene, "arch")
     first = modes.at(strokes)
     assert first == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
     assert modes.at(strokes + 0.001) is first and modes.at(strokes + 0.02) != first

@@ -7,8 +7,8 @@ import struct
 import numpy as np
 import pytest
 
-from boom_twin.monitor.frames import ROWS, pack
-from boom_twin.monitor.table import Table
+from boom_twin.monitor.data.store import Table
+from boom_twin.monitor.protocol import ROWS, pack
 
 
 @pytest.fixture

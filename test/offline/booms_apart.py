@@ -9,10 +9,10 @@ from oracle import booms
 from ruamel.yaml import YAML
 
 from boom_twin import statics
-from boom_twin.io.session import write_session
-from boom_twin.io.sheet import Sheet
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.session_sheet import SessionSheet
+from boom_twin.scene.edit import anew
 from boom_twin.scene.load import load_scene
-from boom_twin.study.rewrite import anew
 
 ORDERS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 1, 1, 2, 3)}
 POSTURES = {3: (60, 20, -30), 4: (60, 20, -30, -80), 5: (75, 50, 10, -5, -40)}
@@ -41,7 +41,7 @@ def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float =
     joints += noise.normal(0.0, 2e-4, joints.shape)
     write_session(path, START + np.arange(rows) * STEP, strokes, joints, None, {"origin": "synthetic, a test"})
     if keep:
-        Sheet("0", text).write(path)
+        SessionSheet("0", text).write(path)
     return path
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin.bag.reader import read, scan
 from boom_twin.health.baseline import load_baseline
-from boom_twin.io.intake import Intake, stamp_of
-from boom_twin.io.outlet import Outlet
-from boom_twin.io.reader import read, scan
-from boom_twin.io.topics import load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.truth import load_truth
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.offline.ground_truth import load_truth
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SENSOR = 1.745e-4  # rad, a joint encoder's own noise
@@ -48,9 +48,7 @@ def test_true_strokes_leave_the_lag_of_the_estimator_alone():
     strokes = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)])
     stamps = np.round(truth["t_s"] * 1e9).astype(np.int64)
     twin = Twin(load_scene())
-    predictions = [
-        twin.update(Sample(Stream.STROKES, int(t), y)).prediction for t, y in zip(stamps, strokes, strict=True)
-    ]
+    predictions = [twin.update(Sample(Stream.STROKES, int(t), y)).prediction for t, y in zip(stamps, strokes, strict=True)]
     assert load_truth(SESSION).errors(predictions)["tip_acceleration_error_rms_m_s2"] < 0.10
 
 
@@ -76,7 +74,7 @@ def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
     wanted = {inputs[stream].name: inputs[stream].type for stream in Stream}
     roles = {inputs[stream].name: stream for stream in Stream}
     scene, store = load_scene(), jazzy()
-    twin, intake, outlet = Twin(scene, baseline=load_baseline()), Intake(4), Outlet(scene, Settings())
+    twin, intake, outlet = Twin(scene, baseline=load_baseline()), SampleDecoder(4), ReportEncoder(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(SESSION), wanted):
         sample = intake.put(roles[name], stamp_of(message), message)

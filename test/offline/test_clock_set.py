@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.offline.ground_truth import TipTruth
 from boom_twin.offline.replay import Recording
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.truth import TipTruth
 
 MS = 1_000_000
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.session_sheet import SessionSheet
+from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.places import fill_header
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import write_session
-from boom_twin.io.sheet import Sheet
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import SessionWriter
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.types import Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -78,7 +78,7 @@ def rig(arrays, tmp_path_factory):
                 values = {**own, **values}
             msg.name, msg.position = list(values), types.doubles([*values.values()])
             bag.write("all", int(stamp), msg)
-    Sheet("test", "", "", MAPPING, {}).write(path)
+    SessionSheet("test", "", "", MAPPING, {}).write(path)
     return path
 
 

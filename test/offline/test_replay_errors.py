@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.replay import as_text
 from boom_twin.errors import BagError
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.places import fill_header
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import SessionWriter
-from boom_twin.records import Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.topic_table import load_topics
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Stream
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
 from boom_twin.errors import UsageError
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import Output, load_topics
+from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.offline.replay import alarm_as_text, replay
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 

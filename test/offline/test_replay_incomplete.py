@@ -17,17 +17,17 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, replay
+from boom_twin.bag.reader import scan
+from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
+from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
-from boom_twin.io import behind
-from boom_twin.io.pipe import END, Pipe
-from boom_twin.io.reader import scan
-from boom_twin.io.results import REPLAY, result_folder
-from boom_twin.io.session import write_session
-from boom_twin.monitor.bag import bag_feed
+from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.offline import writer_process as behind
+from boom_twin.offline.process_pipe import END, Pipe
 from boom_twin.offline.replay import replay_into
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.settings import Settings
+from boom_twin.system.result_folder import REPLAY, result_folder
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 
@@ -180,7 +180,7 @@ def test_a_process_of_a_replay_that_dies_is_an_error(
 
 def test_a_pipe_that_breaks_off_is_no_end() -> None:
     """Also where the process says that all is well."""
-    pipe = Pipe("boom_twin.io.ahead")
+    pipe = Pipe("boom_twin.offline.reader_process")
     pipe._process.kill()
     pipe._process.wait()
     pipe._process.returncode = 0
@@ -190,7 +190,7 @@ def test_a_pipe_that_breaks_off_is_no_end() -> None:
 
 @pytest.mark.parametrize("is_told", [True, False], ids=["end told", "end not told"])
 def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path, is_told: bool) -> None:
-    from boom_twin.io.topics import load_topics
+    from boom_twin.messages.topic_table import load_topics
 
     pipe = Pipe(behind.__name__, str(tmp_path / "bag"))
     pipe.send(({}, load_topics().outputs, load_scene(), Settings()))

@@ -8,23 +8,23 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from replay.booms_apart import as_document, scene_text, session
+from offline.booms_apart import as_document, scene_text, session
 
 from boom_twin import load_scene, replay
+from boom_twin.bag.session_model import baseline_of, scene_of
+from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, kept, sha256
+from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
+from boom_twin.config.settings import Settings
+from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
 from boom_twin.errors import BagError
-from boom_twin.io.factory import RosbagsTypes
-from boom_twin.io.intake import Intake
-from boom_twin.io.places import fill_header
-from boom_twin.io.session_model import baseline_of, scene_of
-from boom_twin.io.sheet import FILE_NAME, Sheet, kept, sha256
-from boom_twin.io.topics import load_topics
-from boom_twin.io.writer import SessionWriter
-from boom_twin.monitor.bag import bag_feed
-from boom_twin.records import Report, Residuals, Sample, Stream
+from boom_twin.messages.cdr_encoder import RosbagsTypes
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.sample_decoder import SampleDecoder
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME, default_text
-from boom_twin.settings import Settings
-from boom_twin.watch.other_boom import FAR, WINDOW, OtherBoom
+from boom_twin.types import Report, Residuals, Sample, Stream
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"
@@ -138,7 +138,7 @@ def test_other_names_do_not_matter_and_a_mapping_can_say_which_are_the_booms():
 def test_the_intake_takes_nothing_of_another_boom():
     """So the node publishes nothing by it, and its diagnostics have the names."""
     names = [f"cylinder_{i}" for i in range(1, 6)]
-    intake, msg = Intake(4), SimpleNamespace(name=names, position=[0.1] * 5)
+    intake, msg = SampleDecoder(4), SimpleNamespace(name=names, position=[0.1] * 5)
     assert intake.put(Stream.STROKES, 10**18, msg) is None
     assert intake.oddities == {"names of another boom": 1} and intake.strangers == {Stream.STROKES: ["cylinder_5"]}
     assert intake.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
@@ -206,7 +206,7 @@ def test_the_given_scene_comes_first_then_the_sessions_then_the_default(four, fi
 )
 def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tmp_path, capsys):
     write_names(tmp_path / "bag", ["cylinder_1"])
-    Sheet("0", text).write(tmp_path / "bag")
+    SessionSheet("0", text).write(tmp_path / "bag")
     for command in (["info", str(tmp_path / "bag")], arguments(tmp_path / "bag", tmp_path / "out")):
         assert main(command) == 1
         told = capsys.readouterr().err
@@ -226,14 +226,14 @@ def test_what_is_no_sheet_is_one_line_with_the_remedy(document, tmp_path):
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_texts_are_kept_as_they_are(text, tmp_path):
-    Sheet("0", text).write(tmp_path)
+    SessionSheet("0", text).write(tmp_path)
     assert kept(tmp_path, "scene", "--scene").text == text
     assert kept(tmp_path, "scene_sha256", "--scene").text == sha256(text)
 
 
 def test_a_sheet_that_could_not_be_read_again_is_not_written(tmp_path):
     with pytest.raises(BagError, match="bytes, of which"):
-        Sheet("0", "#" * 5_000_000).write(tmp_path)
+        SessionSheet("0", "#" * 5_000_000).write(tmp_path)
     assert not (tmp_path / FILE_NAME).exists()
 
 
@@ -247,10 +247,10 @@ def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
 
 def test_the_baseline_is_that_of_the_recording(four, tmp_path):
     assert baseline_of(four).source == "default baseline"
-    Sheet("0", baseline="description: learnt\nangle_error: 0.001\n").write(tmp_path)
+    SessionSheet("0", baseline="description: learnt\nangle_error: 0.001\n").write(tmp_path)
     found = baseline_of(tmp_path)
     assert (found.baseline.angle_error, found.source) == (0.001, f"{tmp_path / FILE_NAME}, baseline")
-    Sheet("0", baseline="angle_error: -1\n").write(tmp_path)
+    SessionSheet("0", baseline="angle_error: -1\n").write(tmp_path)
     with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
         baseline_of(tmp_path)
 

@@ -6,7 +6,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from boom_twin.scene.load import default_text
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
 
 from .segments import Segments, link_headings
 

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.load import default_text
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
 
 
 @pytest.fixture

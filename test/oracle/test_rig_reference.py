@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.rig import Move, Programme, simulate, statics
 from boom_twin.scene import load_scene
+from boom_twin.validation.rig import Move, Programme, simulate, statics
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"
 

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import rig
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
-from boom_twin.rig.programmes import stroke_range
+from boom_twin.validation import rig
+from boom_twin.validation.rig.motion import stroke_range
 
 STROKE = 0.04  # m, of every other cylinder within one second
 

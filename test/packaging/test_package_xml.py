@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import boom_twin
-from boom_twin.io.topics import TYPES
+from boom_twin.messages.topic_table import TYPES
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
@@ -21,7 +21,7 @@ NOT_OF_ROS = {"boom_twin", "numpy", "pydantic", "tqdm", "rpyutils"}  # rpyutils 
 def imported(folder: str) -> set[str]:
     """Top-level packages that the files of a folder import, less those of Python."""
     names: set[str] = set()
-    for path in (ROOT / "boom_twin" / folder).glob("*.py"):
+    for path in (ROOT / "boom_twin" / folder).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 names |= {alias.name.split(".")[0] for alias in node.names}
@@ -55,7 +55,7 @@ def test_no_module_hides_a_function_of_the_package():
     program = (
         "import pkgutil, importlib, boom_twin\n"
         "for found in pkgutil.iter_modules(boom_twin.__path__): importlib.import_module(f'boom_twin.{found.name}')\n"
-        "import boom_twin.offline.replay, boom_twin.analysis.simulate, boom_twin.analysis.statics\n"
+        "import boom_twin.offline.replay, boom_twin.analysis.simulate, boom_twin.analysis.equilibrium\n"
         "from boom_twin import load_scene, replay, simulate, statics\n"
         "assert all(map(callable, (load_scene, replay, simulate, statics)))\n"
     )

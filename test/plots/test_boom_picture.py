@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.posture import rigid_tip
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import rigid_tip, statics
+from boom_twin.plots.boom import boom_picture, undeformed_outline
 from boom_twin.scene import Scene, load_scene
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.view.boom import boom_picture, undeformed_outline
-from boom_twin.view.skeleton import skeleton
+from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 
 
 @pytest.fixture(scope="module")

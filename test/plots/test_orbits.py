@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.view.orbits import orbits_picture
-from boom_twin.view.records import Orbits
+from boom_twin.plots.history import Orbits
+from boom_twin.plots.posture import orbits_picture
 
 
 def circling(pins: int, instants: int) -> Orbits:

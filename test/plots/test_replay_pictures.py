@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.records import Array
-from boom_twin.view import AlarmSpan, History, ImuTrace, Truth, replay_pictures
-from boom_twin.view.posture import spread
-from boom_twin.view.residuals import residual_picture, running_mean
-from boom_twin.view.spectrum import density
-from boom_twin.view.style import broken, limits
-from boom_twin.view.tip import liveliest, rms_difference
+from boom_twin.plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
+from boom_twin.plots.posture import spread
+from boom_twin.plots.residuals import density, residual_picture, running_mean
+from boom_twin.plots.style import broken, limits
+from boom_twin.plots.tip import liveliest, rms_difference
+from boom_twin.types import Array
 
 ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
 
@@ -145,7 +144,7 @@ def test_numbers_behind_the_pictures() -> None:
 
 
 def test_plotting_library_is_not_imported_before_a_picture_is_drawn() -> None:
-    code = "import sys, boom_twin.view, boom_twin.view.boom; sys.exit('matplotlib' in sys.modules)"
+    code = "import sys, boom_twin.plots, boom_twin.plots.boom; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

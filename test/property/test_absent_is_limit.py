@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.statics import statics
-from boom_twin.scene.parts import Scene
-from boom_twin.study.deviation import Answer, answer, course_of
-from boom_twin.study.variants import KINDS, without
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.reduction.deviation import Response, answer, course_of
+from boom_twin.reduction.variants import KINDS, without
+from boom_twin.scene.schema import Scene
 
 SHORT = {"rise": 0.3, "duration": 0.6}
 BEAM_KEYS = ("A", "I")
@@ -44,7 +44,7 @@ def distances(scene: Scene, lean: Scene, family, factors) -> tuple[np.ndarray, n
     course = course_of(scene)
     course = replace(course, motion=replace(course.motion, **SHORT))
     limit = answer(lean, course)
-    models: list[Answer] = [answer(family(factor), course) for factor in factors]
+    models: list[Response] = [answer(family(factor), course) for factor in factors]
     assert all(one.status == "ok" for one in (limit, *models))
     rest = np.array([np.linalg.norm(one.rest - limit.rest, axis=1).max() for one in models])
     return rest, np.array([np.linalg.norm(one.tip - limit.tip, axis=1).max() for one in models])

@@ -7,10 +7,10 @@ import pytest
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
-from boom_twin.analysis.march import march
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.methods import march
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.parts import IDEAL_BELOW
+from boom_twin.scene.schema import IDEAL_BELOW
 
 TRAVEL, RISE = np.array([0.03, -0.02, 0.03, 0.02]), 0.3  # m, s
 STEP, EVERY = 1e-3, 4  # s, steps

@@ -24,10 +24,10 @@ CUTS = {
 }
 WORKER = """
 import sys
-from boom_twin.analysis.march import march
+from boom_twin.analysis.methods import march
 from boom_twin.scene import load_scene
-from boom_twin.study.motion import motion_of
-from boom_twin.study.variants import KINDS, without
+from boom_twin.analysis.motions import motion_of
+from boom_twin.reduction.variants import KINDS, without
 scene = load_scene()
 motion = motion_of(scene)
 for kind in KINDS:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis import march as stepping
-from boom_twin.analysis.statics import statics
-from boom_twin.plan.compile import compile_scene
-from boom_twin.study.deviation import answer, course_of
-from boom_twin.study.motion import motion_of
+from boom_twin.analysis import methods as stepping
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.motions import motion_of
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.reduction.deviation import answer, course_of
 
 RUNS, STEPS, STEP, ATTEMPTS = 30, 400, 1e-3, 3
 MOST = 1.05

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from boom_twin.analysis.course import PASSES
-from boom_twin.analysis.posture import set_undeformed
+from boom_twin.analysis.drive import PASSES
+from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.analysis.simulate import RHO
-from boom_twin.chain.place import place
-from boom_twin.chain.program import State, Work
-from boom_twin.chain.step import advance, observe, run
-from boom_twin.physics.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
-from boom_twin.plan.compile import compile_scene
-from boom_twin.plan.plan import Plan
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import Plan
+from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
+from boom_twin.kernels.tables import State, Work
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.time_step import advance, observe, run
 
 INSTANT = 1e-4  # s, over which accelerations at rest are found; their relative error is about its square
 TOLERANCE = 1e-11  # rad in the last pass of a step
@@ -79,9 +79,7 @@ def halved(start, step, duration, rows, drive=None, halvings=3, rho=RHO):
     """Results of `stepped` at equal distances for `step` and its halves, shape (halvings + 1, rows + 1, 3, 3)."""
     count = round(duration / step)
     assert count % rows == 0 and abs(count * step - duration) < 1e-9
-    return np.array(
-        [stepped(start, step / 2**k, count * 2**k, count * 2**k // rows, drive, rho) for k in range(halvings + 1)]
-    )
+    return np.array([stepped(start, step / 2**k, count * 2**k, count * 2**k // rows, drive, rho) for k in range(halvings + 1)])
 
 
 def orders(errors):

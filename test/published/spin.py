@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from published import scenes
 
-from boom_twin.physics.linkage import cylinder_length
+from boom_twin.kernels.elements.linkage import cylinder_length
 from boom_twin.scene.kinematics import linkage
 
 PIVOTS = 26

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from boom_twin import Stream
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
-from boom_twin.io.intake import Intake, stamp_of
-from boom_twin.io.reader import read, scan
-from boom_twin.io.session import write_session
-from boom_twin.io.topics import load_topics
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
@@ -20,7 +20,7 @@ SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
 
 def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
     """Stamps (k,) and values of every stream, up to `SECONDS`; all streams have the same stamps."""
-    inputs, intake = load_topics().inputs, Intake(4)
+    inputs, intake = load_topics().inputs, SampleDecoder(4)
     roles = {inputs[stream].name: stream for stream in Stream}
     found: dict[Stream, list] = {stream: [] for stream in Stream}
     for name, _, message in read(scan(SESSION), {inputs[stream].name: inputs[stream].type for stream in Stream}):

@@ -8,16 +8,17 @@ from pathlib import Path
 import pytest
 
 from boom_twin.cli.main import main
-from boom_twin.report.compare import as_text, flat, rows_of
+from boom_twin.report.compare import ComparedSession, as_text, flat, rows_of
 from boom_twin.report.quantities import Quantity
-from boom_twin.report.side import Side
 
-ONE = Side("one", "s", [Quantity("x", 1.0, 0.1, "m"), Quantity("y", 1.0, None, "m"), Quantity("only", 2.0, 0.1, "m")], [])
+ONE = ComparedSession(
+    "one", "s", [Quantity("x", 1.0, 0.1, "m"), Quantity("y", 1.0, None, "m"), Quantity("only", 2.0, 0.1, "m")], []
+)
 
 
-def other(x: float) -> Side:
+def other(x: float) -> ComparedSession:
     alarm = {"channel": "joint_1", "kind": "bias", "from_s": -0.03, "to_s": None, "cause": "joint_1.sensor", "told": "bias"}
-    return Side("other", "s", [Quantity("x", x, 0.1, "m"), Quantity("y", 3.0, None, "m")], [alarm])
+    return ComparedSession("other", "s", [Quantity("x", x, 0.1, "m"), Quantity("y", 3.0, None, "m")], [alarm])
 
 
 @pytest.mark.parametrize(("x", "differs"), [(1.0, False), (1.5, False), (1.6, True), (0.4, True)])

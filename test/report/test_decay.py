@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.records import Array
-from boom_twin.report.decay import vibrations
-from boom_twin.report.vibration import SURE
+from boom_twin.report.vibration import SURE, vibrations
+from boom_twin.types import Array
 
 TIMES = np.arange(0.0, 5.0, 0.005)
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.session import write_session
+from boom_twin.bag.session_files import write_session
+from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.ros.isolation import Isolation
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -94,7 +94,7 @@ def spawn_node(spawn: Callable[..., Process]) -> Callable[..., Process]:
     """Starts the node with ROS arguments."""
 
     def start(*arguments: str) -> Process:
-        return spawn("boom_twin.ros.main", *(["--ros-args", *arguments] if arguments else []))
+        return spawn("boom_twin.ros.node.main", *(["--ros-args", *arguments] if arguments else []))
 
     return start
 
@@ -154,9 +154,7 @@ def motion() -> dict[str, Any]:
     """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""
     scene, random = load_scene(), np.random.default_rng(3)
     time_s = np.arange(int(SECONDS * RATE)) / RATE
-    stamps = (
-        1_700_000_000_000_000_000 + (time_s * 1e9).astype(np.int64) + random.integers(-150_000, 150_000, len(time_s))
-    )
+    stamps = 1_700_000_000_000_000_000 + (time_s * 1e9).astype(np.int64) + random.integers(-150_000, 150_000, len(time_s))
     strokes = np.tile(strokes_of_posture(scene, "arch"), (len(time_s), 1))
     strokes[:, 0] += 0.02 * (1.0 - np.cos(1.5 * time_s))
     strokes[:, 2] += 0.01 * (1.0 - np.cos(2.0 * time_s))

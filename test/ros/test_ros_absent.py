@@ -15,16 +15,14 @@ def _run(code: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_package_never_imports_rclpy() -> None:
-    done = _run(
-        "import boom_twin, boom_twin.twin, boom_twin.offline.replay, boom_twin.cli.main, boom_twin.ros, boom_twin.ros.main"
-    )
+    done = _run("import boom_twin, boom_twin.twin.twin, boom_twin.offline.replay, boom_twin.cli.main, boom_twin.ros.node.main")
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(
     "call",
     [
-        "from boom_twin.ros.main import main; sys.exit(main([]))",
+        "from boom_twin.ros.node.main import main; sys.exit(main([]))",
         "from boom_twin.cli.main import main; sys.exit(main(['record', '--out', 'never']))",
         "from boom_twin.cli.main import main; sys.exit(main(['play', 'never']))",
     ],

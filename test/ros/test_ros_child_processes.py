@@ -47,14 +47,14 @@ def loud(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_page_of_the_node(spawn: Callable[..., Any], trap: Trap, loud: None, tmp_path: Path) -> None:
-    node = spawn("start", "boom_twin.ros.main", "--ros-args", "-p", "monitor:=true")
+    node = spawn("start", "boom_twin.ros.node.main", "--ros-args", "-p", "monitor:=true")
     node.wait_for("open http")
     assert node.stop() == 0 and trap.sprung() == "", node.said()
     assert not (tmp_path / "overwritten").exists()
 
 
 def test_the_demonstration(spawn: Callable[..., Any], trap: Trap, loud: None, tmp_path: Path) -> None:
-    demo = spawn("start", "boom_twin.ros.demo", "--bag", "bag", "--duration", "1", "--out", "out")
+    demo = spawn("start", "boom_twin.ros.demo.demo", "--bag", "bag", "--duration", "1", "--out", "out")
     assert demo.end() == 0 and trap.sprung() == "", demo.said()
     assert (tmp_path / "received" / "out" / "recorded" / "metadata.yaml").is_file()
     assert not (tmp_path / "overwritten").exists()

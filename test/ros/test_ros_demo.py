@@ -15,18 +15,16 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from boom_twin.io.reader import scan
-from boom_twin.io.session import write_session
-from boom_twin.ros.company import Company
+from boom_twin.bag.reader import scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.ros.demo.processes import DemoProcesses
 from boom_twin.scene.load import default_text
 
 
 def test_a_short_demonstration(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo", "--bag", str(bag), "--duration", "2", "--out", str(tmp_path / "out"))
+    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(bag), "--duration", "2", "--out", str(tmp_path / "out"))
     assert demo.end() == 0, demo.said()
-    rows = dict(
-        line.split("  ", 1) for line in demo.said().splitlines() if line.startswith(("stroke", "pred", "equal"))
-    )
+    rows = dict(line.split("  ", 1) for line in demo.said().splitlines() if line.startswith(("stroke", "pred", "equal")))
     sent, arrived = int(rows["stroke samples sent"]), int(rows["predictions received"])
     assert 0.98 * sent < arrived <= sent == pytest.approx(400, abs=1)
     assert (tmp_path / "out" / "replay" / "tip.png").stat().st_size > 10_000
@@ -37,21 +35,19 @@ def test_no_output_is_a_failure(spawn: Callable[..., Any], motion: dict[str, Any
     """Strokes that no cylinder has give no prediction."""
     far = {**motion, "strokes": np.full_like(motion["strokes"], 50.0)}
     write_session(tmp_path / "far", **far, description={})
-    demo = spawn(
-        "boom_twin.ros.demo", "--bag", str(tmp_path / "far"), "--duration", "1", "--out", str(tmp_path / "out")
-    )
+    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(tmp_path / "far"), "--duration", "1", "--out", str(tmp_path / "out"))
     assert demo.end() == 1
     assert "the node published no prediction" in demo.said() and "Traceback" not in demo.said()
 
 
 def test_no_session_is_a_failure(spawn: Callable[..., Any], tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo", "--bag", str(tmp_path / "absent"), "--out", str(tmp_path / "out"))
+    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(tmp_path / "absent"), "--out", str(tmp_path / "out"))
     assert demo.end() == 1
     assert "absent" in demo.said() and "Traceback" not in demo.said()
 
 
 def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo = spawn("boom_twin.ros.demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
     demo.wait_for("in a browser")
     url = demo.said().split("open ")[1].split()[0]
     assert b"boom twin" in urlopen(url).read()
@@ -63,7 +59,7 @@ def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable
 
 
 def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo = spawn("boom_twin.ros.demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
     demo.wait_for("in a browser")
     children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
     monitor = next(int(pid) for pid in children if "monitor" in Path(f"/proc/{pid}/cmdline").read_text().split("\0"))
@@ -82,7 +78,7 @@ def test_nothing_of_earlier_demonstrations_is_written_over(tmp_path: Path) -> No
     for name in ("scene.yaml", "node.log", "recorder.log"):
         (tmp_path / name).write_text("mine")
     with open(os.devnull) as lock:
-        running = Company(tmp_path, default_text(), lock.fileno())
+        running = DemoProcesses(tmp_path, default_text(), lock.fileno())
         running.begin("a test")
         running.end()
     assert running.recorded == tmp_path / "recorded_4"

@@ -19,9 +19,9 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 
-from boom_twin.io.topics import load_topics
-from boom_twin.records import Stream
-from boom_twin.ros.peers import PeerBook
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.ros.node.diagnostics import GraphPeers
+from boom_twin.types import Stream
 
 OK, WARN, ERROR, STALE = b"\x00", b"\x01", b"\x02", b"\x03"
 NAMES = ["cylinder_1", "cylinder_2", "cylinder_3", "cylinder_4"]
@@ -148,7 +148,7 @@ def test_a_publisher_that_cannot_be_heard_is_named(domain: None) -> None:
     topics = topics.model_copy(update={"inputs": topics.inputs | {Stream.IMU: strict}})
     node, driver = rclpy.create_node("strict"), rclpy.create_node("driver")
     driver.create_publisher(Imu, "tip_imu", QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT))
-    book, end = PeerBook(node, topics), time.monotonic() + 30.0
+    book, end = GraphPeers(node, topics), time.monotonic() + 30.0
     while not book.publishers[Stream.IMU].incompatible and time.monotonic() < end:
         book.look()
         time.sleep(0.02)

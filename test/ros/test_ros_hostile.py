@@ -15,7 +15,7 @@ import rclpy
 from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
-from boom_twin.io.intake import stamp_of
+from boom_twin.messages.sample_decoder import stamp_of
 
 NAMES = [f"cylinder_{i}" for i in (1, 2, 3, 4)]
 NAN = float("nan")

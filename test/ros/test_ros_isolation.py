@@ -146,7 +146,7 @@ def test_a_demonstration_refuses_a_domain_in_use(
     demo: str, isolation: Isolation, bag: Path, spawn: Callable[..., Any], tmp_path: Path
 ) -> None:
     with rig_in(free := unclaimed(), tmp_path / "rig"):
-        process = spawn(f"boom_twin.ros.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
+        process = spawn(f"boom_twin.ros.demo.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
         assert process.end() == 1
     assert f"ROS domain {free} is in use" in process.said() and "Traceback" not in process.said()
     assert "/some_rig" in process.said() or "a node without a known name" in process.said()

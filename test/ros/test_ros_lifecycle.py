@@ -16,8 +16,8 @@ pytest.importorskip("rclpy")
 from lifecycle_msgs.msg import Transition
 from rcl_interfaces.srv import DescribeParameters
 
+from boom_twin.config.settings import Settings
 from boom_twin.scene.load import default_text
-from boom_twin.settings import Settings
 
 
 @pytest.fixture
@@ -102,9 +102,7 @@ def test_a_bad_scene_ends_the_node_with_its_fault(spawn_node: Callable[..., Any]
         (["--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
     ],
 )
-def test_a_bad_argument_ends_the_node_with_its_name(
-    spawn_node: Callable[..., Any], arguments: list[str], words: str
-) -> None:
+def test_a_bad_argument_ends_the_node_with_its_name(spawn_node: Callable[..., Any], arguments: list[str], words: str) -> None:
     node = spawn_node(*arguments)
     assert node.end() == 1
     assert words in node.said() and "Traceback" not in node.said()
@@ -128,9 +126,9 @@ def test_signals_end_the_node_in_order_at_any_time(
 
 STUCK = """
 import hashlib, sys
-from boom_twin.twin import Twin
+from boom_twin.twin.twin import Twin
 Twin.warm_up = lambda self: hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)
-from boom_twin.ros.main import main
+from boom_twin.ros.node.main import main
 sys.exit(main([]))
 """
 """A node whose preparation is one call into C that takes minutes, as compiling a large kernel takes seconds."""
@@ -163,7 +161,7 @@ def test_without_the_events_executor(
     spawn: Callable[..., Any], fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.getcwd()}")
-    lines = ["import sys, rclpy.experimental as e", fault, "from boom_twin.ros.main import main", "sys.exit(main([]))"]
+    lines = ["import sys, rclpy.experimental as e", fault, "from boom_twin.ros.node.main import main", "sys.exit(main([]))"]
     (tmp_path / "start_without.py").write_text("\n".join(lines))
     node = spawn("start_without")
     node.wait_for("the single-threaded executor goes on")

@@ -13,19 +13,18 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from boom_twin.bag.reader import read, scan
+from boom_twin.config.settings import load_settings
 from boom_twin.health.baseline import load_baseline
-from boom_twin.io.change_messages import decode_changes
-from boom_twin.io.changes import recorded_changes
-from boom_twin.io.intake import Intake, stamp_of
-from boom_twin.io.outlet import Outlet
-from boom_twin.io.reader import read, scan
-from boom_twin.io.topics import TYPES, Output, load_topics
-from boom_twin.io.typestore import jazzy
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.report_encoder import ReportEncoder, decode_changes
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.offline.reader_process import recorded_changes
 from boom_twin.offline.replay import replay
-from boom_twin.records import Stream
 from boom_twin.scene import load_scene
-from boom_twin.settings import load_settings
-from boom_twin.twin import Twin
+from boom_twin.twin.twin import Twin
+from boom_twin.types import Stream
 
 PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
 SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES]
@@ -43,12 +42,10 @@ Recorded = dict[str, list[tuple[int, bytes]]]
 
 
 @pytest.fixture(scope="module")
-def recorded(
-    spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, remote: Any, tmp_path_factory: Any
-) -> Path:
+def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, remote: Any, tmp_path_factory: Any) -> Path:
     """Inputs and outputs of a live run, recorded over DDS in a third process; much is asked of the node meanwhile."""
-    from boom_twin.ros.player import Player
-    from boom_twin.ros.recorder import COMPLETE
+    from boom_twin.ros.bag.player import Player
+    from boom_twin.ros.bag.recorder import COMPLETE
 
     out = tmp_path_factory.mktemp("live") / "bag"
     node = spawn_node("--params-file", str(PARAMETERS))
@@ -80,9 +77,7 @@ def outputs(recorded: Path) -> dict[Output, list[tuple[int, bytes]]]:
 
 
 def _encoded(session: Any, name: str, type_name: str) -> list[tuple[int, bytes]]:
-    return [
-        (_stamp(msg), bytes(jazzy().serialize_cdr(msg, type_name))) for _, _, msg in read(session, {name: type_name})
-    ]
+    return [(_stamp(msg), bytes(jazzy().serialize_cdr(msg, type_name))) for _, _, msg in read(session, {name: type_name})]
 
 
 def _stamp(msg: Any) -> int:
@@ -96,7 +91,7 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
     twin = Twin(scene, settings, baseline=load_baseline())
-    intake, outlet = Intake(twin.plan.joints), Outlet(scene, settings)
+    intake, outlet = SampleDecoder(twin.plan.joints), ReportEncoder(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     changes = recorded_changes(scan(recorded), load_topics())
     for name, log, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):

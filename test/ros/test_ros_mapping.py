@@ -20,10 +20,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 from boom_twin import load_scene, replay
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.reader import read_both, scan
-from boom_twin.io.topics import NODE, TYPES, Output
-from boom_twin.ros.recorder import COMPLETE
+from boom_twin.bag.reader import read_both, scan
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import NODE, TYPES, Output
+from boom_twin.ros.bag.recorder import COMPLETE
 
 MAPPING = """
 inputs:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.io.health import encode_health
-from boom_twin.io.topics import Output, load_topics
-from boom_twin.monitor.desk import AT_NODE, Desk
-from boom_twin.monitor.lamps import Level, overall
-from boom_twin.records import Alarm, Health, Ranked, Stream
+from boom_twin.messages.report_encoder import encode_health
+from boom_twin.messages.topic_table import Output, load_topics
+from boom_twin.monitor.actions import AT_NODE, ViewerActions
+from boom_twin.monitor.data.status import Level, overall
+from boom_twin.types import Alarm, Health, Ranked, Stream
 
 TOPICS = load_topics()
 EPOCH = 1_700_000_000
@@ -31,8 +31,7 @@ class Rig:
         import rclpy
         from rcl_interfaces.msg import Log
 
-        from boom_twin.ros.qos import qos_profile
-        from boom_twin.ros.types import message_class
+        from boom_twin.ros.runtime import message_class, qos_profile
 
         self.node, self.events = rclpy.create_node("beside"), []
         wanted: dict[Any, Any] = {**TOPICS.outputs, Stream.IMU: TOPICS.inputs[Stream.IMU]}
@@ -75,7 +74,7 @@ def until(feed: Any, condition: Callable[[], Any]) -> None:
 
 @pytest.fixture(scope="module")
 def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
-    from boom_twin.ros.monitor import TopicFeed
+    from boom_twin.ros.monitor_feed import TopicFeed
 
     feed, rig = TopicFeed(TOPICS), Rig()
     until(feed, rig.is_heard)
@@ -171,7 +170,7 @@ def test_only_with_permission_the_node_lets_go_and_only_of_what_ended(pair: tupl
         return response
 
     service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", let_go)
-    usual, permitted = Desk(feed, frozenset({"acknowledge"})), Desk(feed, frozenset({AT_NODE}))
+    usual, permitted = ViewerActions(feed, frozenset({"acknowledge"})), ViewerActions(feed, frozenset({AT_NODE}))
     request = {"do": "acknowledge", "number": judged(feed).number}
     assert usual.act(request)["words"] == permitted.act(request)["words"] == "acknowledged: joint_3"
     rig.send(Output.HEALTH, 80_000_000, partial(tell, END))

@@ -27,15 +27,15 @@ pytest.importorskip("playwright.sync_api", reason="playwright is not installed: 
 from aiohttp import ClientSession
 from playwright import sync_api
 
-from boom_twin.io.health import decode_health
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.reader import read, scan
-from boom_twin.io.topics import Output, load_topics
-from boom_twin.monitor.bag import bag_feed
-from boom_twin.monitor.lamps import LEVELS
-from boom_twin.records import Alarm
+from boom_twin.bag.reader import read, scan
+from boom_twin.config.settings import Settings
+from boom_twin.messages.report_encoder import decode_health
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import Output, load_topics
+from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.monitor.data.status import LEVELS
 from boom_twin.scene import load_scene
-from boom_twin.settings import Settings
+from boom_twin.types import Alarm
 
 CHROMIUM = Path("/usr/bin/chromium")
 pytestmark = [
@@ -62,8 +62,7 @@ class Witness:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        from boom_twin.ros.qos import qos_profile
-        from boom_twin.ros.types import message_class
+        from boom_twin.ros.runtime import message_class, qos_profile
 
         self.node, self.heard = rclpy.create_node("witness"), defaultdict(list)
         for role in HEARD:

@@ -21,14 +21,13 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from boom_twin.io.bagmeta import offered_qos
-from boom_twin.io.bagwriter import BagWriter
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.publishable import publishable
-from boom_twin.io.reader import scan
-from boom_twin.io.recorded import Recorded
-from boom_twin.io.topics import Qos
-from boom_twin.ros.player import Player
+from boom_twin.bag.advice import publishable
+from boom_twin.bag.metadata import Recorded, offered_qos
+from boom_twin.bag.reader import scan
+from boom_twin.bag.writer import BagWriter
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import Qos
+from boom_twin.ros.bag.player import Player
 
 
 def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path, motion: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from boom_twin.ros.receive_queue import ReceiveQueue
+from boom_twin.ros.node.receive_queue import ReceiveQueue
 
 MS = 1_000_000
 

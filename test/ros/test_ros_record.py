@@ -24,14 +24,14 @@ from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 
 from boom_twin import __version__
+from boom_twin.bag.inspect import inspect
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.recovery.recover import recover
 from boom_twin.errors import UsageError
-from boom_twin.io.info import inspect
-from boom_twin.io.reader import read, scan
-from boom_twin.io.recover import recover
-from boom_twin.io.typestore import jazzy
-from boom_twin.ros import definition
-from boom_twin.ros.recorder import COMPLETE
-from boom_twin.ros.wanted import wanted_of
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.ros.bag import subscriptions as definition
+from boom_twin.ros.bag.recorder import COMPLETE
+from boom_twin.ros.bag.subscriptions import wanted_of
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "boom_twin_recorder: recording"

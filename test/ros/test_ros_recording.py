@@ -24,16 +24,16 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from ruamel.yaml import YAML
 
-from boom_twin.io.intake import stamp_of
-from boom_twin.io.reader import read, read_both, scan
-from boom_twin.io.topics import TYPES, Output, load_topics
-from boom_twin.io.typestore import jazzy
-from boom_twin.io.writer import SessionWriter
+from boom_twin.bag.reader import read, read_both, scan
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.config.settings import Settings
+from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.offline.replay import replay
-from boom_twin.records import Stream
 from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text
-from boom_twin.settings import Settings
+from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
 CLIENT, MODULES = ROOT / "test" / "clients" / "read.cjs", ROOT / ".node"
@@ -50,8 +50,8 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
 
     The node's scene has a text of its own, which the recorder is not given.
     """
-    from boom_twin.ros.player import Player
-    from boom_twin.ros.recorder import COMPLETE
+    from boom_twin.ros.bag.player import Player
+    from boom_twin.ros.bag.recorder import COMPLETE
 
     out = tmp_path_factory.mktemp("recording") / "bag"
     scene = out.parent / "scene.yaml"

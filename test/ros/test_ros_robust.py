@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.io.intake import stamp_of
+from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.scene.kinematics import strokes_of_posture
 
 RATE = 200.0

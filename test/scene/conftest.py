@@ -12,8 +12,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from boom_twin.errors import Fault, SceneError
-from boom_twin.scene.end_mark import with_end_mark
 from boom_twin.scene.load import default_text, examine
+from boom_twin.scene.yaml_reader import with_end_mark
 
 Values = dict[str, Any]
 Edit = Callable[[Values], None]

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from boom_twin.scene import load_scene
-from boom_twin.scene.explain import explain
-from boom_twin.scene.splits import flexible_parts, splits
+from boom_twin.scene.segmentation import flexible_parts, splits
+from boom_twin.scene.summary import explain
 
 
 def test_masses_of_the_default_scene() -> None:

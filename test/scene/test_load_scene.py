@@ -29,9 +29,7 @@ def test_a_path_and_a_string_give_the_same_scene(bench: Any) -> None:
     assert load_scene(str(path)) == load_scene()
 
 
-@pytest.mark.parametrize(
-    ("text", "number"), [("2e11", 2e11), ("2E+11", 2e11), ("200_000_000_000", 2e11), ("+.5e12", 5e11)]
-)
+@pytest.mark.parametrize(("text", "number"), [("2e11", 2e11), ("2E+11", 2e11), ("200_000_000_000", 2e11), ("+.5e12", 5e11)])
 def test_every_spelling_of_a_number_is_a_number(bench: Any, text: str, number: float) -> None:
     path = bench.text(default_text().replace("E: 2.06e+11", f"E: {text}"))
     assert number == load_scene(path).material.E

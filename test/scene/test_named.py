@@ -6,7 +6,7 @@ import pytest
 
 from boom_twin import load_scene, statics
 from boom_twin.errors import UsageError
-from boom_twin.scene.named import parameter, parameter_names, with_parameters
+from boom_twin.scene.edit import parameter, parameter_names, with_parameters
 
 SCENE = load_scene()
 

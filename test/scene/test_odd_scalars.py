@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from boom_twin.config.yaml_text import plain
 from boom_twin.errors import SceneError
-from boom_twin.plain import plain
 from boom_twin.scene.load import default_text, examine
 
 NO_VALUES = [

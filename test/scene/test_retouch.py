@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ruamel.yaml import YAML
 
-from boom_twin.retouch import with_value
+from boom_twin.config.yaml_text import with_value
 
 TEXT = """# head
 tip: {payload: 1.0}   # kg

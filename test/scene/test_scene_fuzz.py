@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from boom_twin.errors import SceneError, SceneWarning
 from boom_twin.scene import Scene, load_scene
-from boom_twin.scene.explain import explain
+from boom_twin.scene.summary import explain
 
 Place = tuple[str | int, ...]
 SETTINGS = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

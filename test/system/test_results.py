@@ -16,10 +16,10 @@ from typing import Any
 
 import pytest
 
+from boom_twin.bag.session_sheet import incompleteness
 from boom_twin.errors import BagError, UsageError
-from boom_twin.io.atomic import check_target, write_atomic
-from boom_twin.io.incomplete import incompleteness
-from boom_twin.io.results import RECOVER, REPLAY, RIG, Kind, result_folder
+from boom_twin.system.atomic_files import check_target, write_atomic
+from boom_twin.system.result_folder import RECOVER, REPLAY, RIG, ResultKind, result_folder
 
 FILES = ("summary.json", "quantities.json", "bag/session_0.mcap")
 CHANGING = ("open", "mkdir", "rename", "replace", "unlink", "rmdir", "fsync", "pwrite", "truncate")
@@ -85,7 +85,7 @@ def test_a_kill_at_any_step_leaves_a_whole_result_or_one_that_says_it_is_not(tmp
     pytest.fail("it took more steps than were tried")
 
 
-def build(out: Path, kind: Kind = REPLAY, sources: tuple[Path, ...] = (), name: str = "summary.json") -> None:
+def build(out: Path, kind: ResultKind = REPLAY, sources: tuple[Path, ...] = (), name: str = "summary.json") -> None:
     with result_folder(out, kind, sources) as building:
         write_atomic(building.folder / name, "{}")
 

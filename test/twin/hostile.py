@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.rig.motion import Move, Programme
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.validation.rig.motion import Move, Programme
 
 MS = 1_000_000
 START = 1_700_000_000_000_000_000
@@ -66,8 +66,7 @@ PHASES: dict[str, Phase] = {
     "NaN": beside(lambda rng, s, true: [strokes(s.stamp + MS, np.where(rng.random(4) < 0.6, np.nan, s.values))]),
     "beyond reach": beside(lambda rng, s, true: [strokes(s.stamp + MS, s.values + rng.choice([-1e6, 5.0, 1e300]))], 0.3),
     "clock back and forth": lambda rng, true: [
-        strokes(s.stamp + 3600_000 * MS * (len(true) // 4 < k < 3 * len(true) // 4), s.values)
-        for k, s in enumerate(true)
+        strokes(s.stamp + 3600_000 * MS * (len(true) // 4 < k < 3 * len(true) // 4), s.values) for k, s in enumerate(true)
     ],
     "swapped order": swapped,
     "second source": second_source,

@@ -10,7 +10,7 @@ import pytest
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.errors import UsageError
-from boom_twin.load import loaded
+from boom_twin.scene.edit import loaded
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 RATE = 5_000_000  # ns

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
-from boom_twin.io.reader import read, scan
-from boom_twin.mounting import TURN
+from boom_twin.bag.reader import read, scan
+from boom_twin.estimation.sensor_model import TURN
 from boom_twin.scene.kinematics import strokes_of_posture
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"

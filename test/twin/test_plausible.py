@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.plausible import FAR, MOST, SILENT, Plausible
-from boom_twin.settings import Settings
+from boom_twin.config.settings import Settings
+from boom_twin.twin.stroke_check import FAR, MOST, SILENT, StrokeCheck
 
 MS, SETTINGS = 1_000_000, Settings()
 LIMIT = FAR * SETTINGS.stroke_variance**0.5 + SETTINGS.stroke_rate * 0.005
@@ -16,7 +16,7 @@ class Run:
     """Readings every 5 ms; the estimate is the last that was taken, as the model's own nearly is."""
 
     def __init__(self) -> None:
-        self.plausible, self.stamp = Plausible(), 0
+        self.plausible, self.stamp = StrokeCheck(), 0
         self.take(0.3, 0.4)
 
     def take(self, *values: float):

@@ -1,4 +1,4 @@
-"""The head of a chunk record, read so that one wrong field does not hide the content."""
+"""Parse the head of a damaged chunk record, so that one wrong field does not hide its content."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from .content import LARGEST, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
-from .damage import STUMBLES
+from ..integrity import STUMBLES
+from ..mcap_records import LARGEST, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
 
 _FIELDS = struct.Struct("<BQQQQII")
 _SIZE = struct.Struct("<Q")
@@ -160,9 +160,7 @@ def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str]]:
     yield from product(packed, known)
 
 
-def _unpacked(
-    file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int, budget: UnpackBudget
-) -> bytes:
+def _unpacked(file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int, budget: UnpackBudget) -> bytes:
     if packed > LARGEST:
         raise McapError(f"{packed} bytes: at most {LARGEST} are read")
     file.seek(head.offset + head.head)

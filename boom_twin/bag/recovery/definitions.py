@@ -1,4 +1,4 @@
-"""What a damaged file still says about its messages: topics, definitions, notes, counts."""
+"""Definitions found in a damaged file: topics, schemas, notes, counts."""
 
 from __future__ import annotations
 
@@ -12,19 +12,17 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
-from ..errors import BagError
-from ..received import open_received
-from .bagmeta import BagMetadata, offered_qos
-from .content import LARGEST, definition_of, parts
-from .ends import checksum_of, summary_start
-from .offered import profiles
-from .recorded import Recorded
-from .salvage import Piece, walk
-from .survey import NOTES, PROFILE
+from ...errors import BagError
+from ...system.received_files import open_received
+from ..integrity import checksum_of, summary_start
+from ..mcap_records import LARGEST, definition_of, parts
+from ..mcap_summary import NOTES, PROFILE
+from ..metadata import BagMetadata, Recorded, offered_qos, profiles
+from .scanner import SoundRecords, walk
 
 
 @dataclass(slots=True)
-class Legend:
+class FileDefinitions:
     """What one file says about its messages.
 
     Attributes
@@ -65,7 +63,7 @@ class Legend:
         )
 
 
-def legend_of(path: Path, unverified: bool = False) -> Legend:
+def legend_of(path: Path, unverified: bool = False) -> FileDefinitions:
     """Walk through a file once for everything but its messages.
 
     A definition counts if its chunk's or the summary's checksum fits, or if none is there to deny it; if `unverified`,
@@ -76,13 +74,13 @@ def legend_of(path: Path, unverified: bool = False) -> Legend:
     BagError
         The file is of another profile than ros2.
     """
-    legend = Legend()
-    loose = Legend()
+    legend = FileDefinitions()
+    loose = FileDefinitions()
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST, True
     for piece in walk(path, unverified):
-        if not isinstance(piece, Piece):
+        if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
         taker = legend if piece.vouched or is_in_summary else loose
@@ -114,7 +112,7 @@ def _check_profile(path: Path, body: bytes) -> None:
         raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
 
 
-def _note(legend: Legend, body: bytes) -> None:
+def _note(legend: FileDefinitions, body: bytes) -> None:
     record: Metadata = Metadata.read(ReadDataStream(BytesIO(body)))
     if record.name == NOTES:
         legend.notes |= record.metadata
@@ -129,7 +127,7 @@ def _is_summed(path: Path, offset: int, body: bytes) -> bool:
         return checksum_of(file, 0, offset) == told
 
 
-def _define(legend: Legend, opcode: int, body: bytes) -> None:
+def _define(legend: FileDefinitions, opcode: int, body: bytes) -> None:
     record = definition_of(opcode, body)
     if isinstance(record, Channel):
         legend.channels.setdefault(record.id, record)

@@ -1,33 +1,66 @@
-"""A new, sound session with all that can be saved of a damaged one, and a truthful count."""
+"""Recover a damaged session: write a new, sound one with all that can be saved, and a truthful count."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap.opcode import Opcode
 
-from ..errors import BagError
-from ..plain import LARGEST
-from ..received import holds_file, open_received
-from .atomic import write_atomic
-from .bagmeta import BagMetadata
-from .bagwriter import BagWriter
-from .blocks import heads
-from .content import message_of, parts
-from .damage import blame
-from .files import sources
-from .legend import Legend, legend_of
-from .outcome import Outcome
-from .reader import RECOVERED, scan
-from .recorded import Recorded
-from .results import RECOVER, result_folder
-from .salvage import Fault, walk
-from .sheet import sheet_path
+from ...config.yaml_text import LARGEST
+from ...errors import BagError
+from ...system.atomic_files import write_atomic
+from ...system.received_files import holds_file, open_received
+from ...system.result_folder import RECOVER, result_folder
+from ..integrity import blame
+from ..mcap_records import heads, message_of, parts
+from ..metadata import BagMetadata, Recorded
+from ..reader import RECOVERED, scan, sources
+from ..session_sheet import sheet_path
+from ..writer import BagWriter
+from .definitions import FileDefinitions, legend_of
+from .scanner import DamagedBytes, walk
+
+MOST_FAULTS = 1000
+"""Faults that are told one by one."""
 
 
-def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
+@dataclass(slots=True)
+class Recovery:
+    """What a rescue brought.
+
+    Attributes
+    ----------
+    saved : Counter
+        Messages by topic, counted in the new session after it was written.
+    unvouched : Counter
+        Those of them that were under no checksum.
+    lost : dict of str to int, or None
+        By topic; None where no sound count of the source says how many there were.
+    nameless : int
+        Sound messages that were left out, because the definition of their topic is lost.
+    faults : list of (Path, Fault)
+        The first `MOST_FAULTS`.
+    fault_count : int
+    """
+
+    saved: Counter[str] = field(default_factory=Counter)
+    unvouched: Counter[str] = field(default_factory=Counter)
+    lost: dict[str, int] | None = None
+    nameless: int = 0
+    faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)
+    fault_count: int = 0
+
+    def note(self, path: Path, fault: DamagedBytes) -> None:
+        """Count a fault; the first ones are kept."""
+        self.fault_count += 1
+        if len(self.faults) < MOST_FAULTS:
+            self.faults.append((path, fault))
+
+
+def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
     """Write what can be saved of the session at `path` into the new directory `out`, or nothing; `path` is only read.
 
     Parameters
@@ -45,13 +78,13 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Outcome:
         return _recover(path, building.folder, unverified)
 
 
-def _recover(path: Path, out: Path, unverified: bool) -> Outcome:
+def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     files, metadata = sources(path)
     legends = []
     for file in files:
         with blame(file):
             legends.append(legend_of(file, unverified))
-    outcome = Outcome()
+    outcome = Recovery()
     notes = {key: value for legend in legends for key, value in legend.notes.items()}
     notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
     bag = BagWriter(out, {**notes, RECOVERED: path.name}, distro=metadata.ros_distro if metadata else "")
@@ -76,17 +109,17 @@ def _recover(path: Path, out: Path, unverified: bool) -> Outcome:
 
 def _copy(
     file: Path,
-    legend: Legend,
+    legend: FileDefinitions,
     bag: BagWriter,
     keys: dict[tuple[str, str, bytes], int],
-    outcome: Outcome,
+    outcome: Recovery,
     metadata: BagMetadata | None,
     unverified: bool,
 ) -> None:
     """Copy the messages of one file."""
     own: dict[int, int] = {}
     for piece in walk(file, unverified, legend.channels):
-        if isinstance(piece, Fault):
+        if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
             continue
         for opcode, body in parts(piece.content):
@@ -131,7 +164,7 @@ def _count(out: Path) -> Counter[str]:
 
 
 def _lost(
-    saved: Mapping[str, int], legends: list[Legend], metadata: BagMetadata | None, files: list[Path]
+    saved: Mapping[str, int], legends: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
 ) -> dict[str, int] | None:
     """What is missing of the source's own count, if there is a sound one that can be true."""
     for told in _counts_told(legends, metadata, files):
@@ -140,7 +173,7 @@ def _lost(
     return None
 
 
-def _counts_told(legends: list[Legend], metadata: BagMetadata | None, files: list[Path]) -> Iterator[Counter[str]]:
+def _counts_told(legends: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]) -> Iterator[Counter[str]]:
     """The counts by the files' summaries, if all have one; by the metadata, if it knows of all files."""
     counts = [legend.told for legend in legends]
     if None not in counts:
@@ -152,7 +185,7 @@ def _counts_told(legends: list[Legend], metadata: BagMetadata | None, files: lis
         yield told
 
 
-def _first(outcome: Outcome) -> str:
+def _first(outcome: Recovery) -> str:
     if outcome.faults:
         path, fault = outcome.faults[0]
         return f"{path.name}, byte {fault.offset}: {fault.reason}"

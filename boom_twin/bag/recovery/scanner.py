@@ -1,4 +1,4 @@
-"""Walks a damaged .mcap file from front to back: what is sound in it, and what is not."""
+"""Scan a damaged .mcap file from front to back for sound records."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from ..received import open_received
-from .chunkhead import ChunkHead, UnsoundError, head_at, loose_start, sound_content
-from .content import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, whole_parts
-from .damage import STUMBLES
-from .ends import BLOCK
+from ...system.received_files import open_received
+from ..integrity import BLOCK, STUMBLES
+from ..mcap_records import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, whole_parts
+from .chunk_head import ChunkHead, UnsoundError, head_at, loose_start, sound_content
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""
@@ -41,7 +40,7 @@ _READERS: dict[int, Callable[[ReadDataStream], kinds.McapRecord]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class SoundRecords:
     """Whole records, one behind the other. `vouched` says whether the checksum of their chunk fits."""
 
     offset: int
@@ -50,7 +49,7 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class DamagedBytes:
     """Bytes that cannot be used, and why."""
 
     offset: int
@@ -58,7 +57,7 @@ class Fault:
     reason: str
 
 
-def walk(path: Path, unverified: bool = False, channels: Container[int] | None = None) -> Iterator[Piece | Fault]:
+def walk(path: Path, unverified: bool = False, channels: Container[int] | None = None) -> Iterator[SoundRecords | DamagedBytes]:
     """All of a file in order; one chunk in memory at a time.
 
     Parameters
@@ -73,25 +72,25 @@ def walk(path: Path, unverified: bool = False, channels: Container[int] | None =
     with open_received(path) as file:
         offset = len(MCAP0_MAGIC)
         if file.read(offset) != MCAP0_MAGIC:
-            yield Fault(0, min(offset, size), "it does not begin as an MCAP file")
+            yield DamagedBytes(0, min(offset, size), "it does not begin as an MCAP file")
         while offset < size - len(MCAP0_MAGIC) or (offset < size and not _ends(file, offset)):
             pieces, after = _next(file, offset, size, unverified, budget)
             if after is None:
                 after = _behind(file, offset + 1, size, channels or ())
-                if not any(isinstance(piece, Fault) for piece in pieces):
-                    pieces = [*pieces, Fault(offset, after - offset, "no record that is whole begins here")]
+                if not any(isinstance(piece, DamagedBytes) for piece in pieces):
+                    pieces = [*pieces, DamagedBytes(offset, after - offset, "no record that is whole begins here")]
             yield from pieces
             offset = after
 
 
 def _next(
     file: BinaryIO, offset: int, size: int, unverified: bool, budget: UnpackBudget
-) -> tuple[list[Piece | Fault], int | None]:
+) -> tuple[list[SoundRecords | DamagedBytes], int | None]:
     """What begins at `offset`, and where the next record begins; None where that is not known."""
     head = head_at(file, offset)
     if head is None:
         record = _whole_record(file, offset, size)
-        return ([Piece(offset, False, record)], offset + len(record)) if record else ([], None)
+        return ([SoundRecords(offset, False, record)], offset + len(record)) if record else ([], None)
     if head.is_certain and head.after > size:
         reason = f"cut off, {size - offset} of {head.after - offset} bytes are there"
         start = b""
@@ -103,7 +102,7 @@ def _next(
         return _broken(head, size - offset, reason, start), size
     try:
         content, after = sound_content(file, head, size, budget)
-        return [Piece(offset, head.crc != 0, content)], after
+        return [SoundRecords(offset, head.crc != 0, content)], after
     except UnsoundError as error:
         if not head.is_certain:
             return [], None
@@ -111,10 +110,10 @@ def _next(
         return _broken(head, head.after - offset, str(error), start), head.after
 
 
-def _broken(head: ChunkHead, length: int, reason: str, start: bytes) -> list[Piece | Fault]:
+def _broken(head: ChunkHead, length: int, reason: str, start: bytes) -> list[SoundRecords | DamagedBytes]:
     """A chunk that is not sound, behind the whole records at its start."""
-    fault = Fault(head.offset, length, f"{head}: {reason}")
-    return [Piece(head.offset, False, start), fault] if start else [fault]
+    fault = DamagedBytes(head.offset, length, f"{head}: {reason}")
+    return [SoundRecords(head.offset, False, start), fault] if start else [fault]
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:

@@ -1,4 +1,4 @@
-"""What may be wrong with a boom and its sensors, as parameters of linear signatures in the residuals.
+"""The fault catalogue: what may be wrong with a boom and its sensors, as parameters of linear signatures.
 
 A parameter is 0 where the scene and the mapping are right. Stiffnesses are taken by their compliance, in which residuals are
 nearly linear: a parameter of 0.25 of ``cylinder_2.k`` is an oil spring 1.25 times as compliant as the scene's.
@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..records import Array
-from ..scene.named import parameter, parameter_names
-from ..scene.parts import Scene
+from ...scene.edit import parameter, parameter_names
+from ...scene.schema import Scene
+from ...types import Array
 
 
 class Form(Enum):
@@ -110,7 +110,7 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
 
 
 def step_of(each: Parameter, scene: Scene) -> tuple[float, dict[str, float]]:
-    """A small value of a parameter of the scene, and what the scene then has; see `boom_twin.scene.named`."""
+    """A small value of a parameter of the scene, and what the scene then has; see `boom_twin.scene.edit`."""
     value = parameter(scene, each.cause)
     if each.unit == "":
         share = 0.01

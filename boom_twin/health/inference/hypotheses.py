@@ -1,13 +1,14 @@
-"""The bank of hypotheses: how well each fault explains what was measured since it began, and how large it then is.
+"""Hypothesis test of faults: how well each explains what was measured, how large it is, and Bayesian regression of what is
+healthy.
 
 Innovations are linear in the parameters, so all that they say is an information matrix L and a vector l. With the healthy
 deviations of all parameters (mean m, covariance P) integrated out,
 
-    L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
+L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
 
 a fault with prior N(0, F) in one parameter f is more probable than none by the factor
 
-    ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
+ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
 
 and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay,
 Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with
@@ -23,8 +24,8 @@ from math import log
 import numpy as np
 from scipy.special import log_ndtr
 
-from ..records import Array
-from .parameters import Form, Parameter, variances
+from ...types import Array
+from .fault_catalogue import Form, Parameter, variances
 
 UNKNOWN, UNKNOWN_PRIOR = "unknown", 0.01
 SLOWEST = 6.0  # s
@@ -144,7 +145,7 @@ class Verdict:
         return self.best.log_factor / self.excess
 
 
-class Bank:
+class HypothesisTest:
     """Explains evidence.
 
     Parameters
@@ -200,3 +201,64 @@ class Bank:
         if each.place is None:
             return healthy.unknown - healthy.log
         return float(each.value * (healthy.vector[each.place] - 0.5 * each.value * healthy.matrix[each.place, each.place]))
+
+
+GATE = 4.5  # deviations
+STRAYED = 5.0  # deviations of the prior
+LEAST = 1e-3  # of the prior's variance, what must have been learnt for that
+
+
+class Regression:
+    """Parameters that are constant in time, normal before anything is measured; what is measured narrows them.
+
+    Mean and covariance are never changed, but replaced: what was known at a time may be kept.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (parameters,)
+    covariance : ndarray, shape (parameters, parameters)
+        Of healthy parameters.
+    """
+
+    def __init__(self, mean: Array, covariance: Array) -> None:
+        self._prior = mean, covariance
+        self.restart()
+
+    def restart(self) -> None:
+        """Know no more than before anything was measured."""
+        self.mean, self.covariance = self._prior
+
+    @property
+    def has_strayed(self) -> bool:
+        """Whether what was learnt bit by bit is, all together, more than healthy parameters may be off by."""
+        mean, covariance = self._prior
+        learnt = np.diag(covariance) - np.diag(self.covariance)
+        return bool(np.any((self.mean - mean) ** 2 > STRAYED**2 * np.maximum(learnt, LEAST * np.diag(covariance))))
+
+    def take(self, white: Array, learn: bool) -> tuple[Array, float]:
+        """Narrow by whitened innovations, shape (rows, 1 + parameters), what is known.
+
+        Parameters
+        ----------
+        white : ndarray
+            Of one block.
+        learn : bool
+            False leaves everything as it is. A block with something left beyond `GATE`, which no healthy deviation explains, is
+            never learnt from.
+
+        Returns
+        -------
+        left : ndarray, shape (rows,)
+            What is left, of unit variance each.
+        spread : float
+            Logarithm of the deviations that it had, in all.
+        """
+        signature = white[:, 1:]
+        gain = signature @ self.covariance
+        root = np.linalg.cholesky(gain @ signature.T + np.eye(len(white)))
+        step = np.linalg.solve(root, np.column_stack([white[:, 0] - signature @ self.mean, gain]))
+        left = step[:, 0]
+        if learn and np.abs(left).max() < GATE:
+            self.mean = self.mean + step[:, 1:].T @ left
+            self.covariance = self.covariance - step[:, 1:].T @ step[:, 1:]
+        return left, float(np.log(np.diag(root)).sum())

@@ -1,10 +1,10 @@
-"""The whitening filter: residuals less the vibration and the slow errors that a good model still leaves in them.
+"""Kalman filter that whitens residuals: takes out the vibration and the slow errors that a good model still leaves.
 
 Two kinds of deviation are no fault. What strokes' noise shakes out of the natural modes, and what a model leaves of a
 vibration whose frequency it has a little wrong: per mode a coordinate eta with eta'' + 2 zeta omega eta' + omega^2 eta = w;
 w is white, of the density that
 
-- gives eta the variance that stroke noise collects in the mode (see `boom_twin.analysis.noise`), and
+- gives eta the variance that stroke noise collects in the mode (see `boom_twin.analysis.modal`), and
 - lets a vibration of the predicted size lose step with the real one as if its frequency were wrong by the share `detuning`
   within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
 
@@ -26,12 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.frequencies import Mode, along
-from ..analysis.noise import StrokeNoise
-from ..chain.program import State, Work
-from ..plan.plan import Plan
-from ..records import Array
-from .reading import Reading
+from ...analysis.modal import Mode, StrokeNoise, along
+from ...compiler.plan import Plan
+from ...estimation.sensor_model import Reading
+from ...kernels.tables import State, Work
+from ...types import Array
 
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
@@ -41,7 +40,7 @@ REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
 
 
-class Modes(NamedTuple):
+class ModalStates(NamedTuple):
     """Of one posture: c channels, m modes below `HIGHEST`.
 
     Attributes
@@ -69,8 +68,8 @@ class Modes(NamedTuple):
 
 
 def modes_of(
-    noise: StrokeNoise, plan: Plan, state: State, work: Work, reading: Reading, block: float, before: Modes | None
-) -> Modes:
+    noise: StrokeNoise, plan: Plan, state: State, work: Work, reading: Reading, block: float, before: ModalStates | None
+) -> ModalStates:
     """The modes of a posture, where the boom is at rest in `state`, for blocks of `block` s; of the signs of those `before`."""
     kept = [j for j, mode in enumerate(noise.modes) if mode.frequency < HIGHEST]
     size, n, tip, h = len(kept), plan.joints, plan.tables.tip, block
@@ -87,7 +86,7 @@ def modes_of(
         if before is not None and 2 * k < before.shown.shape[1] and shown[:, 2 * k] @ before.shown[:, 2 * k] < 0.0:
             shown[:, 2 * k] *= -1.0
         shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
-    return Modes(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown, shaken)
+    return ModalStates(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown, shaken)
 
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
@@ -128,7 +127,7 @@ class Innovations(NamedTuple):
     log: float
 
 
-class Whitening:
+class InnovationFilter:
     """Filters several columns at once: column 0 the residuals, the others signatures.
 
     Parameters
@@ -144,9 +143,9 @@ class Whitening:
         self._block, self._detuning2, self._channels = block, detuning**2, channels
         self._x, self._p = np.zeros((channels, columns)), np.zeros((channels, channels))
         self._fresh, self._size = True, 0
-        self._posture: Modes | None = None
+        self._posture: ModalStates | None = None
 
-    def tune(self, modes: Modes) -> None:
+    def tune(self, modes: ModalStates) -> None:
         """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
         if modes is self._posture:
             return

@@ -1,4 +1,4 @@
-"""How every parameter shows in the residuals, at the present posture and load: derivatives of the boom's equilibrium."""
+"""Sensitivities of the residuals to every parameter, at the present posture and load."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.statics import settle
-from ..chain.program import State, Work
-from ..chain.status import OK
-from ..chain.step import advance
-from ..errors import BoomTwinError
-from ..mounting import Mounting
-from ..physics.integrators import REST, X, prepare
-from ..plan.compile import compile_scene
-from ..plan.plan import Plan
-from ..records import Array, Mount
-from ..scene.kinematics import joint_angles_of_strokes
-from ..scene.named import with_parameters
-from ..scene.parts import Scene
-from .parameters import Form, Parameter, step_of
-from .reading import Reading
+from ...analysis.equilibrium import settle
+from ...compiler.compile import compile_scene
+from ...compiler.plan import Plan
+from ...errors import BoomTwinError
+from ...estimation.sensor_model import Mounting, Reading
+from ...kernels.integrators import REST, X, prepare
+from ...kernels.tables import OK, State, Work
+from ...kernels.transfer.time_step import advance
+from ...scene.edit import with_parameters
+from ...scene.kinematics import joint_angles_of_strokes
+from ...scene.schema import Scene
+from ...types import Array, Mount
+from .fault_catalogue import Form, Parameter, step_of
 
 STROKE_STEP = 1e-5  # m
 TOLERANCE, PASSES, LONGEST = 1e-7, np.int64(12), 0.1  # of a pass, rad

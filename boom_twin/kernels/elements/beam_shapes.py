@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..records import Array
+from ...types import Array
 
 
 class Basis(NamedTuple):

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from .jit import inner
+from ..jit import inner
 
 BARREL, ROD = 0, 1
 
@@ -69,7 +69,7 @@ def place_cylinder(row, parts, cx, cy, rx, ry, position):
 def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion, gravity, position, g, h):
     """Gradient g, shape (5,), and tangent h, shape (5, 5), over (x_C, y_C, x_R, y_R, N).
 
-    `motion` holds A, C, x_hat and D (see `boom_twin.chain.program.Motion`); `drive`, `drive_rate` are l_ref, l_ref'.
+    `motion` holds A, C, x_hat and D (see `boom_twin.kernels.tables.Motion`); `drive`, `drive_rate` are l_ref, l_ref'.
     """
     dx, dy = rx - cx, ry - cy
     length = math.hypot(dx, dy)

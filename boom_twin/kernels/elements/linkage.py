@@ -20,8 +20,8 @@ import math
 
 import numpy as np
 
-from .jit import inner
-from .rotation import turned
+from ..jit import inner
+from ..plane_algebra import turned
 
 DIRECT, LINK_L, LINK_R = 0, 1, 2
 

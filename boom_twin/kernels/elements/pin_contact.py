@@ -7,7 +7,7 @@ The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^
 
 c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
 radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
-K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.notation`); the laws differ
+K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.scene.notation`); the laws differ
 in chi, a function of the coefficient of restitution each. The bracket is kept above `LEAST_SHARE`: nothing pulls, and a
 journal without mass, which leaves as fast as it likes, is still held somewhere. With g' in the bracket the rebound does not
 depend on how d is smoothed. The elastic part is convex in delta: at rest a pin has one place.
@@ -27,7 +27,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .jit import inner
+from ..jit import inner
 
 SMOOTH = 1e-6  # m, over which contact sets in
 NEAR = 4.0 * SMOOTH  # m, width of the gap at which journal and bush count as touching

@@ -7,7 +7,7 @@ Body vector b turned by the orientation theta is (X, Y). With r_O = r_I + (X, Y)
 
 from __future__ import annotations
 
-from .jit import inner
+from ..jit import inner
 
 
 @inner

@@ -1,17 +1,36 @@
-"""Pins with clearance in the sweeps: the journal's offset is an unknown more, condensed where its pin is.
+"""Pins with clearance in the sweeps: offsets of journals at cylinders, pivots and links, condensed where the pin is.
 
 The end of a cylinder stands off its pin by delta: R = R_pin + delta, C likewise. Its own system over (C, R, N) is written
 for the ends; delta and the pin's force are condensed there, and what goes on is a system over the pins. Pivots and link pins
-are unknowns of their joint (see `chain.substructure_a`, `chain.substructure_b`).
+are unknowns of their joint (see `kernels.transfer.slider_crank`, `kernels.transfer.six_bar`).
+
+The offset of a pin's journal moves all that hangs on it, as the head's pivot would. So its rows are those of the head's pivot
+as far as they come from these parts, which are therefore assembled in turn: link L, link R, section i.
 """
 
 from __future__ import annotations
 
 import math
 
-from ..physics.contact import BARREL, CLOSED, LEAST_GAP, LINK_R_PIN, NEAR, Q_PIN, ROD, SPRING, bearing, limited, remember
-from ..physics.integrators import A, V
-from ..physics.jit import inner
+import numpy as np
+
+from ..elements.pin_contact import (
+    BARREL,
+    CLOSED,
+    LEAST_GAP,
+    LINK_L_PIN,
+    LINK_R_PIN,
+    NEAR,
+    PIVOT,
+    Q_PIN,
+    ROD,
+    SPRING,
+    bearing,
+    limited,
+    remember,
+)
+from ..integrators import A, V
+from ..jit import inner
 
 ALLOWED = 1e-3  # of the clearance, or of the least one in K: error of a sub-step in an offset
 SIXTH = 1.0 / 6.0
@@ -149,7 +168,7 @@ def move_ends(t, work, cylinder, cx, cy, rx, ry, force):
 
 @inner
 def shorten(t, state, work):
-    """Limit the increments of all offsets, see `physics.contact.limited`."""
+    """Limit the increments of all offsets, see `kernels.elements.pin_contact.limited`."""
     for k in range(t.clearances.shape[0]):
         row = t.clearances[k]
         i, j = row.z, row.z + 1
@@ -206,3 +225,65 @@ def unstiffened(t, work, k, ax, ay):
     fy = (xy - hold[3]) * ax + (yy - hold[4]) * ay
     share = 1.0 / (xx * yy - xy * xy)
     return share * (yy * fx - xy * fy), share * (xx * fy - xy * fx)
+
+
+# places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
+HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
+INNER = np.int64(6)  # typed, because numba compiles once more for every literal
+
+
+@inner
+def keep_rows(apart, g, h, size):
+    """Keep force and tangent of the head's pivot, as assembled so far."""
+    for i in range(2):
+        apart[i, size] = g[i]
+        for j in range(size):
+            apart[i, j] = h[max(i, j), min(i, j)]
+
+
+@inner
+def take_rows(t, work, joint, place, size, g, h):
+    """Rows of the offset of pin `place`: those of the head's pivot less the kept ones, and the pin's own force."""
+    apart = work.apart
+    for k in range(joint.clearances):
+        row = joint.first_clearance + k
+        if t.clearances[row].place != place:
+            continue
+        at, hold = SIZE + 2 * k, work.hold[row]
+        for i in range(2):
+            g[at + i] += g[i] - apart[i, size] + hold[i]
+            for j in range(size):
+                value = h[max(i, j), min(i, j)] - apart[i, j]
+                if j < at:
+                    h[at + i, j] += value
+                elif j > at + 1:
+                    h[j, at + i] += value
+            for j in range(i + 1):
+                h[at + i, at + j] += h[i, j] - apart[i, j] + hold[2 + i + j]
+
+
+@inner
+def free_pins(t, state, work, joint, g, h):
+    """Closure of pin Q with all offsets, the force of pin Q's own, and friction in all four pins."""
+    lx, ly = state.z[joint.z + 3], state.z[joint.z + 4]
+    for k in range(joint.clearances):
+        row = joint.first_clearance + k
+        place, hold, at = t.clearances[row].place, work.hold[row], SIZE + 2 * k
+        sign = 1.0 if place in (LINK_L_PIN, Q_PIN) else -1.0
+        g[at] += sign * lx
+        g[at + 1] += sign * ly
+        dx, dy = state.z[t.clearances[row].z], state.z[t.clearances[row].z + 1]
+        g[LAMBDA] += sign * dx
+        g[LAMBDA + 1] += sign * dy
+        h[at, LAMBDA] += sign
+        h[at + 1, LAMBDA + 1] += sign
+        if place == Q_PIN:
+            for i in range(2):
+                g[at + i] += hold[i]
+                for j in range(i + 1):
+                    h[at + i, at + j] += hold[2 + i + j]
+        journal = SECTION if place == PIVOT else ALPHA_L if place == LINK_L_PIN else ALPHA_R
+        bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
+        g[journal] += hold[5]
+        g[bush] -= hold[5]
+        add_turning(hold, h, at, journal, bush)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from ..physics.beam import USUAL, Sizes, beam_shape, is_usual, place_beam
-from ..physics.contact import BARREL, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
-from ..physics.cylinder import near, place_cylinder
-from ..physics.integrators import X
-from ..physics.jit import inner, kernel
-from ..physics.linkage import LINK_L
-from ..physics.rotation import rotated
-from .clearance import offset_of, set_turn
-from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from ..elements.beam import USUAL, Sizes, beam_shape, is_usual, place_beam
+from ..elements.cylinder import near, place_cylinder
+from ..elements.linkage import LINK_L
+from ..elements.pin_contact import BARREL, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
+from ..integrators import X
+from ..jit import inner, kernel
+from ..plane_algebra import rotated
+from ..tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from .clearance_pins import offset_of, set_turn
 
 
 @inner

@@ -1,9 +1,9 @@
-"""The papers' own form: transfer matrices of the units multiplied from base to tip. It loses digits; kept to show where.
+"""Plain product of transfer matrices from base to tip, the papers' own form; kept to show where it loses digits.
 
 A unit is what lies between two cuts with nothing carried: one element, or a whole six-bar from its pin C on. Sweeping in
 through one unit from a cut whose force f_O = f_0 + df is left open, as three more slots that multiply its displacement, gives
 
-    f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f,
+f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f,
 
 and solved for the output the unit's transfer matrix, [de_O, f_O, 1] = U [de_I, f_I, 1]. The elements are those of the Riccati
 sweep; only the way they are combined differs. Their product maps the cut behind substructure A to the free tip, whose force
@@ -16,12 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..physics.algebra import solve
-from ..physics.jit import inner
-from ..records import Array
-from .program import JOINT_B, ROD_PIN, STATION, Tables
-from .status import DIGITS_LOST, OK, SINGULAR
-from .sweep import clear_cut, sweep_in, sweep_out
+from ...types import Array
+from ..jit import inner
+from ..plane_algebra import solve
+from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Tables
+from .riccati_sweep import clear_cut, sweep_in, sweep_out
 
 LOST = 1e-6  # force left at the free tip over the largest in the boom, at which a pass counts as lost
 THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)

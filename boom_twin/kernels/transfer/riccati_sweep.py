@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..physics.beam import USUAL, Sizes, is_usual, transfer_beam
-from ..physics.contact import BARREL
-from ..physics.jit import inner, kernel
-from ..physics.rigid import add_body, merge_outlet, pull_back
-from .clearance import move_ends, torque_of
-from .program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
-from .status import OK, SINGULAR
-from .substructure_a import close_base, join_rod
-from .substructure_b import close_loop, open_loop
+from ..elements.beam import USUAL, Sizes, is_usual, transfer_beam
+from ..elements.pin_contact import BARREL
+from ..elements.rigid_body import add_body, merge_outlet, pull_back
+from ..jit import inner, kernel
+from ..tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, OK, ROD_PIN, SINGULAR, STATION
+from .clearance_pins import move_ends, torque_of
+from .six_bar import close_loop, open_loop
+from .slider_crank import close_base, join_rod
 
 # The first operation; slots of a cut with nothing carried: x, y, theta. Typed, because numba compiles once more for literals.
 ROOT, FREE = np.int64(0), np.int64(3)

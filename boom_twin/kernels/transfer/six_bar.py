@@ -7,22 +7,36 @@ the place where C sits. With P the pivot, L the vector of link L from D to Q, an
     closure of pin Q:   (r_D + l_L u_L) - (r_E + l_R u_R) = 0, multiplied by lambda;
     rod pin:            R = r_base + along u + left n, on link L from D, or on link R from E.
 
-B1, B2, B3 differ in the numbers of the rod pin only (see `physics.linkage`).
+B1, B2, B3 differ in the numbers of the rod pin only (see `kernels.elements.linkage`).
 
-Pivots and link pins with clearance: `chain.loop_pins`.
+Pivots and link pins with clearance: `kernels.transfer.clearance_pins`.
 """
 
 from __future__ import annotations
 
-from ..physics.algebra import solve
-from ..physics.contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
-from ..physics.cylinder import cylinder_terms
-from ..physics.jit import inner
-from ..physics.linkage import LINK_L, LINK_R
-from ..physics.rotation import rotated
-from .clearance import condense_ends, move_ends, torque_of
-from .loop_pins import ALPHA_L, ALPHA_R, FORCE, HEAD, INNER, LAMBDA, PIN_C, SECTION, SIZE, free_pins, keep_rows, take_rows
-from .place import link_frame
+from ..elements.cylinder import cylinder_terms
+from ..elements.linkage import LINK_L, LINK_R
+from ..elements.pin_contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
+from ..jit import inner
+from ..plane_algebra import rotated, solve
+from .clearance_pins import (
+    ALPHA_L,
+    ALPHA_R,
+    FORCE,
+    HEAD,
+    INNER,
+    LAMBDA,
+    PIN_C,
+    SECTION,
+    SIZE,
+    condense_ends,
+    free_pins,
+    keep_rows,
+    move_ends,
+    take_rows,
+    torque_of,
+)
+from .forward_kinematics import link_frame
 
 
 @inner

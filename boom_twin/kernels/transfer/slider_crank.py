@@ -6,11 +6,11 @@ N are what is left to solve. The pivot does not move, or by the offset of its jo
 
 from __future__ import annotations
 
-from ..physics.algebra import solve
-from ..physics.contact import ROD
-from ..physics.cylinder import cylinder_terms
-from ..physics.jit import inner
-from .clearance import condense_ends, torque_of
+from ..elements.cylinder import cylinder_terms
+from ..elements.pin_contact import ROD
+from ..jit import inner
+from ..plane_algebra import solve
+from .clearance_pins import condense_ends, torque_of
 
 
 @inner

@@ -1,4 +1,4 @@
-"""One time step of the boom, and many in one call."""
+"""Time step of the boom: Newton passes of one step, many steps in one call, many booms in one call."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 
-from ..physics.contact import CLOSED, bearing
-from ..physics.integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
-from ..physics.jit import inner, kernel
-from .clearance import axis_of, coarseness, load_pins, note_contacts, shorten
-from .place import place
-from .plain import plain_pass
-from .program import JOINT_A, JOINT_B, Motion
-from .status import NOT_CONVERGED, NOT_FINITE, OK
-from .sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from ..elements.pin_contact import CLOSED, bearing
+from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
+from ..jit import inner, kernel
+from ..tables import JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Motion, State, Tables, Work
+from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
+from .forward_kinematics import place
+from .matrix_product import plain_pass
+from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 TICKS = np.int64(4096)  # of a step, the grid of its sub-steps
 MOST = np.int64(32)  # sub-steps that a step is divided into for their error; for passes that fail, down to SHORTEST
@@ -34,7 +33,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     Parameters
     ----------
     scheme : Scheme
-        See `physics.integrators`; the scheme of rest gives static equilibrium next to the history's positions.
+        See `kernels.integrators`; the scheme of rest gives static equilibrium next to the history's positions.
     tolerance : float
         Done once the largest increment (rad) is below it; convergence is quadratic, so the error left is about its square.
     passes : int
@@ -42,7 +41,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     longest : float
         Increments are shortened so that none exceeds this (rad).
     product : Product or None
-        None for the Riccati form; else room for the plain product of transfer matrices (see `chain.plain`).
+        None for the Riccati form; else room for the plain product of transfer matrices (see `kernels.transfer.matrix_product`).
 
     Returns
     -------
@@ -210,7 +209,7 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
     drives, rates : ndarray, shape (sum of counts, n)
         Drive lengths (m) and rates (m/s) at the end of every step, or where the scheme solves.
     family, parameter : int, float
-        See `physics.integrators.prepare`.
+        See `kernels.integrators.prepare`.
     product : Product or None
         See `advance`.
     out : ndarray, shape (rows, 2 n + 9 + 4 pins)
@@ -243,3 +242,45 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         observe(t, state, out[row])
         observe_pins(t, state, out[row], 2 * t.joints.shape[0] + 9)
     return OK, steps.shape[0], total, jolt, shake
+
+
+@inner
+def tables_of(b, i):
+    """Tables of boom `i` of a stack; they differ in numbers only, so `tip` is common."""
+    return Tables(
+        b.operations[i], b.joints[i], b.linkages[i], b.links[i], b.offsets[i], b.bodies[i], b.beams[i], b.psi[i], b.weights[i],
+        b.stiffness[i], b.point_mass[i], b.point_rotary[i], b.outlets[i], b.cylinders[i], b.parts[i], b.clearances[i],
+        b.gravity[i], b.moving[i], b.scale[i], b.tip,
+    )  # fmt: skip
+
+
+@inner
+def state_of(b, i):
+    """State of boom `i` of a stack."""
+    return State(b.z[i], b.history[i], b.frames[i], b.turns[i], b.pins[i], b.contacts[i], b.drives[i], b.pace[i])
+
+
+@inner
+def work_of(b, i):
+    """Work of boom `i` of a stack."""
+    return Work(
+        b.position[i], b.hat[i], b.offset[i], b.weights[i], b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
+        b.matrix[i], b.right[i], b.gains[i], b.free[i], b.block[i], b.blocks[i], b.ends[i], b.end_gains[i],
+        b.end_free[i], b.hold[i], b.apart[i], b.rho[i], b.drho[i], b.angles[i], b.turn[i], b.local[i], b.drive[i],
+        b.drive_rate[i], b.dz[i], b.cut[i],
+    )  # fmt: skip
+
+
+@kernel
+def run_each(tables, states, works, first, last, steps, counts, drives, rates, family, parameter, tolerance, passes, out, ends):
+    """`run` for booms `first` .. `last - 1` of a stack.
+
+    drives, rates : (booms, steps in all, n), m and m/s. out : (booms, rows, 2 n + 9 + 4 pins), see `run`.
+    ends : ndarray of int, shape (booms, 3): status, row, passes of each, see `run`.
+    """
+    for i in range(first, last):
+        status, row, total, _, _ = run(
+            tables_of(tables, i), state_of(states, i), work_of(works, i), steps, counts, drives[i], rates[i],
+            family, parameter, tolerance, passes, None, out[i],
+        )  # fmt: skip
+        ends[i, 0], ends[i, 1], ends[i, 2] = status, row, total

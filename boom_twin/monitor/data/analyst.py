@@ -1,19 +1,55 @@
-"""Spectrum and natural frequencies of what was just shown, worked out beside the server."""
+"""Analysis beside the server: spectrum and the model's natural frequencies for what was just shown."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import asdict
 from math import floor
 from typing import Any
 
 import numpy as np
 
+from ...analysis.equilibrium import settle
+from ...analysis.modal import natural_modes
+from ...compiler.compile import compile_scene
+from ...errors import BoomTwinError
+from ...scene.kinematics import joint_angles_of_strokes
+from ...scene.schema import Scene
+from ..protocol import SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .frames import SPECTROGRAM, SPECTRUM, pack
-from .modes import Modes
-from .spectrogram import STEP, spectrogram
-from .spectrum import SEGMENT, WINDOW, Spectrum, spectrum
+from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
+
+COUNT = 6
+WIDTH = 1e-4
+"""Relative accuracy of the frequencies."""
+MOVED = 0.005
+"""m of any stroke after which they are worked out anew."""
+
+
+class ModeList:
+    """Frequencies of one boom, worked out anew where it has moved."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._plan = scene, compile_scene(scene)
+        self._at: np.ndarray | None = None
+        self._found: list[float] = []
+
+    def at(self, strokes: Sequence[float]) -> list[float]:
+        """The lowest `COUNT` frequencies (Hz) about the equilibrium at `strokes` (m); none where there is no equilibrium."""
+        now = np.asarray(strokes, dtype=np.float64)
+        if self._at is None or np.max(np.abs(now - self._at)) > MOVED:
+            self._found, self._at = self._work_out(now), now
+        return self._found
+
+    def _work_out(self, strokes: np.ndarray) -> list[float]:
+        state, work = self._plan.state(), self._plan.work()
+        try:
+            settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
+        except BoomTwinError:
+            return []
+        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
+
 
 TABLE = "acceleration"
 MATCH = 0.2
@@ -30,7 +66,7 @@ class Analyst:
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self._modes: Modes | None = None
+        self._modes: ModeList | None = None
         self._turn = asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
         self._firsts: dict[int, tuple[float, float]] = {}
@@ -85,7 +121,7 @@ class Analyst:
         scene = self._feed.scene()
         if scene is None or len(strokes) != len(scene.joints):
             return []
-        self._modes = self._modes or Modes(scene)
+        self._modes = self._modes or ModeList(scene)
         return self._modes.at(strokes)
 
 

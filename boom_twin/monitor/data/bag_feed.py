@@ -1,4 +1,4 @@
-"""A recorded session: what its node published, or what a twin says to it now; read while it is shown."""
+"""Feed from a recorded session: what its node published, or what a twin says to it now."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ from time import perf_counter
 from types import SimpleNamespace
 from typing import Any
 
-from ..errors import BagError, BoomTwinError
-from ..health.baseline import Baseline
-from ..io.ahead import Ahead
-from ..io.boom_names import refuse_other_names
-from ..io.outlet import Outlet
-from ..io.reader import Session, read, scan
-from ..io.session_model import SessionScene, baseline_of, mapping_of
-from ..io.topics import NODE, Output, Topic, Topics
-from ..offline.replay import scene_for
-from ..records import Change, Sample, Stream
-from ..scene.parts import Scene
-from ..settings import Settings
-from ..thresholds import Thresholds
-from ..twin import Twin
-from ..watch.other_boom import OtherBoom
-from ..watch.peers import Peers
-from ..watch.sensors import sensors_of
-from ..watch.status import Status
-from ..watch.twin import TwinWatch
+from ...bag.joint_names import refuse_other_names
+from ...bag.reader import Session, read, scan
+from ...bag.session_model import SessionScene, baseline_of, mapping_of
+from ...config.settings import Settings, Thresholds
+from ...diagnostics.boom_mismatch import OtherBoom
+from ...diagnostics.levels import Status
+from ...diagnostics.sensor_status import sensors_of
+from ...diagnostics.topic_status import Peers
+from ...diagnostics.twin_status import TwinWatch
+from ...errors import BagError, BoomTwinError
+from ...health.baseline import Baseline
+from ...messages.report_encoder import ReportEncoder
+from ...messages.topic_table import NODE, Output, Topic, Topics
+from ...offline.reader_process import SampleReader
+from ...offline.replay import scene_for
+from ...scene.schema import Scene
+from ...twin.twin import Twin
+from ...types import Change, Sample, Stream
 from .feed import Feed
 from .store import Store
 
@@ -155,7 +154,7 @@ def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[s
 def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], joints: int, twin: _Twin) -> Generator[None]:
     """What a twin says now; one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
-    ahead = Ahead(session.path, topics, wanted, joints)
+    ahead = SampleReader(session.path, topics, wanted, joints)
     try:
         ahead.wait_ready()
         for sample in ahead:
@@ -175,7 +174,7 @@ class _Twin:
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self._twin, self._outlet = Twin(scene, settings, mounts, usual), Outlet(scene, settings)
+        self._twin, self._outlet = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if key in SHOWN}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)

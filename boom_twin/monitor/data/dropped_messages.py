@@ -1,4 +1,4 @@
-"""Messages that could not be used: how many of which topic, and why the last one."""
+"""Count messages that could not be used, by topic, and why the last one."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..printable import printable
+from ...system.terminal_text import printable
 
-LOG = logging.getLogger("boom_twin.monitor.dropped")
+LOG = logging.getLogger("boom_twin.monitor.data.dropped_messages")
 LONGEST = 200
 """Characters of a reason."""
 
@@ -20,7 +20,7 @@ class MalformedError(Exception):
 
 
 @dataclass(slots=True)
-class Loss:
+class TopicLoss:
     """Messages of one topic that were dropped: how many, and why the last one."""
 
     topic: str
@@ -28,18 +28,18 @@ class Loss:
     reason: str
 
 
-class Dropped:
+class DroppedMessages:
     """Counts messages that were dropped, and logs them.
 
-    Every one is handed to the log; how many lines of it are written is bounded there, see `boom_twin.monitor.log`.
+    Every one is handed to the log; how many lines of it are written is bounded there, see `boom_twin.monitor.log_limit`.
 
     Attributes
     ----------
-    by_topic : dict of str to Loss
+    by_topic : dict of str to TopicLoss
     """
 
     def __init__(self) -> None:
-        self.by_topic: dict[str, Loss] = {}
+        self.by_topic: dict[str, TopicLoss] = {}
 
     @contextmanager
     def guard(self, topic: str) -> Iterator[None]:
@@ -56,6 +56,6 @@ class Dropped:
         return [asdict(loss) for loss in sorted(self.by_topic.values(), key=lambda loss: -loss.count)]
 
     def _add(self, topic: str, reason: str) -> None:
-        loss = self.by_topic.setdefault(topic, Loss(topic, 0, ""))
+        loss = self.by_topic.setdefault(topic, TopicLoss(topic, 0, ""))
         loss.count, loss.reason = loss.count + 1, printable(reason[:LONGEST], keep="")
         LOG.getChild(topic).warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)

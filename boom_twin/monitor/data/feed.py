@@ -1,19 +1,19 @@
-"""Where the page's numbers come from."""
+"""Feeds of the live page: the interface of live and recorded sources, and a viewer's place in a recording."""
 
 from __future__ import annotations
 
-from ..io.topics import Topics
-from ..scene import load_scene
-from ..scene.load import DEFAULT_NAME
-from ..scene.parts import Scene
-from .catch import Catch
+from ...messages.topic_table import Topics
+from ...scene import load_scene
+from ...scene.load import DEFAULT_NAME
+from ...scene.schema import Scene
 from .store import Store
+from .topic_rows import TopicRows
 
 STROKE = "stroke_"
 
 
 class Feed:
-    """A store and what fills it; `boom_twin.monitor.bag` and `boom_twin.ros.monitor` have the two kinds.
+    """A store and what fills it; `boom_twin.monitor.data.bag_feed` and `boom_twin.ros.monitor_feed` have the two kinds.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Feed:
 
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
-        self.catch = Catch(store, topics)
+        self.catch = TopicRows(store, topics)
         self.trouble = ""
         self._scene = scene
 
@@ -72,3 +72,48 @@ class Feed:
         values = table.rows(row - 1, row)[1]
         places = [place for place, name in enumerate(table.columns) if name.startswith(STROKE)]
         return [float(values[0, place]) for place in places] if len(values) else []
+
+
+SLOWEST, FASTEST = 0.1, 10.0
+
+
+class Playback:
+    """A position that moves on at a speed, as long as it is not held, up to what has been read of the session.
+
+    Parameters
+    ----------
+    feed : Feed
+        Of a recorded session.
+
+    Attributes
+    ----------
+    position : float
+        s.
+    speed : float
+        Session time over real time.
+    is_held : bool
+    """
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+        self.position, self.speed, self.is_held = 0.0, 1.0, False
+
+    def advance(self, span: float) -> float:
+        """Move on by `span` (s) of real time; gives the position. It holds at the end."""
+        if not self.is_held:
+            self.seek(self.position + self.speed * span)
+            self.is_held = self.is_at_end
+        return self.position
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether nothing more can come."""
+        return self.position >= (self._feed.end or 0.0)
+
+    def pace(self, speed: float) -> None:
+        """Go on at that speed, or the nearest that there is."""
+        self.speed = min(max(speed, SLOWEST), FASTEST)
+
+    def seek(self, position: float) -> None:
+        """Go there, or to the nearest end of what has been read."""
+        self.position = min(max(position, 0.0), self._feed.store.newest, self._feed.end or 0.0)

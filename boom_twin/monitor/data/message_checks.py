@@ -1,4 +1,4 @@
-"""What must hold of a message before its numbers are rows; each check raises MalformedError with the reason."""
+"""Check a message before its numbers become rows, and count those that are dropped."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from math import isnan
 from typing import Any
 
-from ..io.intake import LATEST, LONGEST, stamp_of
-from ..printable import printable
-from .dropped import MalformedError
+from ...messages.sample_decoder import LATEST, LONGEST, stamp_of
+from ...system.terminal_text import printable
+from .dropped_messages import MalformedError
 
 LARGEST = 1e12
 """Largest magnitude of a number: none of the twin's, in SI units, comes near it."""

@@ -1,11 +1,11 @@
-"""Rows in the order of their stamps, whatever stamps come."""
+"""Sort rows by their stamps, whatever stamps come."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .dropped import MalformedError
+from .dropped_messages import MalformedError
 
 NANO = 1e-9
 BACK = 1_000_000_000
@@ -42,7 +42,7 @@ class Step:
     stray: str = ""
 
 
-class Order:
+class RowOrder:
     """Lets a row of a table through if its stamp is after that of the row before.
 
     A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both are

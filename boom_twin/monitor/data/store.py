@@ -1,4 +1,4 @@
-"""What the page can show: tables of numbers by time, and the state of the lamps."""
+"""Store of the live page: bounded tables of numbers by time, and the state of the status indicators."""
 
 from __future__ import annotations
 
@@ -6,10 +6,75 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from operator import itemgetter
 
-from .alarms import Alarms
-from .dropped import MalformedError
-from .lamps import Board
-from .table import Table
+import numpy as np
+from numpy.typing import NDArray
+
+from .dropped_messages import MalformedError
+from .status import Alarms, StatusTable
+
+FIRST = 1024
+"""Rows that there is room for at first."""
+Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
+
+
+class Table:
+    """Named columns and a time for every row; the oldest rows make room for new ones.
+
+    Memory is taken as rows come.
+
+    Parameters
+    ----------
+    name : str
+    columns : sequence of str
+        Their unit at the end: ``x_m``.
+    capacity : int
+        Rows that are kept.
+
+    Attributes
+    ----------
+    count : int
+        Rows that ever came; they are numbered from 0 on.
+    """
+
+    def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
+        self.name, self.columns, self.count = name, tuple(columns), 0
+        self._capacity = capacity
+        self._times = np.zeros(min(capacity, FIRST))
+        self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
+
+    @property
+    def first(self) -> int:
+        """Number of the oldest row that is kept."""
+        return max(0, self.count - len(self._times))
+
+    @property
+    def newest(self) -> float:
+        """Time of the newest row, s; minus infinity without one."""
+        return float(self._times[(self.count - 1) % len(self._times)]) if self.count else -np.inf
+
+    def append(self, time: float, values: Sequence[float]) -> None:
+        """Add a row: `time` (s), values (columns,)."""
+        if self.count == len(self._times) < self._capacity:
+            self._grow(min(2 * self.count, self._capacity))
+        place = self.count % len(self._times)
+        self._times[place], self._values[place] = time, values
+        self.count += 1
+
+    def _grow(self, size: int) -> None:
+        more = size - len(self._times)
+        self._times = np.pad(self._times, (0, more))
+        self._values = np.pad(self._values, ((0, more), (0, 0)))
+
+    def until(self, time: float) -> int:
+        """Number of the first row after `time` (s), the rows being in order."""
+        size = len(self._times)
+        return bisect_right(range(self.first, self.count), time, key=lambda row: self._times[row % size]) + self.first
+
+    def rows(self, first: int, end: int) -> Rows:
+        """Times (k,) and values (k, columns) of the rows from number `first` up to before `end`, as far as they are kept."""
+        places = np.arange(max(first, self.first), min(end, self.count)) % len(self._times)
+        return self._times[places], self._values[places]
+
 
 NANO = 1e-9
 MOST_BOARDS = 100_000
@@ -42,7 +107,7 @@ class Store:
         self.generation, self.epoch = 0, 0
         self.tables: dict[str, Table] = {}
         self.alarms = Alarms()
-        self._boards: list[tuple[float, Board]] = []
+        self._boards: list[tuple[float, StatusTable]] = []
 
     def clear(self) -> None:
         """Forget the numbers; the lamps stay as they are."""
@@ -74,7 +139,7 @@ class Store:
         """Newest time of all tables, s; 0 without any."""
         return max((table.newest for table in self.tables.values()), default=0.0)
 
-    def light(self, time: float, board: Board) -> None:
+    def light(self, time: float, board: StatusTable) -> None:
         """The lamps from `time` (s, as they count it) on."""
         if not self._keeps_boards:
             self._boards.clear()
@@ -83,10 +148,10 @@ class Store:
             del self._boards[: MOST_BOARDS // 2]
         self.alarms.follow(self.newest, board)
 
-    def board(self, time: float) -> Board:
+    def board(self, time: float) -> StatusTable:
         """The lamps as they were last told at `time` (s)."""
         place = bisect_right(self._boards, time, key=itemgetter(0)) if self._keeps_boards else len(self._boards)
-        return self._boards[place - 1][1] if place else Board()
+        return self._boards[place - 1][1] if place else StatusTable()
 
 
 def _difference(first: Sequence[str], columns: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""From messages of the twin's topics to rows of the tables, for live topics and recorded ones alike.
+"""Turn messages of the twin's topics into rows of the page's tables, for live and recorded topics alike.
 
 Nothing is known of who sent a message. Here, and nowhere after it, one that cannot be used is dropped and counted.
 """
@@ -11,15 +11,15 @@ from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from ..io.health import decode_health
-from ..io.intake import Intake, stamp_of
-from ..io.topics import Output, Topics
-from ..io.typestore import jazzy
-from ..records import Sample, Stream, channels_of
-from . import checks
-from .dropped import Dropped, MalformedError
-from .lamps import MOST_NODES, Level
-from .order import Order, Row
+from ...messages.cdr_encoder import jazzy
+from ...messages.report_encoder import decode_health
+from ...messages.sample_decoder import SampleDecoder, stamp_of
+from ...messages.topic_table import Output, Topics
+from ...types import Sample, Stream, channels_of
+from . import message_checks as checks
+from .dropped_messages import DroppedMessages, MalformedError
+from .row_order import Row, RowOrder
+from .status import MOST_NODES, Level
 from .store import Store
 
 Taker = Callable[[Any, float], None]
@@ -40,7 +40,7 @@ PLANE = ("x_m", "z_m")
 ACCELERATION = ("x_m_s2", "z_m_s2")
 
 
-class Catch:
+class TopicRows:
     """Puts messages into a store.
 
     =================  ==================================================================================================
@@ -59,13 +59,13 @@ class Catch:
     ----------
     names : frozenset of str
         Absolute names of the topics that it takes.
-    dropped : Dropped
+    dropped : DroppedMessages
         What could not be used.
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
-        self._store, self._intake, self._order = store, Intake(1, topics), Order()
-        self.dropped = Dropped()
+        self._store, self._intake, self._order = store, SampleDecoder(1, topics), RowOrder()
+        self.dropped = DroppedMessages()
         self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
         self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
         self._forces: list[float] = []

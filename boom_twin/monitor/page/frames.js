@@ -1,4 +1,4 @@
-// Binary messages as boom_twin/monitor/frames.py describes them.
+// Binary messages as boom_twin/monitor/protocol.py describes them.
 
 export const ROWS = 1, SPECTRUM = 2, SPECTROGRAM = 3;
 

@@ -1,4 +1,4 @@
-"""Publishes topics of a recorded session at the pace of its log times."""
+"""Play a recorded session: publish its topics at the pace of its log times, with ``/clock``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,24 @@ from typing import Any
 import rclpy
 from rclpy.publisher import Publisher
 
-from ..errors import BagError, BoomTwinError
-from ..io.publishable import publishable
-from ..io.reader import Session, read_both
-from .clock import CLOCK, CLOCK_TYPE, clock_message
-from .definition import installed_class
-from .peers import node_name
-from .qos import qos_profile
-from .types import message_class
+from ...bag.advice import publishable
+from ...bag.reader import Session, read_both
+from ...errors import BagError, BoomTwinError
+from ...messages.cdr_encoder import jazzy
+from ..node.diagnostics import node_name
+from ..runtime import message_class, qos_profile
+from .subscriptions import installed_class
+
+CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
+
+
+def clock_message(stamp: int) -> bytes:
+    """A message for ``/clock`` in CDR."""
+    types = jazzy().types
+    time_class, clock_class = types["builtin_interfaces/msg/Time"], types[CLOCK_TYPE]
+    now = time_class(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
+    return bytes(jazzy().serialize_cdr(clock_class(clock=now), CLOCK_TYPE))
+
 
 NAME = "boom_twin_player"
 LOOK = 0.05
@@ -64,8 +74,7 @@ class Player:
         kinds = {topic.name: installed_class(topic.type) for topic in topics}
         self._node = rclpy.create_node(NAME)
         self._publishers = {
-            topic.name: self._node.create_publisher(kinds[topic.name], topic.name, qos_profile(topic.qos))
-            for topic in topics
+            topic.name: self._node.create_publisher(kinds[topic.name], topic.name, qos_profile(topic.qos)) for topic in topics
         }
         self._clock: Publisher[Any] | None = None
         if clock_rate is not None:

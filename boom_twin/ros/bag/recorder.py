@@ -1,4 +1,4 @@
-"""Records topics as they come over DDS into a session bag, message bytes untouched."""
+"""Record topics over DDS into a session bag, message bytes untouched, with the parameters of the running twin."""
 
 from __future__ import annotations
 
@@ -10,15 +10,71 @@ from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+from std_srvs.srv import Trigger
 
-from ..errors import BagError, BoomTwinError
-from ..io.storage import Storage
-from ..io.topics import Output, load_topics
-from ..thresholds import Thresholds
-from ..watch.recording import RecordingJudge, TopicState
-from .board import Board
-from .remote import RemoteParameters, RemoteText
-from .wanted import Wanted, subscription_of
+from ...bag.async_writer import Storage
+from ...config.settings import Settings, Thresholds
+from ...diagnostics.recorder_status import RecordingJudge, TopicState
+from ...errors import BagError, BoomTwinError
+from ...messages.topic_table import NODE, Output, load_topics
+from ..node.diagnostics import DiagnosticsPublisher
+from .subscriptions import Wanted, subscription_of
+
+NAMES = ("scene", *Settings.model_fields)
+
+
+class RemoteParameters:
+    """Asks the node ``boom_twin`` once, as soon as it is there; `node` is the one that asks."""
+
+    def __init__(self, node: Node) -> None:
+        self._client = AsyncParameterClient(node, NODE)
+        self._answer: Future | None = None
+        self._is_told = False
+
+    def look(self) -> Mapping[str, object]:
+        """The values by name, once; empty at any other time. Never waits."""
+        if self._answer is None:
+            if self._client.services_are_ready():
+                self._answer = self._client.get_parameters(list(NAMES))
+            return {}
+        if self._is_told or not self._answer.done():
+            return {}
+        self._is_told = True
+        pairs = zip(NAMES, self._answer.result().values, strict=False)
+        return {name: value for name, each in pairs if (value := parameter_value_to_python(each)) is not None}
+
+
+class RemoteText:
+    """Asks the node ``boom_twin`` once, as soon as it is configured, for a text that its model was built from.
+
+    Parameters
+    ----------
+    node : Node
+        That asks.
+    name : str
+        Of the service: scene or baseline, see `boom_twin.ros.node.services.Services`.
+    """
+
+    def __init__(self, node: Node, name: str) -> None:
+        self._client = node.create_client(Trigger, f"{NODE}/{name}")
+        self._answer: Future | None = None
+        self._is_told = False
+
+    def look(self) -> str:
+        """The text, once; empty at any other time. Never waits."""
+        if self._answer is None:
+            if self._client.service_is_ready():
+                self._answer = self._client.call_async(Trigger.Request())
+            return ""
+        if self._is_told or not self._answer.done():
+            return ""
+        self._is_told = True
+        return str(self._answer.result().message)
+
 
 NAME = "boom_twin_recorder"
 WAKE = 0.1
@@ -103,7 +159,7 @@ class _Recording:
     def __init__(self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage) for each in wanted]
-        self._board, self._judge = Board(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self._board, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
         self._parameters = RemoteParameters(node)
         self._texts = {name: RemoteText(node, name) for name in TEXTS}
 
@@ -122,7 +178,7 @@ class _Recording:
         return {name: value for name, value in found.items() if value}
 
     def tell(self, end: str | None = None) -> None:
-        """Publish the state; `end` as for `boom_twin.watch.recording.RecordingJudge`."""
+        """Publish the state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * 1e-9
         disk = self.storage.state()

@@ -1,26 +1,44 @@
-"""What a recorded live run shows, in numbers."""
+"""The demonstration: a recorded session played over DDS into the live node, its outputs recorded and scored.
+
+Three processes: ``twin_node``, ``boom_twin record``, and this one, which plays. Run by ``make demo``. The bundled
+session is synthetic (virtual rig, surrogate parameters).
+"""
 
 from __future__ import annotations
 
+import sys
+import time
+from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
-from ..errors import BagError
-from ..io.intake import stamp_of
-from ..io.reader import Session, read, scan
-from ..io.topics import Output, Topic, load_topics
-from ..records import Array, Stream
-from ..truth import TipTruth, load_truth
+from ...bag.reader import Session, read, scan
+from ...bag.session_model import scene_of
+from ...errors import BagError, BoomTwinError
+from ...messages.sample_decoder import stamp_of
+from ...messages.topic_table import Output, Topic, load_topics
+from ...offline.ground_truth import FILE_NAME as TRUTH
+from ...offline.ground_truth import TipTruth, load_truth
+from ...offline.history import draw, history_of
+from ...offline.replay import Replay, replay_into
+from ...system.atomic_files import write_atomic
+from ...system.received_files import holds_file, open_received
+from ...system.result_folder import REPLAY, result_folder
+from ...types import Array, Stream
+from ..isolation import add_domain
+from ..startup import require_rclpy
+from .processes import DemoProcesses, company
 
 Positions = dict[int, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Scorecard:
+class DemoResult:
     """A live run.
 
     Attributes
@@ -63,7 +81,7 @@ class Scorecard:
         return [f"{name:22s}  {value}" for name, value in rows]
 
 
-def score(recorded: Path) -> Scorecard:
+def score(recorded: Path) -> DemoResult:
     """The numbers of one recorded run; with those against the truth, if the session's truth lies in the same folder.
 
     Raises
@@ -80,7 +98,7 @@ def score(recorded: Path) -> Scorecard:
     positions = {stamp_of(msg): (msg.point.x, msg.point.z) for _, msg in arrived}
     residuals = _messages(session, topics.outputs[Output.RESIDUALS])
     truth = load_truth(recorded)
-    return Scorecard(
+    return DemoResult(
         positions=positions,
         residual_sets=len(residuals),
         latency_ms=np.quantile(delays, [0.5, 0.99]) * 1e-6 if delays else np.full(2, np.nan),
@@ -113,3 +131,73 @@ def _residual_rms(residuals: list[Any]) -> dict[str, float]:
         for name, value in zip(msg.name, msg.position, strict=True):
             values.setdefault(name, []).append(value)
     return {name: float(np.sqrt(np.nanmean(np.square(column)))) for name, column in sorted(values.items())}
+
+
+SETTLE = 1.0
+"""Seconds for the last messages to arrive."""
+BAR = "playing {l_bar}{bar}| {n:.1f}/{total:.1f} s"
+
+
+def main() -> int:
+    """Run the demonstration; returns the exit code, 1 if no output arrived."""
+    args = _arguments()
+    try:
+        require_rclpy()
+        session = scan(args.bag)
+        about = session.notes.get("origin", "origin not noted")
+        taken = scene_of(args.bag)
+        with company(args.out, f"live run of: {about}", taken.text, args.domain) as running:
+            sent, recorded = _play(session, args.duration, running), running.recorded
+        if holds_file(args.bag / TRUTH):
+            with open_received(args.bag / TRUTH) as truth:
+                write_atomic(recorded / TRUTH, truth.read())
+        card = score(recorded)
+        with result_folder(args.out / "replay", REPLAY, [recorded]) as building:
+            again = replay_into(building, recorded, None)
+            pictures = [path.name for path in draw(again, history_of(again.recording, taken.scene), building.folder)]
+        print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
+        for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
+            print(path)
+        print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
+        return 0
+    except BoomTwinError as error:
+        print(f"demo: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("demo: stopped", file=sys.stderr)
+    return 1
+
+
+def _arguments() -> Namespace:
+    parser = ArgumentParser(prog="python -m boom_twin.ros.demo.demo", description="Play a session into the live twin.")
+    parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
+    parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
+    add_domain(parser)
+    return parser.parse_args()
+
+
+def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str, int]:
+    """Play, once all have found each other; gives the messages sent by topic."""
+    from ..bag.player import Player
+    from ..runtime import ros
+
+    with ros([]):
+        player = Player(session)
+        running.meet(player)
+        with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
+            for elapsed in running.play(player, duration):
+                bar.update(elapsed * 1e-9 - bar.n)
+        time.sleep(SETTLE)
+        running.check()
+        player.close()
+    return player.played.sent
+
+
+def _equal(card: DemoResult, again: Replay) -> int:
+    """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
+    replayed = {prediction.stamp: tuple(prediction.tip_position.tolist()) for prediction in again.recording.predictions}
+    return sum(replayed.get(stamp) == position for stamp, position in card.positions.items())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

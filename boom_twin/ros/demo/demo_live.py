@@ -12,12 +12,12 @@ import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ..errors import BoomTwinError
-from ..io.reader import scan
-from ..io.session_model import scene_of
-from .company import LOOK, Company, company
-from .isolation import add_domain
-from .require import require_rclpy
+from ...bag.reader import scan
+from ...bag.session_model import scene_of
+from ...errors import BoomTwinError
+from ..isolation import add_domain
+from ..startup import require_rclpy
+from .processes import LOOK, DemoProcesses, company
 
 
 def main() -> int:
@@ -36,7 +36,7 @@ def main() -> int:
 
 
 def _arguments() -> Namespace:
-    parser = ArgumentParser(prog="python -m boom_twin.ros.demo_live", description="Watch a played session live.")
+    parser = ArgumentParser(prog="python -m boom_twin.ros.demo.demo_live", description="Watch a played session live.")
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--out", type=Path, default=Path("out/demo_live"), help="folder for recording and logs")
     parser.add_argument("--port", help="of the page (8420, or any that is free if that is taken)")
@@ -44,10 +44,10 @@ def _arguments() -> Namespace:
     return parser.parse_args()
 
 
-def _play(args: Namespace, running: Company) -> None:
+def _play(args: Namespace, running: DemoProcesses) -> None:
     """Wait until all are there, tell where the page is, and play again and again; BoomTwinError as soon as one has ended."""
-    from .context import ros
-    from .player import Player
+    from ..bag.player import Player
+    from ..runtime import ros
 
     command = ["boom_twin.cli.main", "monitor", *(["--port", args.port] if args.port else [])]
     monitor = running.start("monitor", command, signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""The processes of a demonstration: the node, a recorder, and others, kept out of any other ROS 2 traffic."""
+"""Processes of a demonstration: node, recorder and player, isolated from other ROS 2 traffic."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..child_process import python_command
-from ..errors import BoomTwinError
-from .isolation import isolated
-from .stop import on_stop_signal
+from ...errors import BoomTwinError
+from ...system.child_process import python_command
+from ..isolation import isolated
+from ..startup import on_stop_signal
 
 if TYPE_CHECKING:
-    from .player import Player
+    from ..bag.player import Player
+
 
 PATIENCE = 300.0
 """Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
@@ -30,7 +31,7 @@ LISTENERS = 2
 """Of every input: node and recorder."""
 
 
-class Child:
+class DemoProcess:
     """A running module of this package whose words go into a log.
 
     Parameters
@@ -71,7 +72,7 @@ class Child:
             self._process.wait()
 
 
-class Company:
+class DemoProcesses:
     """Node, recorder, and whoever joins them.
 
     Parameters
@@ -91,7 +92,7 @@ class Company:
 
     def __init__(self, out: Path, scene: str, lock: int) -> None:
         self._scene, self._lock, self.recorded = scene, lock, _free(out / "recorded")
-        self._children: list[Child] = []
+        self._children: list[DemoProcess] = []
         self._is_asked_to_end = False
 
     def begin(self, origin: str) -> None:
@@ -99,13 +100,13 @@ class Company:
         scene = self._beside("scene.yaml")
         with scene.open("x", encoding="utf-8") as file:
             file.write(self._scene)
-        self.start("node", ["boom_twin.ros.main", "--ros-args", "-p", f"scene:={scene}"], signal.SIGTERM)
+        self.start("node", ["boom_twin.ros.node.main", "--ros-args", "-p", f"scene:={scene}"], signal.SIGTERM)
         record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin, "--scene", str(scene)]
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
-    def start(self, name: str, arguments: list[str], parting: signal.Signals) -> Child:
+    def start(self, name: str, arguments: list[str], parting: signal.Signals) -> DemoProcess:
         """Start one more."""
-        self._children.append(Child(arguments, self._beside(f"{name}.log"), parting, self._lock))
+        self._children.append(DemoProcess(arguments, self._beside(f"{name}.log"), parting, self._lock))
         return self._children[-1]
 
     def _beside(self, name: str) -> Path:
@@ -124,7 +125,7 @@ class Company:
         self._is_asked_to_end = True
 
     def play(self, player: Player, duration: float | None = None) -> Iterator[int]:
-        """Play as long as all of them run; as `boom_twin.ros.player.Player.play`."""
+        """Play as long as all of them run; as `boom_twin.ros.bag.player.Player.play`."""
 
         def is_held() -> bool:
             self.check()
@@ -134,7 +135,7 @@ class Company:
 
     def meet(self, player: Player) -> None:
         """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
-        from .recorder import COMPLETE
+        from ..bag.recorder import COMPLETE
 
         print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
         end = time.monotonic() + PATIENCE
@@ -163,7 +164,7 @@ def _free(folder: Path) -> Path:
 
 
 @contextmanager
-def company(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[Company]:
+def company(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[DemoProcesses]:
     """Node and recorder as long as this lasts, isolated; recordings of earlier runs stay.
 
     Parameters
@@ -182,10 +183,10 @@ def company(out: Path, origin: str, scene: str, domain: int | None = None) -> It
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise BoomTwinError(f"{error.filename}: {error.strerror}. Give another folder with --out.") from None
-        yield from _run(Company(out, scene, isolation.lock), origin)
+        yield from _run(DemoProcesses(out, scene, isolation.lock), origin)
 
 
-def _run(running: Company, origin: str) -> Iterator[Company]:
+def _run(running: DemoProcesses, origin: str) -> Iterator[DemoProcesses]:
     """Start, and end whatever happens."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     on_stop_signal(running.ask_to_end)

@@ -1,24 +1,143 @@
-"""State of the node on ``/diagnostics``, once a second and as soon as the model fails or an input falls silent."""
+"""Publish the node's state on ``/diagnostics``, log its changes, and look who is at the other ends of its topics."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
+from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
-from ..io.boom_names import told_beyond
-from ..io.intake import Intake
-from ..io.topics import Output, Topics
-from ..records import Report, Sample, Stream
-from ..thresholds import Thresholds
-from ..twin import EVENTS, TOLD_AT_ONCE, Twin
-from ..watch.sensors import sensors_of
-from ..watch.twin import TwinWatch
-from .board import Board
-from .peers import PeerBook
+from ...bag.joint_names import told_beyond
+from ...config.settings import Thresholds
+from ...diagnostics.levels import Level, Status
+from ...diagnostics.sensor_status import sensors_of
+from ...diagnostics.topic_status import Peers
+from ...diagnostics.twin_status import TwinWatch
+from ...messages.sample_decoder import SampleDecoder
+from ...messages.topic_table import Output, Topic, Topics
+from ...twin.twin import EVENTS, TOLD_AT_ONCE, Twin
+from ...types import Report, Sample, Stream
+from ..runtime import qos_profile
 from .receive_queue import ReceiveQueue
+
+
+class DiagnosticsPublisher:
+    """The states of one node.
+
+    Parameters
+    ----------
+    node : Node
+    topic : Topic
+        Where they are published.
+    """
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        self._node = node
+        self._name = node.get_fully_qualified_name().lstrip("/")
+        self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
+        self._levels: dict[str, Level] = {}
+
+    def show(self, statuses: Sequence[Status]) -> None:
+        """Publish all, and log in one line those whose level is another than before; a new one is taken to have been well."""
+        before, self._levels = self._levels, {status.name: status.level for status in statuses}
+        self._log([status for status in statuses if before.get(status.name, Level.OK) != status.level])
+        message = DiagnosticArray(status=[self._message(status) for status in statuses])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def settle(self) -> None:
+        """Wait until those that listen have got it, at most a second."""
+        self._publisher.wait_for_all_acked(Duration(seconds=1))
+
+    def _log(self, changed: Sequence[Status]) -> None:
+        """Names of the same state together: the sensors of a topic fall silent as one."""
+        groups: dict[str, list[str]] = {}
+        for status in changed:
+            groups.setdefault(status.message, []).append(status.name)
+        text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
+        if any(status.level != Level.OK for status in changed):
+            self._node.get_logger().warning(text)
+        elif changed:
+            self._node.get_logger().info(text)
+
+    def _message(self, status: Status) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            name=f"{self._name}: {status.name}",
+            level=bytes([status.level]),
+            message=status.message,
+            values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
+        )
+
+
+def _text(value: str | int | float) -> str:
+    """As a program reads it; nine digits of a float."""
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+class GraphPeers:
+    """The other ends of every topic of `node`, one topic looked up at a time.
+
+    Discovery is asked, and not only the events of incompatible QoS: those do not tell who it was, nor that it has gone.
+
+    Attributes
+    ----------
+    publishers : dict of Stream to Peers
+        Of the inputs.
+    subscribers : dict of Output to Peers
+        Of the outputs.
+    """
+
+    def __init__(self, node: Node, topics: Topics) -> None:
+        self._node = node
+        self.publishers = dict.fromkeys(topics.inputs, Peers())
+        self.subscribers = dict.fromkeys(topics.outputs, Peers())
+        entries: list[tuple[Stream | Output, Topic]] = [*topics.inputs.items(), *topics.outputs.items()]
+        self._entries = cycle([(key, topic.name, _as_discovered(qos_profile(topic.qos))) for key, topic in entries])
+
+    def look(self) -> None:
+        """Look up the next topic."""
+        key, name, own = next(self._entries)
+        address = self._node.resolve_topic_name(name)
+        if isinstance(key, Stream):
+            ends = self._node.get_publishers_info_by_topic(address)
+            self.publishers[key] = _peers(address, [(end, end.qos_profile, own) for end in ends])
+        else:
+            ends = self._node.get_subscriptions_info_by_topic(address)
+            self.subscribers[key] = _peers(address, [(end, own, end.qos_profile) for end in ends])
+
+
+def _as_discovered(qos: QoSProfile) -> QoSProfile:
+    """Own QoS as the other ends see it: what is left to the default is none."""
+    qos.deadline = qos.lifespan = qos.liveliness_lease_duration = Infinite
+    qos.liveliness = LivelinessPolicy.AUTOMATIC
+    return qos
+
+
+def _peers(address: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
+    """From the other ends, and the QoS offered and asked for."""
+    faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
+    names, ids = tuple(name for name, _ in faults), tuple(bytes(end.endpoint_gid).hex() for end, _, _ in ends)
+    return Peers(address, names, tuple(f"{name}: {reason}" for name, reason in faults if reason), ids)
+
+
+def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
+    """Why the two do not fit; empty if they do."""
+    verdict, reason = qos_check_compatible(offered, asked)
+    return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
+
+
+def node_name(endpoint: Any) -> str:
+    """Namespace and name of the node of a publisher or subscriber that was discovered."""
+    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
+        return "a node without a known name"
+    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+
 
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
@@ -40,8 +159,8 @@ class Diagnostics:
         self._node, self._queue = node, queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        self._board = Board(node, topics.outputs[Output.DIAGNOSTICS])
-        self._peers = PeerBook(node, topics)
+        self._board = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
+        self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
@@ -50,7 +169,7 @@ class Diagnostics:
         self._strangers: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
 
-    def watch(self, twin: Twin, intake: Intake, scene: str) -> None:
+    def watch(self, twin: Twin, intake: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)

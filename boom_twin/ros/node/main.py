@@ -11,9 +11,8 @@ from argparse import ArgumentParser
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import BoomTwinError
-from .require import require_rclpy
-from .stop import Stop
+from ...errors import BoomTwinError
+from ..startup import StopSignal, require_rclpy
 
 if TYPE_CHECKING:
     from .node import TwinNode
@@ -30,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()
-        return _run(arguments, Stop())
+        return _run(arguments, StopSignal())
     except BoomTwinError as error:
         print(f"twin_node: {error}", file=sys.stderr)
         return 1
@@ -38,10 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
 
-def _run(arguments: list[str], stop: Stop) -> int:
+def _run(arguments: list[str], stop: StopSignal) -> int:
     from rclpy.utilities import remove_ros_args
 
-    from .context import ros
+    from ..runtime import ros
 
     parser = ArgumentParser(prog="twin_node", description="The live boom twin, a ROS 2 lifecycle node.")
     parser.epilog = "Parameters: --ros-args -p scene:=PATH --params-file msg_config/twin.yaml"
@@ -56,10 +55,9 @@ def _run(arguments: list[str], stop: Stop) -> int:
             node.destroy_node()
 
 
-def _live(node: TwinNode, stop: Stop) -> int:
+def _live(node: TwinNode, stop: StopSignal) -> int:
     """Start, spin, stop in order."""
-    from .context import STOPPED
-    from .executor import spin
+    from ..runtime import STOPPED, spin
 
     try:
         if node.autostart and not node.start():

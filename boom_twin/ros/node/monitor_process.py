@@ -1,4 +1,4 @@
-"""The live page beside the node: ``boom_twin monitor`` as a process that the node starts, ends, and otherwise forgets."""
+"""The live page as a child process of the node."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from ..child_process import python_command
-from ..io.topics import NODE, Topics
-from .recorder import TEXTS
+from ...messages.topic_table import NODE, Topics
+from ...system.child_process import python_command
+from ..bag.recorder import TEXTS
 
 LOOK = 1.0
 """Seconds of steady time between looks at whether it still runs."""
@@ -18,7 +18,7 @@ PARTING = 1.0
 """Seconds that it may take to end."""
 
 
-class Page:
+class MonitorProcess:
     """Runs the monitor from now until `close`; if it ends before, one line says so and nothing else changes.
 
     It shares no socket, lock or queue with the node: it hears the node's topics as any subscriber does. Its standard input is

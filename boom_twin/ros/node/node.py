@@ -1,4 +1,4 @@
-"""The live twin: a lifecycle node that is three calls around `boom_twin.twin.Twin`."""
+"""The live twin: a lifecycle node around `Twin.update`."""
 
 from __future__ import annotations
 
@@ -12,24 +12,22 @@ from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, T
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
-from ..errors import BoomTwinError
-from ..io.intake import Intake
-from ..io.mapping import load_mapping
-from ..io.outlet import Outlet
-from ..io.session_model import scene_from
-from ..io.topics import NODE, Output
-from ..io.wire import Wire
-from ..records import Stream
-from ..settings import Settings
-from ..twin import Twin
+from ...bag.session_model import scene_from
+from ...config.settings import Settings
+from ...errors import BoomTwinError
+from ...messages.cdr_decoder import CdrDecoder
+from ...messages.mapping import load_mapping
+from ...messages.report_encoder import ReportEncoder
+from ...messages.sample_decoder import SampleDecoder
+from ...messages.topic_table import NODE, Output
+from ...twin.twin import Twin
+from ...types import Stream
+from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
-from .page import Page
+from .monitor_process import MonitorProcess
 from .parameters import baseline_of, baseline_text, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
-from .qos import qos_profile
 from .receive_queue import ReceiveQueue
-from .services import Services
-from .started import Started
-from .types import message_class
+from .services import Services, Started
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -50,7 +48,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
-        self._page: Page | None = None
+        self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
@@ -87,7 +85,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
                 self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
         if self.get_parameter("monitor").value:
             mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
-            self._page = Page(self, self._topics, mapping, scene)
+            self._page = MonitorProcess(self, self._topics, mapping, scene)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -101,7 +99,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for name, streams in self._topics.heard.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            wire = Wire(topic.type, partial(deserialize_message, message_type=kind))
+            wire = CdrDecoder(topic.type, partial(deserialize_message, message_type=kind))
             put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, wire))
             self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
@@ -148,8 +146,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
-        self._twin, self._intake = twin, Intake(joints, topics)
-        self._outlet = Outlet(scene, settings)
+        self._twin, self._intake = twin, SampleDecoder(joints, topics)
+        self._outlet = ReportEncoder(scene, settings)
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._asked = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
@@ -185,7 +183,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, streams: list[Stream], wire: Wire, data: bytes) -> None:
+    def _receive(self, streams: list[Stream], wire: CdrDecoder, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
         for stream in streams:
             try:

@@ -15,11 +15,10 @@ from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..errors import UsageError
-from ..health.baseline import Baseline, load_baseline
-from ..settings import Settings, settings_from
-from ..thresholds import Thresholds, thresholds_from
-from .context import one_line
+from ...config.settings import Settings, Thresholds, settings_from, thresholds_from
+from ...errors import UsageError
+from ...health.baseline import Baseline, load_baseline
+from ..runtime import one_line
 
 SOURCE = "parameters of the node"
 FIXED, LIVE, AT_START = "fixed while the node is configured", "changes at once", "given at start"
@@ -27,7 +26,7 @@ _LARGEST = sys.float_info.max
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ParameterRow:
     """One parameter; its type is that of the default, its unit stands at the end of the text."""
 
     name: str
@@ -37,19 +36,19 @@ class Row:
     bounds: dict[str, float] | None = None
 
 
-def _row(name: str, field: FieldInfo, is_live: bool) -> Row:
+def _row(name: str, field: FieldInfo, is_live: bool) -> ParameterRow:
     keys = ("gt", "ge", "lt", "le")
     bounds = {key: float(getattr(rule, key)) for rule in field.metadata for key in keys if hasattr(rule, key)}
-    return Row(name, float(field.default), field.description or "", LIVE if is_live else FIXED, bounds)
+    return ParameterRow(name, float(field.default), field.description or "", LIVE if is_live else FIXED, bounds)
 
 
 TABLE = (
-    Row("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
-    Row("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
-    Row("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
-    Row("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
-    Row("autostart", True, "the node configures and activates itself", AT_START),
-    Row("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
+    ParameterRow("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
+    ParameterRow("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
+    ParameterRow("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
+    ParameterRow("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
+    ParameterRow("autostart", True, "the node configures and activates itself", AT_START),
+    ParameterRow("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
     *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
     *(_row(name, field, True) for name, field in Thresholds.model_fields.items()),
 )
@@ -139,7 +138,7 @@ def thresholds_of(node: Node) -> Thresholds:
     return thresholds_from({name: node.get_parameter(name).value for name in Thresholds.model_fields}, SOURCE)
 
 
-def _descriptor(row: Row) -> ParameterDescriptor:
+def _descriptor(row: ParameterRow) -> ParameterDescriptor:
     """Type, meaning and bounds; a ROS range includes its ends, so words say where they are out."""
     kinds = {str: ParameterType.PARAMETER_STRING, bool: ParameterType.PARAMETER_BOOL, float: ParameterType.PARAMETER_DOUBLE}
     descriptor = ParameterDescriptor(

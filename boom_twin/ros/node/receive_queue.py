@@ -1,4 +1,4 @@
-"""Received messages that wait for their turn, so that a flood of them leaves time for services, timers and diagnostics.
+"""Bounded queue of received messages, so that a flood leaves time for services, timers and diagnostics.
 
 The executor only puts messages here, which takes some microseconds; they are read between two turns of it, for a limited time.
 Left to itself rclpy's events executor calls back once for every message that ever arrived, in one row with services and timers:
@@ -14,7 +14,7 @@ from inspect import Parameter, Signature
 from math import nan
 from typing import Any
 
-from ..watch.reception import Reception
+from ...diagnostics.source_status import Reception
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""

@@ -1,4 +1,5 @@
-"""The node's services: start again from rest, set the zero of a sensor, acknowledge alarms, tell scene and baseline."""
+"""Services of the node: start again from rest, set the zero of a sensor, acknowledge alarms; and the log lines of their
+effect."""
 
 from __future__ import annotations
 
@@ -11,8 +12,9 @@ from rclpy.node import Node
 from rclpy.service import Service
 from std_srvs.srv import Trigger
 
-from ..errors import UsageError
-from ..twin import Twin
+from ...errors import UsageError
+from ...twin.twin import Twin
+from ...types import Change, Report
 
 PAUSE = 1.0
 """Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
@@ -98,3 +100,37 @@ class Services:
 def _tell(text: str, request: Any, response: Any) -> Any:
     response.success, response.message = True, text
     return response
+
+
+BETWEEN = 1.0
+"""Least time (s) between starts that are told: a source whose clock jumps at every sample does not fill the log."""
+
+
+class Started:
+    """Tells what changed.
+
+    Parameters
+    ----------
+    logger : logger of a node
+    """
+
+    def __init__(self, logger: Any) -> None:
+        self._logger = logger
+        self._before: dict[str, float] | None = None
+        self._told = -BETWEEN
+
+    def tell(self, report: Report, change: Change) -> None:
+        """Log one line on a report that has a change."""
+        now = {**change.settings, **{f"zero of {name}": value for name, value in change.zeros.items()}}
+        before, self._before = now if self._before is None else self._before, now
+        words = [f"{name} {value:g}" for name, value in now.items() if before.get(name) != value]
+        if not words and time.monotonic() < self._told + BETWEEN:
+            return
+        if not report.accepted:
+            words.insert(0, f"could not start: {report.status}")
+        elif change.from_rest:
+            words.insert(0, f"started from rest ({', '.join(report.events) or 'first strokes'})")
+        elif "clock set" in report.events:
+            words.insert(0, "clock set; the model goes on")
+        self._told = time.monotonic()
+        self._logger.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")

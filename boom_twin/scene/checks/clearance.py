@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from .draft import Draft
-from .finding import Finding, odd, wrong
-from .parts import ContactLaw, Joint
+from ..schema import ContactLaw, Joint
+from .findings import Draft, Finding, odd, wrong
 
 PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
 NEAR_ENOUGH = 0.02  # between the restitution that is asked for and the one that a law gives

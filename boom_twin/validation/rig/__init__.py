@@ -4,21 +4,22 @@ Nothing here is part of the twin, and nothing of the twin's equations is used he
 every session is synthetic. Needs the extra ``peers``.
 """
 
-from .motion import Move, Programme
-from .programmes import BUNDLED_DURATION, bundled, random_programme
+from __future__ import annotations
+
+from .exudyn.solve import at_rest, move, simulate, statics
+from .exudyn.stepping import Effort, Scheme
+from .motion import BUNDLED_DURATION, Move, Programme, bundled, random_programme
 from .sensors import Sensors, noise_free
-from .session import Session, observe, record
-from .solve import at_rest, move, simulate, statics
-from .stepping import Effort, Scheme
+from .session import RigSession, observe, record
 
 __all__ = [
     "BUNDLED_DURATION",
     "Effort",
     "Move",
     "Programme",
+    "RigSession",
     "Scheme",
     "Sensors",
-    "Session",
     "at_rest",
     "bundled",
     "move",

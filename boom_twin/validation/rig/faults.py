@@ -1,4 +1,4 @@
-"""Faults that a session of the virtual rig can be given, named as alarms name their causes.
+"""Faults of the virtual rig: physical faults in its scene, random wrong parameters, sensor faults.
 
 ==============================  =========  ======================================================================
 cause                           kind       size
@@ -21,6 +21,8 @@ cause                           kind       size
 
 The first five are physical: they are in the scene that is simulated, from the start. The others are of sensors, from their
 onset on.
+
+They act on readings that are rounded already, as a fault behind the sensor does.
 """
 
 from __future__ import annotations
@@ -28,10 +30,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..errors import UsageError
-from ..scene.parts import Scene
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UsageError
+from ...scene.edit import parameter, parameter_names, with_parameters
+from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
+from ...types import Array
+from .sensors import NANO
+from .session import RigSession
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
 _SHARE, _LOSS, _PLAY = "above 0 and at most 1, a share", "above 0 and below 1, a share", "above 0 and below 0.005 m"
@@ -62,7 +71,7 @@ CAUSES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class RigFault:
     """One fault: its cause, kind and size as in the table above, and its onset (s after the start).
 
     Raises
@@ -108,24 +117,24 @@ class Fault:
         return 0 if found is None else int(found[1])
 
 
-def parse(text: str) -> Fault:
+def parse(text: str) -> RigFault:
     """The fault that is written ``CAUSE:KIND[:SIZE][@ONSET]``.
 
     Raises
     ------
     UsageError
-        The text has not that form, or see `Fault`.
+        The text has not that form, or see `RigFault`.
     """
     words, _, onset = text.partition("@")
     cause, _, rest = words.partition(":")
     kind, _, size = rest.partition(":")
     try:
-        return Fault(cause, kind, float(size or 0.0), float(onset or 0.0))
+        return RigFault(cause, kind, float(size or 0.0), float(onset or 0.0))
     except ValueError:
         raise UsageError(f"fault {text}: size and onset must be numbers. Write CAUSE:KIND[:SIZE][@ONSET].") from None
 
 
-def check(faults: Sequence[Fault], scene: Scene, duration: float) -> None:
+def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
     """UsageError if a fault is of a part that `scene` does not have, or begins after `duration` (s)."""
     parts = len(scene.joints)
     for fault in faults:
@@ -133,3 +142,132 @@ def check(faults: Sequence[Fault], scene: Scene, duration: float) -> None:
             raise UsageError(f"fault {fault}: the boom has joints, cylinders and sections 1 to {parts}. Give one of them.")
         if fault.onset >= duration:
             raise UsageError(f"fault {fault}: begins at {fault.onset:g} s, must be before the end at {duration:g} s.")
+
+
+JOURNAL = 0.025  # m, radius of a pin that the scene does not list
+
+
+def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
+    """`scene` with the physical ones of `faults`; those of sensors are passed over.
+
+    A pin that the scene does not list gets a journal of 25 mm radius.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such parameter, for instance no oil spring.
+    """
+    for fault in faults:
+        if fault.kind == "play":
+            scene = _worn(scene, fault.cause.removesuffix(".clearance"), fault.size)
+        elif fault.is_physical:
+            now = parameter(scene, fault.cause)
+            changed = now + fault.size if fault.kind == "more" else now * (1.0 - fault.size)
+            scene = with_parameters(scene, {fault.cause: changed})
+    return scene
+
+
+def _worn(scene: Scene, at: str, more: float) -> Scene:
+    """The pin `at` with `more` radial clearance (m) than it has."""
+    clearance = scene.clearance or Clearance()
+    pins = {pin.at: pin for pin in clearance.pins}
+    pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)
+    pins[at] = pin.model_copy(update={"radial_clearance": pin.radial_clearance + more})
+    return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
+
+
+MOST = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
+KEYS = ("k", "d", "EI", "mass")
+
+
+def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
+    """Every k, d, EI and section mass, mass of link, barrel and rod multiplied by 1 + `share` z of its own.
+
+    z is standard normal, drawn again beyond 2; masses take their inertia with them. Payload, line fill, geometry and material
+    damping stay, for they are known, or nothing is predicted from them that a sensor could tell.
+
+    Raises
+    ------
+    UsageError
+        `share` is not from 0 to 0.3.
+    """
+    if not 0.0 <= share <= MOST:
+        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST:g}, as a share of every parameter. 0.02 is 2 %.")
+    rng = np.random.default_rng([seed, 2])
+    names = [name for name in parameter_names(scene) if name.split(".")[-1] in KEYS]
+    scene = with_parameters(scene, {name: parameter(scene, name) * _factor(share, rng) for name in names})
+    return scene.model_copy(update={"joints": tuple(_joint(joint, share, rng) for joint in scene.joints)})
+
+
+def _factor(share: float, rng: np.random.Generator) -> float:
+    while abs(z := rng.standard_normal()) > 2.0:
+        pass
+    return 1.0 + share * float(z)
+
+
+def _joint(joint: Joint, share: float, rng: np.random.Generator) -> Joint:
+    links = {key: getattr(joint, key) for key in ("mL", "mR")}
+    parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in ("barrel", "rod")}
+    cylinder = {key: _heavier(part, _factor(share, rng)) for key, part in parts.items() if part is not None}
+    changes = {key: mass * _factor(share, rng) for key, mass in links.items() if mass is not None}
+    return joint.model_copy(update={**changes, "cylinder": joint.cylinder.model_copy(update=cylinder)})
+
+
+def _heavier(part: CylinderPart, factor: float) -> CylinderPart:
+    return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
+
+
+SPIKE_SHARE = 0.02  # of the readings
+
+
+def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSession:
+    """The session with the sensor faults among `faults`; readings before an onset stay, bit for bit, and so does the truth.
+
+    Parameters
+    ----------
+    seed : int
+        Of spikes and dropouts; each fault draws from a stream of its own.
+    """
+    sensed = [fault for fault in faults if not fault.is_physical]
+    for fault, rng in zip(sensed, np.random.default_rng([seed, 1]).spawn(len(sensed)), strict=True):
+        session = _with_one(session, fault, rng)
+    return session
+
+
+def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) -> RigSession:
+    after = session.truth["t"] >= fault.onset
+    if fault.kind == "late":
+        late = np.where(after, round(fault.size * NANO), 0)
+        return replace(session, angle_stamps=session.angle_stamps + late)
+    name = "joints" if fault.cause.startswith("joint") else "strokes"
+    values: Array = getattr(session, name).copy()
+    if fault.kind == "missing":
+        values[after & (rng.random(len(after)) < fault.size)] = np.nan
+    else:
+        column = fault.number - 1
+        true = session.truth[name][:, column]
+        values[after, column] = _spoiled(fault, session.truth["t"], values[:, column], true, after, rng)[after]
+    return replace(session, joints=values) if name == "joints" else replace(session, strokes=values)
+
+
+def _spoiled(
+    fault: RigFault, times: Array, read: Array, true: Array, after: NDArray[np.bool_], rng: np.random.Generator
+) -> Array:
+    """Readings (m,) of the one sensor as if the fault had always been there; those before the onset are not used."""
+    match fault.kind:
+        case "bias":
+            return read + fault.size
+        case "drift":
+            return read + fault.size * (times - fault.onset)
+        case "scale":
+            return read * (1.0 + fault.size)
+        case "stuck":
+            last = max(0, int(np.argmax(after)) - 1)
+            return np.full_like(read, read[last])
+        case "noisy":
+            return true + fault.size * (read - true)
+        case "spikes":
+            hit = rng.random(len(read)) < SPIKE_SHARE
+            return np.asarray(read + fault.size * hit * rng.choice([-1.0, 1.0], len(read)))
+        case _:  # dropout
+            return np.where(rng.random(len(read)) < fault.size, np.nan, read)

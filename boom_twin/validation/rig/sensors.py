@@ -1,4 +1,4 @@
-"""What the rig's transducers make of the truth.
+"""Sensor model of the virtual rig: noise, resolution, jitter.
 
 A surrogate: no sensor was measured for it. The instant of sampling is the stamp itself.
 """
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import Array
-from ..scene.parts import Point
+from ...scene.schema import Point
+from ...types import Array
 
 NANO = 1_000_000_000
 

@@ -1,4 +1,4 @@
-"""A recorded session of the virtual rig: Exudyn's motion seen through the sensor model.
+"""Record a synthetic session of the virtual rig.
 
 Synthetic by construction: the scene's parameters are surrogates, and no hardware took part.
 """
@@ -14,20 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from ..io.atomic import write_atomic
-from ..records import Array
-from ..scene.parts import Scene
-from .assembly import gravity_in_base
+from ...scene.schema import Scene
+from ...system.atomic_files import write_atomic
+from ...types import Array
+from .exudyn.solve import simulate
+from .exudyn.system import gravity_in_base
 from .motion import Programme
 from .sensors import NANO, Sensors, read, sampling_stamps, specific_force
-from .solve import simulate
 
 EPOCH = 1_700_000_000 * NANO
 """Stamp (ns) of the start of every session."""
 
 
 @dataclass(frozen=True)
-class Session:
+class RigSession:
     """Samples of all sensors, taken at common instants, with the truth at the same instants.
 
     Attributes
@@ -53,9 +53,7 @@ class Session:
     def save_truth(self, path: Path) -> None:
         """Write the truth as a gzipped CSV; equal truths give equal bytes."""
         text = [",".join(name for name, _, _ in self._columns())]
-        columns = [
-            [f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0] for _, digits, values in self._columns()
-        ]
+        columns = [[f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0] for _, digits, values in self._columns()]
         text += [",".join(row) for row in zip(*columns, strict=True)]
         content = BytesIO()
         with gzip.GzipFile("", "wb", 9, content, mtime=0) as packed:
@@ -90,7 +88,7 @@ def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
     }
 
 
-def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors: Sensors, seed: int) -> Session:
+def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors: Sensors, seed: int) -> RigSession:
     """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
 
     Parameters
@@ -104,7 +102,7 @@ def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors:
     truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
     truth |= {"t": times, "strokes": programme(times)[0]}
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
-    return Session(
+    return RigSession(
         stamps,
         read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
         read(truth["joints"], sensors.angle_sigma, sensors.angle_resolution, angle_noise),
@@ -122,7 +120,7 @@ def record(
     seed: int = 0,
     step: float = 5e-4,
     elements: int = 16,
-) -> Session:
+) -> RigSession:
     """Simulate a programme for `duration` (s) and sample it."""
     rows = simulate(scene, programme, duration, step, 2 * step, elements)
     return observe(scene, programme, rows, sensors or Sensors(), seed)

@@ -1,4 +1,4 @@
-"""Valid booms of any number of sections, made up to one recipe so that they differ in nothing but their divisions.
+"""Long booms for studies: valid scenes of any number of sections made to one recipe.
 
 Joint 1 is of kind A, the others are six-bars, all geometrically similar to those of the default scene. Second moments and oil
 stiffnesses follow the static moments of the boom stretched out horizontally, so that every boom bends and gives by the same
@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..physics.linkage import cylinder_length
-from ..records import Array
-from ..scene.kinematics import linkage_of
-from ..scene.parts import Base, Joint, Scene, Section
+from ...kernels.elements.linkage import cylinder_length
+from ...scene.kinematics import linkage_of
+from ...scene.schema import Base, Joint, Scene, Section
+from ...types import Array
 
 STEEL, DENSITY, GRAVITY = 2.06e11, 7850.0, 9.81  # Pa, kg/m^3, m/s^2
 FEW = 7.0  # sections up to which the material is steel

@@ -1,4 +1,4 @@
-"""What each part of a model costs, and what leaving it out changes: `boom_twin study parts`."""
+"""Study of parts: what each part of a model costs, and what leaving it out changes."""
 
 from __future__ import annotations
 
@@ -9,16 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SolverError
-from ..io.atomic import write_atomic
-from ..records import Array
-from ..scene.parts import Scene
-from ..view.parts import Bars, parts_picture
-from .cost import step_times, unknowns
-from .deviation import FREQUENCIES, Answer, Course, Deviation, answer, course_of, deviation
-from .motion import DURATION
+from ...analysis.motions import DURATION
+from ...errors import SolverError
+from ...plots.study import Bars, parts_picture
+from ...reduction.deviation import (
+    FREQUENCIES,
+    Deviation,
+    Response,
+    StrokeCourse,
+    answer,
+    course_of,
+    deviation,
+    step_times,
+    unknowns,
+)
+from ...reduction.variants import Variant, variants
+from ...scene.schema import Scene
+from ...system.atomic_files import write_atomic
+from ...types import Array
 from .report import machine, provenance, table, write_json
-from .variants import Variant, variants
 
 ROUNDS, QUICK_ROUNDS = 30, 5
 QUICK_DURATION = 2.0  # s
@@ -56,7 +65,7 @@ class Part:
 class Parts:
     """A study. `full_times`: a step of the full model, measured twice, s; `parts` ascend in the error of the tip."""
 
-    course: Course
+    course: StrokeCourse
     frequencies: Array
     full_times: tuple[float, float]
     unknowns: int
@@ -67,7 +76,7 @@ class Parts:
         return 1.0 - part.step_time / self.full_times[0]
 
 
-def measure(scene: Scene, course: Course, rounds: int = ROUNDS) -> Parts:
+def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> Parts:
     """Every variant of a scene against the scene itself, times the least of `rounds`.
 
     Raises
@@ -89,7 +98,7 @@ def measure(scene: Scene, course: Course, rounds: int = ROUNDS) -> Parts:
     return Parts(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
 
 
-def _part(scene: Scene, variant: Variant, found: Answer, time: float, full: Answer, course: Course) -> Part:
+def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Response, course: StrokeCourse) -> Part:
     shifts = np.full(FREQUENCIES, np.nan)
     both = min(len(found.frequencies), len(full.frequencies))
     shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.rig.faults import Fault
-from boom_twin.rig.wrong import wrong_by
 from boom_twin.scene import load_scene
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
+from boom_twin.validation.rig.faults import RigFault, wrong_by
 
 WRONG = 0.02
 INSTANCES = (1, 2, 3)
@@ -47,7 +46,7 @@ class Job:
     number: int
     instance: int
     duration: float
-    fault: Fault | None = None
+    fault: RigFault | None = None
     base: Job | None = None
     label: str = "healthy"
 
@@ -88,31 +87,31 @@ def jobs() -> list[Job]:
     learn = [Job("learn", i, INSTANCES[i % 3], SHORT) for i in range(15)]
     right = [Job("right", i, 0, SHORT) for i in range(6)]
     test = [Job("test", i, INSTANCES[i % 3], LONG) for i in range(TESTS)]
-    wanted = [_softer(1, 0.3), _softer(2, 0.3), _softer(3, 0.3), _softer(4, 0.4), Fault("tip.payload", "more", 20.0)]
+    wanted = [_softer(1, 0.3), _softer(2, 0.3), _softer(3, 0.3), _softer(4, 0.4), RigFault("tip.payload", "more", 20.0)]
     return [*learn, *right, *_physical(wanted), *test, *_sensors(test), *_physical(_sizes()), *_physical(_clearances())]
 
 
-def _softer(cylinder: int, share: float) -> Fault:
-    return Fault(f"cylinder_{cylinder}.k", "softer", share)
+def _softer(cylinder: int, share: float) -> RigFault:
+    return RigFault(f"cylinder_{cylinder}.k", "softer", share)
 
 
-def _sizes() -> list[Fault]:
+def _sizes() -> list[RigFault]:
     """The physical faults in other sizes."""
     return [
         *(_softer(i, 0.15) for i in CYLINDERS),
-        Fault("tip.payload", "more", 10.0),
-        *(Fault("line_fill", "more", size) for size in (2.0, 5.0)),
-        *(Fault(f"section_{i}.EI", "softer", share) for i in SECTIONS for share in (0.1, 0.2)),
+        RigFault("tip.payload", "more", 10.0),
+        *(RigFault("line_fill", "more", size) for size in (2.0, 5.0)),
+        *(RigFault(f"section_{i}.EI", "softer", share) for i in SECTIONS for share in (0.1, 0.2)),
         *(_softer(i, 0.5) for i in CYLINDERS),
-        *(Fault("tip.payload", "more", size) for size in (5.0, 40.0)),
+        *(RigFault("tip.payload", "more", size) for size in (5.0, 40.0)),
     ]
 
 
-def _clearances() -> list[Fault]:
-    return [Fault(f"cylinder_{i}.rod.clearance", "play", size) for size in (5e-4, 1e-3, 2e-4) for i in CYLINDERS]
+def _clearances() -> list[RigFault]:
+    return [RigFault(f"cylinder_{i}.rod.clearance", "play", size) for size in (5e-4, 1e-3, 2e-4) for i in CYLINDERS]
 
 
-def _physical(faults: list[Fault]) -> Iterator[Job]:
+def _physical(faults: list[RigFault]) -> Iterator[Job]:
     """All faults before a second session of any."""
     for number in range(EACH):
         for fault in faults:
@@ -129,16 +128,16 @@ def _sensors(healthy: list[Job]) -> Iterator[Job]:
         for owner, kind, size, at_start in one:
             cause = f"{owner}_{JOINTS[number % 4]}.sensor"
             label = f"{owner}.sensor_{kind}_{size:.3g}" + ("_from_start" if at_start else "")
-            yield _spoilt(base, number, label, Fault(cause, kind, size), at_start)
+            yield _spoilt(base, number, label, RigFault(cause, kind, size), at_start)
         for cause, kind, size in STREAM_FAULTS:
-            yield _spoilt(base, number, f"{cause}_{kind}_{size:g}", Fault(cause, kind, size), False)
+            yield _spoilt(base, number, f"{cause}_{kind}_{size:g}", RigFault(cause, kind, size), False)
 
 
 def _starts(kind: str) -> tuple[bool, ...]:
     return (False, True) if kind in ("bias", "scale") else (False,)
 
 
-def _spoilt(base: Job, number: int, label: str, fault: Fault, at_start: bool) -> Job:
+def _spoilt(base: Job, number: int, label: str, fault: RigFault, at_start: bool) -> Job:
     draw = np.random.default_rng([zlib.crc32(f"{label}_{number}".encode()), 4])
     onset = 0.0 if at_start else round(float(draw.uniform(10.0, 40.0)), 3)
-    return Job("sensor", number, base.instance, SHORT, Fault(fault.cause, fault.kind, fault.size, onset), base, label)
+    return Job("sensor", number, base.instance, SHORT, RigFault(fault.cause, fault.kind, fault.size, onset), base, label)

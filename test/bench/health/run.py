@@ -20,10 +20,10 @@ import stored
 from tqdm import tqdm
 
 from boom_twin import Twin, load_scene
+from boom_twin.calibration.baseline import learn_baseline
+from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.learn import learn_baseline
-from boom_twin.records import Alarm
-from boom_twin.settings import Settings
+from boom_twin.types import Alarm
 
 NANO = 1e-9
 CALM, LOAD = 1.0, 0.25  # s over which a force is averaged; share of it that counts as a change of load

@@ -24,11 +24,10 @@ import stored
 from plan import INSTANCES, Job, instance, jobs
 
 from boom_twin.errors import SolverError
-from boom_twin.rig import Programme, Scheme, Sensors, Session, at_rest, move, observe, random_programme
-from boom_twin.rig.faulty_scene import with_faults
-from boom_twin.rig.faulty_sensors import spoil
 from boom_twin.scene import load_scene
-from boom_twin.scene.named import parameter, parameter_names
+from boom_twin.scene.edit import parameter, parameter_names
+from boom_twin.validation.rig import Programme, Scheme, Sensors, Session, at_rest, move, observe, random_programme
+from boom_twin.validation.rig.faults import spoil, with_faults
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)
 STEP_OF_PLAY, SCHEME_OF_PLAY = 2e-3, Scheme(modified=False)

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.io.session import samples_of
-from boom_twin.records import Sample
+from boom_twin.bag.session_files import samples_of
+from boom_twin.types import Sample
 
 EPOCH = 1_700_000_000_000_000_000  # ns, the start of every session
 INDEX = "index.json"

@@ -13,7 +13,7 @@ from math import log
 import numpy as np
 from scipy.optimize import brentq
 
-from boom_twin.peers.play.impacts import follow
+from boom_twin.validation.reference.worn_pin.impacts import follow
 
 APPROACH = 100.0  # smoothing lengths, from where a smoothed contact is out of reach
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.peers.play.geometry import levers, pins
+from boom_twin.validation.reference.worn_pin.geometry import levers, pins
 
 
 def lengthening(contact, force, axis):

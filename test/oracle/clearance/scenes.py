@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from oracle import booms
 
-from boom_twin.physics.contact import SMOOTH
+from boom_twin.kernels.elements.pin_contact import SMOOTH
 
 RODS = tuple(f"cylinder_{i}.rod" for i in range(1, 5))
 LINKS = tuple(f"joint_{i}.{place}" for i in (2, 3, 4) for place in ("pivot", "link_L", "link_R", "Q"))

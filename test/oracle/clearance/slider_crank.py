@@ -14,8 +14,8 @@ from math import asin, pi
 
 import numpy as np
 
-from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.peers.play.impacts import Motion, follow
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin.impacts import Motion, follow
 
 
 @dataclass(frozen=True)

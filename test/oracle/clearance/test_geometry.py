@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from oracle import booms, segments
 
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 

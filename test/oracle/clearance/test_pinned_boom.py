@@ -7,9 +7,9 @@ import pytest
 from oracle import booms, lagrange
 from oracle.clearance import rigid
 
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
-from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 HEADINGS = np.array([0.5, -0.3])

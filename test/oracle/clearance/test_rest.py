@@ -8,9 +8,9 @@ from oracle import booms, segments
 from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, loaded_lever, tip_shift
 
-from boom_twin.peers.play import geometry
-from boom_twin.peers.play.booms import freed
-from boom_twin.peers.play.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin import geometry
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin.motion import freed
 
 RADII = (0.030, 0.025, 0.025, 0.020)
 POSTURES = ["horizontal", "arch", "high", "low"]

@@ -7,10 +7,9 @@ import pytest
 from convergence import motions
 from oracle import booms, lagrange, segments
 
-from boom_twin.peers.equations import Equations
-from boom_twin.peers.linkages import Linkages
-from boom_twin.peers.pieces import link_headings, pieces
 from boom_twin.scene import load_scene
+from boom_twin.validation.reference.segments.equations import Equations
+from boom_twin.validation.reference.segments.geometry import Linkages, link_headings, pieces
 
 
 def kept(scene, fineness):

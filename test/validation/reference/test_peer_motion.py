@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.march import march
+from boom_twin.analysis.methods import march
+from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.peers.stiff import follow
 from boom_twin.scene import load_scene
-from boom_twin.study.motion import motion_of
+from boom_twin.validation.reference.segments.stiff_solver import follow
 
 DURATION, ROW = 1.0, 0.01
 

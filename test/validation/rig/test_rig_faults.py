@@ -7,18 +7,18 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
-from boom_twin.rig.faults import Fault, check, parse
 from boom_twin.scene import load_scene
+from boom_twin.validation.rig.faults import RigFault, check, parse
 
 
 @pytest.mark.parametrize(
     "text, fault",
     [
-        ("cylinder_2.k:softer:0.3", Fault("cylinder_2.k", "softer", 0.3)),
-        ("joint_3.sensor:bias:-0.0035@20", Fault("joint_3.sensor", "bias", -0.0035, 20.0)),
-        ("cylinder_1.sensor:stuck@12.5", Fault("cylinder_1.sensor", "stuck", onset=12.5)),
-        ("cylinder_4.rod.clearance:play:0.0005", Fault("cylinder_4.rod.clearance", "play", 5e-4)),
-        ("joint_angles.delay:late:0.03@10", Fault("joint_angles.delay", "late", 0.03, 10.0)),
+        ("cylinder_2.k:softer:0.3", RigFault("cylinder_2.k", "softer", 0.3)),
+        ("joint_3.sensor:bias:-0.0035@20", RigFault("joint_3.sensor", "bias", -0.0035, 20.0)),
+        ("cylinder_1.sensor:stuck@12.5", RigFault("cylinder_1.sensor", "stuck", onset=12.5)),
+        ("cylinder_4.rod.clearance:play:0.0005", RigFault("cylinder_4.rod.clearance", "play", 5e-4)),
+        ("joint_angles.delay:late:0.03@10", RigFault("joint_angles.delay", "late", 0.03, 10.0)),
     ],
 )
 def test_text_and_back(text, fault):

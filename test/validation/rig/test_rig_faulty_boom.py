@@ -10,13 +10,11 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
-from boom_twin.rig import Move, Programme, Sensors, record
-from boom_twin.rig.faults import parse
-from boom_twin.rig.faulty_scene import with_faults
-from boom_twin.rig.wrong import wrong_by
 from boom_twin.scene import load_scene
-from boom_twin.scene.named import parameter, parameter_names
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.edit import parameter, parameter_names
+from boom_twin.scene.schema import Scene
+from boom_twin.validation.rig import Move, Programme, Sensors, record
+from boom_twin.validation.rig.faults import parse, with_faults, wrong_by
 
 
 def ratios(changed: Scene, scene: Scene) -> dict[str, float]:

@@ -7,11 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.io.session import samples_of
-from boom_twin.records import Stream
-from boom_twin.rig.faults import parse
-from boom_twin.rig.faulty_sensors import SPIKE_SHARE, spoil
-from boom_twin.rig.session import EPOCH, Session
+from boom_twin.bag.session_files import samples_of
+from boom_twin.types import Stream
+from boom_twin.validation.rig.faults import SPIKE_SHARE, parse, spoil
+from boom_twin.validation.rig.session import EPOCH, RigSession
 
 ONSET = 4.0
 ARRAYS = ("stamps", "strokes", "joints", "imu", "angle_stamps")
@@ -24,7 +23,7 @@ def healthy():
     true = {"t": times, "strokes": 0.2 + 0.01 * np.outer(times, [1, 2, 3]), "joints": 0.1 * np.outer(times, [3, 2, 1])}
     noisy = {name: true[name] + 1e-4 * rng.standard_normal((2000, 3)) for name in ("strokes", "joints")}
     stamps = EPOCH + np.rint(times * 1e9).astype(np.int64)
-    return Session(stamps, noisy["strokes"], noisy["joints"], rng.standard_normal((2000, 2)), stamps, true)
+    return RigSession(stamps, noisy["strokes"], noisy["joints"], rng.standard_normal((2000, 2)), stamps, true)
 
 
 def spoilt(healthy, text, seed=1):

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.rig.masses import Lump, gather, rod
+from boom_twin.validation.rig.exudyn.masses import Lump, gather, rod
 
 
 def test_two_masses_about_a_point_between_them():

@@ -8,10 +8,10 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
-from boom_twin.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
-from boom_twin.rig.programmes import BUNDLED_MOVES, stroke_range, tip_speed
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes
+from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
+from boom_twin.validation.rig.motion import BUNDLED_MOVES, stroke_range, tip_speed
 
 SCENE = load_scene()
 

@@ -10,7 +10,7 @@ import sys
 sys.modules["exudyn"] = None
 from boom_twin.errors import BoomTwinError
 try:
-    import boom_twin.rig
+    import boom_twin.validation.rig
 except BoomTwinError as error:
     print(error)
 """

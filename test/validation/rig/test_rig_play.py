@@ -7,15 +7,15 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
 from boom_twin.errors import UsageError
-from boom_twin.rig import Move, Programme, at_rest, move
-from boom_twin.rig.play import contact_of
-from boom_twin.rig.probes import read
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.parts import Clearance, Pin, Scene
+from boom_twin.scene.schema import Clearance, Pin, Scene
+from boom_twin.validation.rig import Move, Programme, at_rest, move
+from boom_twin.validation.rig.exudyn.pin_clearance import contact_of
+from boom_twin.validation.rig.exudyn.probes import read
 
 
 def worn(at: str, play: float, radius: float = 0.025) -> Scene:

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.rig.sensors import Sensors, noise_free, read, sampling_stamps, specific_force
+from boom_twin.validation.rig.sensors import Sensors, noise_free, read, sampling_stamps, specific_force
 
 START = 1_700_000_000_000_000_000
 

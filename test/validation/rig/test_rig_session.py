@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.rig import Move, Programme, noise_free, observe, simulate
-from boom_twin.rig.sensors import Sensors
-from boom_twin.rig.session import EPOCH
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
+from boom_twin.validation.rig import Move, Programme, noise_free, observe, simulate
+from boom_twin.validation.rig.sensors import Sensors
+from boom_twin.validation.rig.session import EPOCH
 
 MOVE = Programme((0.5,), (Move(0, 0.2, 0.6, 0.56),))
 

@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
-from boom_twin.rig import Move, Programme, simulate
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
+from boom_twin.validation.rig import Move, Programme, simulate
 
 
 def slider_crank_length(document, angle):

@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.rig import Move, Programme, Scheme, at_rest, move, simulate
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move, simulate
 
 
 def test_moving_again_and_otherwise():

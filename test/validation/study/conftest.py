@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from oracle import booms
 
-from boom_twin.scene.parts import Scene
+from boom_twin.scene.schema import Scene
 
 
 def short_boom(sections: int) -> Scene:

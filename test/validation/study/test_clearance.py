@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin.analysis.motions import halt
 from boom_twin.scene import Scene, load_scene
-from boom_twin.scene.parts import IDEAL_BELOW
-from boom_twin.study import clearance
-from boom_twin.study.clearance_convergence import Track, convergence, errors, one_pin
-from boom_twin.study.clearance_scenes import ideal, pins_of, rods_and_joints, treated, with_play
-from boom_twin.study.clearance_static import shifts
-from boom_twin.study.clearance_stop import main_frequency, swings
-from boom_twin.study.halt import halt
+from boom_twin.scene.schema import IDEAL_BELOW
+from boom_twin.validation.study.clearance import report as clearance
+from boom_twin.validation.study.clearance.convergence import Track, convergence, errors, one_pin
+from boom_twin.validation.study.clearance.rest_stop_cost import main_frequency, shifts, swings
+from boom_twin.validation.study.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 
 
 def test_a_scene_without_play_gets_the_package_s_pins(two_sections: Scene) -> None:

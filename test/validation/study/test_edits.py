@@ -9,14 +9,11 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from boom_twin.reduction.variants import variants
 from boom_twin.scene import Scene, load_scene
-from boom_twin.scene.end_mark import with_end_mark
-from boom_twin.scene.load import default_text, examine
-from boom_twin.scene.read import parse
-from boom_twin.scene.structure import structure
-from boom_twin.study.edits import Edit, edited, merged
-from boom_twin.study.rewrite import rewritten
-from boom_twin.study.variants import variants
+from boom_twin.scene.edit import Edit, edited, merged, rewritten
+from boom_twin.scene.load import default_text, examine, structure
+from boom_twin.scene.yaml_reader import parse, with_end_mark
 
 EDITS = (
     Edit(("modes",), 4),

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.march import Method
+from boom_twin.analysis.methods import Method
+from boom_twin.analysis.motions import motion_of
 from boom_twin.cli.main import main
 from boom_twin.scene import load_scene
-from boom_twin.study import error, error_problem, error_run
-from boom_twin.study.error_cases import Own, Peer, Stiff, own_cases, peer_cases, stiff_cases, with_modes
-from boom_twin.study.error_front import Match, better, fastest, front, matches, order
-from boom_twin.study.error_problem import Problem, pose
-from boom_twin.study.error_run import Row, Runner
-from boom_twin.study.motion import motion_of
+from boom_twin.validation.study.error import problem as error_problem
+from boom_twin.validation.study.error import report as error
+from boom_twin.validation.study.error import runner as error_run
+from boom_twin.validation.study.error.cases import Own, Peer, Stiff, own_cases, peer_cases, stiff_cases, with_modes
+from boom_twin.validation.study.error.pareto_tables import Match, better, fastest, front, matches, order
+from boom_twin.validation.study.error.problem import Problem, pose
+from boom_twin.validation.study.error.runner import Row, Runner
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +105,7 @@ def test_text_and_pictures(report):
 
 
 def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
-    reason = "boom_twin.rig needs the package exudyn, which is not installed"
+    reason = "boom_twin.validation.rig needs the package exudyn, which is not installed"
     for module in (error_problem, error_run):
         monkeypatch.setattr(module, "load_rig", lambda: (None, reason))
     error.write(booms.random_boom(8), tmp_path, quick=True)

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from boom_twin.analysis.statics import statics
-from boom_twin.scene.end_mark import with_end_mark
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.scene.load import examine
-from boom_twin.study.long_booms import long_boom, seven_sections
+from boom_twin.scene.yaml_reader import with_end_mark
+from boom_twin.validation.study.long_booms import long_boom, seven_sections
 
 
 @pytest.mark.parametrize("count", [2, 3, 7, 50, 200])

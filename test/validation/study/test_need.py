@@ -12,15 +12,15 @@ import pytest
 from oracle import booms
 from ruamel.yaml import YAML
 
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.statics import statics
 from boom_twin.cli.main import main
-from boom_twin.cli.need import tip_error
+from boom_twin.cli.reduce import tip_error
 from boom_twin.errors import UsageError
+from boom_twin.reduction.search import Proposal, propose
 from boom_twin.scene import Scene, load_scene
-from boom_twin.study.edits import edited
-from boom_twin.study.motion import motion_of
-from boom_twin.study.need import Proposal, propose
+from boom_twin.scene.edit import edited
 
 
 def measured_anew(full: Scene, lean: Scene) -> float:

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.statics import statics
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.reduction import deviation
+from boom_twin.reduction.variants import KINDS, Variant, variants, without
 from boom_twin.scene import Scene
-from boom_twin.study import deviation, parts
-from boom_twin.study.clearance_scenes import with_play
-from boom_twin.study.edits import Edit
-from boom_twin.study.variants import KINDS, Variant, variants, without
+from boom_twin.scene.edit import Edit
+from boom_twin.validation.study import parts
+from boom_twin.validation.study.clearance.scenes import with_play
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-from boom_twin.analysis.march import Method
+from boom_twin.analysis.methods import Method
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
-from boom_twin.study import stability
-from boom_twin.study.long_booms import long_boom
-from boom_twin.study.stability_case import Case
-from boom_twin.study.stability_cases import cases, days
-from boom_twin.study.stability_limit import limit_of
-from boom_twin.study.stability_motions import DeadStop, smooth, to_the_ends
-from boom_twin.study.stability_roundoff import Loss
-from boom_twin.study.stability_run import METHODS, one, run
-from boom_twin.study.stability_step import one_step
-from boom_twin.study.stability_turnup import TurnUp
+from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.stability import report as stability
+from boom_twin.validation.study.stability.cases import Case, cases, days
+from boom_twin.validation.study.stability.exact_step import one_step
+from boom_twin.validation.study.stability.roundoff import Loss, TurnUp, limit_of
+from boom_twin.validation.study.stability.runner import METHODS, one, run
+from boom_twin.validation.study.stability.setups import DeadStop, smooth, to_the_ends
 
 COARSE = {"dt 2e-2 s", "dt 5e-2 s", "dt 5e-2 s, fast"}
 QUICK = [case for case in cases(load_scene()) if case.quick]

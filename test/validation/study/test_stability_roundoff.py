@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.posture import set_undeformed
-from boom_twin.chain.place import place
-from boom_twin.plan.compile import compile_scene
+from boom_twin.analysis.equilibrium import set_undeformed
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
-from boom_twin.study.long_booms import long_boom
-from boom_twin.study.stability_dense import Kinematics
-from boom_twin.study.stability_step import digits, one_step
-from boom_twin.study.stability_turnup import TARGET, TURN_UP_STEPS, TurnUp, turn_up
+from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.stability.dense_solver import Kinematics
+from boom_twin.validation.study.stability.exact_step import digits, one_step
+from boom_twin.validation.study.stability.roundoff import TARGET, TURN_UP_STEPS, TurnUp, turn_up
 
 
 @pytest.mark.parametrize("scene", [load_scene(), long_boom(4, kinds=("B3", "B2", "B1"))], ids=["default", "long"])

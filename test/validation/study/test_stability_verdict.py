@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.march import March
-from boom_twin.study.stability_facts import against_motion, against_rest, alternating, growth
-from boom_twin.study.stability_verdict import BOUNDS, Facts, verdict
+from boom_twin.analysis.methods import March
+from boom_twin.validation.study.stability.verdict import (
+    BOUNDS,
+    Facts,
+    against_motion,
+    against_rest,
+    alternating,
+    growth,
+    verdict,
+)
 
 GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force_ringing=0.0, growth=1.0, drift=0.0, passes=1.0)
 

@@ -7,10 +7,10 @@ import pytest
 from oracle import booms
 from oracle.conftest import random_scene
 
+from boom_twin.analysis.motions import TURN, motion_of
 from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
-from boom_twin.study.motion import TURN, motion_of
 
 
 def test_default_boom_moves_as_in_the_documentation():

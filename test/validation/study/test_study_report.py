@@ -6,8 +6,7 @@ import json
 
 import numpy as np
 
-from boom_twin.study.machine import machine
-from boom_twin.study.report import provenance, table, write_json
+from boom_twin.validation.study.report import machine, provenance, table, write_json
 
 
 def test_table():

@@ -1,4 +1,4 @@
-"""Finite-segment boom: short rigid pieces with bending and axial springs between them, loops closed by constraints.
+"""The finite-segment reference boom: rigid pieces with bending and axial springs, loops closed by constraints.
 
 Coordinates: heading of every section's root, headings of both links of every six-bar, and at each spring a turn and a
 stretch. Everything else (points, energy, constraints) is written once as plain geometry on `jets`, which give gradients and
@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..records import Array
-from ..scene.ideal import refuse_clearance
-from ..scene.parts import Cylinder, Joint, Scene
-from .jets import Jet, angle, constant, coordinates, cos, inverse, root, sin
-from .pieces import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
+from ....scene.schema import Cylinder, Joint, Scene, refuse_clearance
+from ....types import Array
+from .equations import Jet, angle, constant, coordinates, cos, inverse, root, sin
+from .geometry import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
 
 Place = tuple[Jet, Jet]
 

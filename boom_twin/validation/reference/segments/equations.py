@@ -1,6 +1,6 @@
-"""Equations of motion of the finite-segment boom in its minimal coordinates.
+"""Equations of motion of the finite-segment reference boom, with automatic differentiation in numpy.
 
-    M(q) q'' + G^T N = f(q, q', t),      G q'' + bias = l_ref''      (only for incompressible cylinders)
+M(q) q'' + G^T N = f(q, q', t),      G q'' + bias = l_ref''      (only for incompressible cylinders)
 
 Kinematics are closed: the links of the six-bars follow from the joint angles, so compressible cylinders leave a plain
 ordinary differential equation. An incompressible cylinder adds a multiplier, solved for together with q''.
@@ -8,18 +8,16 @@ ordinary differential equation. An incompressible cylinder adds a multiplier, so
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..records import Array
-from ..scene.parts import Scene
-from .bodies import Bodies
-from .linkages import Linkages
-from .pieces import gravity_in_base
-from .points import Points, Turns, all_turns, carried, chain_points, fixed, joined, spans
-from .tables import tables_of
+from ....scene.schema import Scene
+from ....types import Array
+from .geometry import Bodies, Linkages, gravity_in_base
+from .kinematics import Points, Turns, all_turns, carried, chain_points, fixed, joined, spans, tables_of
 
 Drive = Callable[[float], tuple[Array, Array, Array]]
 """Time (s) -> lengths (m), rates (m/s) and accelerations (m/s^2) of the drives, each (n,)."""
@@ -152,3 +150,79 @@ class Equations:
     @staticmethod
     def _bordered(matrix: Array, g: Array) -> Array:
         return np.block([[matrix, g.T], [g, np.zeros((len(g), len(g)))]])
+
+
+class Jet:
+    """Value v, gradient g (n,), Hessian h (n, n) of a function of n coordinates."""
+
+    __slots__ = ("g", "h", "v")
+
+    def __init__(self, v: float, g: Array, h: Array) -> None:
+        self.v, self.g, self.h = v, g, h
+
+    def __add__(self, other: Jet | float) -> Jet:
+        if isinstance(other, Jet):
+            return Jet(self.v + other.v, self.g + other.g, self.h + other.h)
+        return Jet(self.v + other, self.g, self.h)
+
+    def __mul__(self, other: Jet | float) -> Jet:
+        if not isinstance(other, Jet):
+            return Jet(self.v * other, self.g * other, self.h * other)
+        cross = np.outer(self.g, other.g)
+        h = self.v * other.h + other.v * self.h + cross + cross.T
+        return Jet(self.v * other.v, self.v * other.g + other.v * self.g, h)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> Jet:
+        return self * -1.0
+
+    def __sub__(self, other: Jet | float) -> Jet:
+        return self + -1.0 * other
+
+    def through(self, value: float, first: float, second: float) -> Jet:
+        """A function of this number, given its value and derivatives here."""
+        return Jet(value, first * self.g, first * self.h + second * np.outer(self.g, self.g))
+
+
+def coordinates(values: Array) -> list[Jet]:
+    """One jet for each coordinate."""
+    n = len(values)
+    return [Jet(float(v), row, np.zeros((n, n))) for v, row in zip(values, np.eye(n), strict=True)]
+
+
+def constant(value: float, n: int) -> Jet:
+    """A jet that depends on nothing."""
+    return Jet(float(value), np.zeros(n), np.zeros((n, n)))
+
+
+def cos(a: Jet) -> Jet:
+    """Cosine."""
+    c, s = math.cos(a.v), math.sin(a.v)
+    return a.through(c, -s, -c)
+
+
+def sin(a: Jet) -> Jet:
+    """Sine."""
+    c, s = math.cos(a.v), math.sin(a.v)
+    return a.through(s, c, -s)
+
+
+def root(a: Jet) -> Jet:
+    """Square root."""
+    r = math.sqrt(a.v)
+    return a.through(r, 0.5 / r, -0.25 / r**3)
+
+
+def inverse(a: Jet) -> Jet:
+    """1 / a."""
+    return a.through(1.0 / a.v, -1.0 / a.v**2, 2.0 / a.v**3)
+
+
+def angle(x: Jet, y: Jet) -> Jet:
+    """Angle of the vector (x, y), in (-pi, pi]."""
+    r = math.hypot(x.v, y.v)
+    c, s = x.v / r, y.v / r
+    ahead, aside = x * c + y * s, y * c - x * s
+    slope = aside * inverse(ahead)
+    return slope.through(math.atan2(y.v, x.v), 1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Equilibrium and small vibrations of the finite-segment boom, from its energy."""
+"""Equilibrium and small vibrations of the finite-segment reference boom, from its energy."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from ..errors import SolverError
-from ..records import Array
-from ..scene.parts import Scene
-from .jets import Jet
-from .segments import Boom, Segments
+from ....errors import SolverError
+from ....scene.schema import Scene
+from ....types import Array
+from .boom import Boom, Segments
+from .equations import Jet
 
 PASSES = 60
 SETTLED = 1e-11  # m and rad, largest increment

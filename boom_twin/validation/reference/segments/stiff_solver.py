@@ -1,4 +1,4 @@
-"""The finite-segment boom stepped by a general stiff solver of SciPy: what one gets without writing an integrator."""
+"""Step the finite-segment reference boom by SciPy's stiff solver."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..errors import SolverError, UsageError
-from ..records import Array
-from ..scene.parts import Scene
+from ....errors import SolverError, UsageError
+from ....scene.schema import Scene
+from ....types import Array
+from .boom import Segments
 from .equations import Drive, Equations
-from .pieces import pieces
-from .rest import equilibrium
-from .segments import Segments
+from .equilibrium import equilibrium
+from .geometry import pieces
 
 Solver = Literal["Radau", "BDF", "LSODA"]
 ABSOLUTE = 1e-2  # absolute tolerance of a coordinate (rad, m) over the relative one; ten times that for rates

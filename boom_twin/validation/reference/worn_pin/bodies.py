@@ -1,16 +1,20 @@
-"""What a cylinder lifts: one rigid body on a pivot, directly (joint A) or through the links of a six-bar (B1, B2, B3).
+"""Bodies of the reference boom with a worn pin: what a cylinder lifts, and the cylinder itself.
 
 Both have one coordinate, the heading phi of the section, and so inertia J(phi), its slope, and a pin whose place depends
 on phi:     2 T = J phi'^2 ,     J = sum m |z'|^2 + I t'^2 .
+
+About the pin, barrel and rod together have
+
+I(l) = I_b + m_b a_b^2 + I_r + m_r (l - a_r)^2 ,      moment of mass = m_b a_b + m_r (l - a_r) .
 """
 
 from __future__ import annotations
 
+from cmath import exp
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .linkage import links, on_left, on_right, rod_pin
-from .moving import Document, Mass, Point, Turn
+from .geometry import Document, Mass, Point, Turn, dot, links, on_left, on_right, rod_pin
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,3 +100,42 @@ def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> Placed:
         sum(b.mass * z.value for b, z, _ in bodies),
         pin,
     )
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Barrel pin (complex, m), oil spring (N/m) and damper (N s/m), barrel and rod (kg, kg m^2, m from their own pins)."""
+
+    pin: complex
+    k: float
+    d: float
+    barrel_mass: float
+    barrel_inertia: float
+    barrel_com: float
+    rod_mass: float
+    rod_inertia: float
+    rod_com: float
+
+    def inertia(self, length: float) -> float:
+        """I about the barrel pin, kg m^2."""
+        still = self.barrel_inertia + self.barrel_mass * self.barrel_com**2 + self.rod_inertia
+        return still + self.rod_mass * (length - self.rod_com) ** 2
+
+    def moment(self, length: float) -> float:
+        """Of mass about the barrel pin, kg m."""
+        return self.barrel_mass * self.barrel_com + self.rod_mass * (length - self.rod_com)
+
+    def tension(self, length: float, rate: float, drive: tuple[float, float]) -> float:
+        """Of the oil (N), at length and rate of the drive."""
+        return self.k * (length - drive[0]) + self.d * (rate - drive[1])
+
+    def energy(self, length: float, psi: float, rate: float, swing: float, drive: float, gravity: complex) -> float:
+        """Of motion, oil and weight, J, at a length of the drive."""
+        moving = self.rod_mass * rate**2 + self.inertia(length) * swing**2
+        return 0.5 * moving + 0.5 * self.k * (length - drive) ** 2 - dot(gravity, self.moment(length) * exp(1j * psi))
+
+    def holding(self, length: float, psi: float, tension: float, gravity: complex) -> complex:
+        """Force (N, complex) on the rod's pin that holds the cylinder still at a tension of the oil."""
+        u = exp(1j * psi)
+        across = self.moment(length) / length * dot(gravity, 1j * u)
+        return (tension - self.rod_mass * dot(gravity, u) - 1j * across) * u

@@ -1,6 +1,6 @@
-"""Normal contact of a pin in its bush: force over penetration and its rate, with the damping of the common laws.
+"""Contact force of the reference boom with a worn pin: force over penetration and its rate.
 
-    F = K d^n (1 + chi g' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
+F = K d^n (1 + chi g' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
 
 K, internal contact of cylinders [R]: K = 4/[3(s_i + s_j)] sqrt(R_i R_j / (R_j - R_i)), s = (1 - nu^2)/E, R_j = R_i + c.
 chi: Lankarani and Nikravesh (1990); Flores et al. (2011); Hunt and Crossley (1975); Hertz has none.

@@ -1,19 +1,114 @@
-"""The rigid boom of a scene's file: pins, cylinder lengths, levers; what lies outboard of a joint as one body.
+"""Geometry of the reference boom with a worn pin: pins, cylinder lengths, levers, link angles with derivatives.
+
+Axes of the head before, origin in the pivot. With a = lL e^(i L), b = lR e^(i R), e = E e^(i phi):
+
+D + a = e + b ,      a L' - b R' = e ,      a L'' - b R'' = i (e - a L'^2 + b R'^2) .
 
 `document` is a scene's file as plain dicts; headings (rad) are those of the sections to the base's x axis; 0-based.
 """
 
 from __future__ import annotations
 
-from cmath import exp
+from cmath import exp, phase
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...records import Array
-from .linkage import links, on_left, on_right, rod_pin
-from .moving import Document, Mass, lumped
+from ....types import Array
+
+Document = dict[str, Any]  # a scene's file, or a part of it
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A rigid body in some axes: kg, kg m^2 about its centre, the centre (complex, m)."""
+
+    mass: float
+    inertia: float
+    at: complex
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A place (m) and its derivatives by the angle."""
+
+    value: complex
+    first: complex
+    second: complex
+
+    def __add__(self, other: Point) -> Point:
+        return Point(self.value + other.value, self.first + other.first, self.second + other.second)
+
+    def seen_from(self, origin: complex, heading: float) -> Point:
+        """In axes where this point's own stand at `origin`, turned by `heading`."""
+        turn = exp(1j * heading)
+        return Point(origin + turn * self.value, turn * self.first, turn * self.second)
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A heading (rad) and its derivatives by the angle."""
+
+    value: float
+    first: float
+    second: float
+
+    def arm(self, local: complex) -> Point:
+        """The vector `local` (complex, m) carried by this heading."""
+        arm = local * exp(1j * self.value)
+        return Point(arm, 1j * self.first * arm, (1j * self.second - self.first**2) * arm)
+
+
+def lumped(masses: Sequence[Mass]) -> Mass:
+    """One rigid body of many that do not move against each other."""
+    mass = sum(body.mass for body in masses)
+    at = sum(body.mass * body.at for body in masses) / mass
+    return Mass(mass, sum(body.inertia + body.mass * abs(body.at - at) ** 2 for body in masses), at)
+
+
+def dot(a: complex, b: complex) -> float:
+    """Scalar product of two vectors of the plane."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def links(joint: Document, phi: float) -> tuple[Turn, Turn]:
+    """Headings of links L and R (`Turn`) at a joint angle phi; `joint` as in a scene's file. Pin Q is left of D->E."""
+    d, e, long, short = complex(*joint["D"]), complex(*joint["E"]) * exp(1j * phi), joint["lL"], joint["lR"]
+    gap = e - d
+    along = (abs(gap) ** 2 + long**2 - short**2) / (2.0 * abs(gap))
+    a = complex(along, sqrt(long**2 - along**2)) * gap / abs(gap)
+    b = a - gap
+    first = _solved(a, b, e)
+    second = _solved(a, b, 1j * (e - a * first[0] ** 2 + b * first[1] ** 2))
+    return Turn(phase(a), first[0], second[0]), Turn(phase(b), first[1], second[1])
+
+
+def rod_pin(joint: Document, phi: float, left: Turn, right: Turn) -> Point:
+    """Where the rod is pinned, a `Point` over phi, given the links there."""
+    if joint["kind"] == "B3":
+        return on_right(joint, phi, right, joint["lR"] - complex(*joint["R"]))
+    return on_left(joint, left, complex(*joint["R"]) if joint["kind"] == "B2" else joint["lL"])
+
+
+def on_left(joint: Document, left: Turn, local: complex) -> Point:
+    """A point carried by link L, `local` from D along and to the left of it."""
+    return Point(complex(*joint["D"]), 0j, 0j) + left.arm(local)
+
+
+def on_right(joint: Document, phi: float, right: Turn, local: complex) -> Point:
+    """A point carried by link R, `local` from E along and to the left of it."""
+    return Turn(phi, 1.0, 0.0).arm(complex(*joint["E"])) + right.arm(local)
+
+
+def _solved(a: complex, b: complex, wanted: complex) -> tuple[float, float]:
+    """Real x, y with a x - b y = wanted."""
+    area = (b.conjugate() * a).imag
+    return (b.conjugate() * wanted).imag / area, (a.conjugate() * wanted).imag / area
+
 
 Headings = Sequence[float] | Array
 Complexes = NDArray[np.complex128]

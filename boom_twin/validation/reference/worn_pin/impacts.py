@@ -1,4 +1,4 @@
-"""Integration of a motion with one contact, cut at every touch and every release; SciPy's stiff solver in between."""
+"""Integrate a motion with one contact, cut at every touch and release, by SciPy's stiff solver."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ...records import Array
+from ....types import Array
 
 MOST = 20_000  # pieces of a motion
 

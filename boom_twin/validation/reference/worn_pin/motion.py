@@ -1,9 +1,13 @@
-"""A part of a boom on a massive cylinder whose rod pin has play: Lagrange's equations by hand in three coordinates.
+"""Motion of the reference boom with a worn pin: Lagrange's equations in three coordinates, equilibrium, set-up from a scene.
+
+With the pin held at an offset, one equation in the heading is left: the oil, as long as it then is, must carry the part. Its
+force tells on which side of the bush the pin really lies and how deep. The offset hardly changes the force, so that a few
+passes suffice.
 
 phi, the part's heading; l and psi, length and heading of the cylinder from its barrel pin B to its rod's pin r. The rod's
 pin lies at offset = r - P(phi) from the bush, and is pushed by F (contact). With u = e^(i psi), <a, b> = Re(conj(a) b):
 
-    J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
+J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
     m_r l''   - m_r (l - a_r) psi'^2        =  <F, u>  + m_r <g, u> - k (l - l_ref) - d (l' - l_ref')
     I psi''   + 2 m_r (l - a_r) l' psi'     =  <F, i l u> + (m_b a_b + m_r (l - a_r)) <g, i u> .
 
@@ -12,20 +16,65 @@ J(phi) and P(phi) are the part's (`parts`), I(l) the cylinder's. The mass matrix
 
 from __future__ import annotations
 
-from cmath import exp
+from cmath import exp, phase
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ...errors import UsageError
-from ...records import Array
+from ....errors import UsageError
+from ....types import Array
+from . import geometry
+from .bodies import Cylinder, Lever, SixBar
 from .contact import Contact
-from .cylinder import Cylinder
-from .equilibrium import Rest, equilibrium
+from .geometry import Document, Point, dot
 from .impacts import Episode, Motion, follow
-from .moving import Point, dot
-from .parts import Lever, SixBar
+
+NEAR = 0.05  # rad, about the guess
+PASSES = 40
+SAME = 1e-14  # m, offsets
+
+
+@dataclass(frozen=True)
+class Rest:
+    """An equilibrium: heading phi, length l, heading psi of the cylinder; offset (m) and force (N) of the pin, complex."""
+
+    phi: float
+    length: float
+    psi: float
+    tip: complex
+    offset: complex
+    force: complex
+    tension: float
+
+
+def equilibrium(boom: PinnedBoom, drive: float, phi: float) -> Rest:
+    """`Rest` of a `PinnedBoom` at a length of the drive (m), within `NEAR` of heading `phi` (rad)."""
+    offset = 0j
+    for _ in range(PASSES):
+        rest = _held(boom, drive, phi, offset)
+        found = 0j if boom.contact is None else boom.contact.resting_offset(-rest.force)
+        if abs(found - offset) < SAME:
+            return rest
+        offset = found
+    raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
+
+
+def _held(boom: PinnedBoom, drive: float, phi: float, offset: complex) -> Rest:
+    """With the pin at `offset`."""
+
+    def at(angle: float) -> tuple[float, Rest]:
+        placed = boom.part.at(angle)
+        axis = placed.pin.value + offset - boom.cylinder.pin
+        length, psi = abs(axis), phase(axis)
+        tension = boom.cylinder.k * (length - drive)
+        force = boom.cylinder.holding(length, psi, tension, boom.gravity)
+        moment = dot(boom.gravity, placed.moments) - dot(force, placed.pin.first)
+        return moment, Rest(angle, length, psi, boom.part.tip_at(angle), offset, force, tension)
+
+    return at(brentq(lambda angle: at(angle)[0], phi - NEAR, phi + NEAR, xtol=1e-15))[1]
+
 
 Drive = Callable[[float], tuple[float, float]]
 
@@ -135,9 +184,7 @@ class PinnedBoom:
             raise UsageError("contact = None: an ideal pin has an equilibrium but no motion here. Give a `Contact`.")
         return self.contact
 
-    def _pin(
-        self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point
-    ) -> tuple[complex, complex]:
+    def _pin(self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point) -> tuple[complex, complex]:
         rate = (speed + 1j * length * swing) * u - bush.first * turn
         return self.cylinder.pin + length * u - bush.value, rate
 
@@ -166,3 +213,29 @@ class PinnedBoom:
 def _pairs(values: Sequence[complex]) -> Array:
     both = np.array(values)
     return np.column_stack([both.real, both.imag])
+
+
+def freed(document: Document, headings: Sequence[float] | Array, index: int, contact: Contact | None) -> PinnedBoom:
+    """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
+
+    Parameters
+    ----------
+    document : dict
+        A scene's file; that cylinder has k, barrel and rod.
+    headings : sequence of float
+        rad, of the sections to the base's x axis.
+    contact : Contact or None
+        None: an ideal pin, for equilibria only.
+    """
+    joint, places = document["joints"][index], geometry.pivots(document, headings)
+    body = geometry.outboard(document, headings, index)
+    tip = (places[-1] - places[index]) * exp(-1j * headings[index])
+    part: Lever | SixBar
+    if index == 0:
+        part = Lever(places[0], body, complex(*document["sections"][0]["rod_pin"]), tip)
+    else:
+        part = SixBar(places[index], body, joint, headings[index - 1], tip)
+    cylinder, pin = joint["cylinder"], geometry.pins(document, headings, index)[0]
+    barrel, rod = ([p["mass"], p["inertia"], p["com"]] for p in (cylinder["barrel"], cylinder["rod"]))
+    oil = Cylinder(pin, cylinder["k"], cylinder.get("d", 0.0), *barrel, *rod)
+    return PinnedBoom(part, oil, contact, geometry.gravity(document))

@@ -1,10 +1,10 @@
-"""What every rigid part of a boom weighs, gathered about a reference point of its section."""
+"""Masses of the Exudyn boom: rigid parts gathered about a reference point of their section."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..scene.parts import Point, RigidPart, Scene, Section
+from ....scene.schema import Point, RigidPart, Scene, Section
 
 
 @dataclass(frozen=True, slots=True)

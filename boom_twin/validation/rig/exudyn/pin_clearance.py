@@ -1,4 +1,4 @@
-"""Rod pins with play in the Exudyn boom: a journal on the rod's end, free in a bush of the boom but for their contact.
+"""Rod pins with clearance in the Exudyn boom.
 
 The contact law is that of the peers, with the K of the scene's radii and materials; pins are contact here also where the scene
 has the twin linearise them.
@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
-from ..peers.play.contact import HYSTERESIS, Contact, stiffness
-from ..records import Array
-from ..scene.parts import Material, Pin, Scene
-from .peer import exudyn
+from ....errors import UsageError
+from ....scene.schema import Material, Pin, Scene
+from ....types import Array
+from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from .module import exudyn
 
 LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal
 SMOOTHING = 1e-6  # m, over which contact sets in

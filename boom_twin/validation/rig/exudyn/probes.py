@@ -1,4 +1,4 @@
-"""What is read from the Exudyn boom: tip, joints and cylinder forces."""
+"""Read tip, joints and cylinder forces from the Exudyn boom."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Array
-from .peer import exudyn, items
+from ....types import Array
+from .module import exudyn, items
 from .system import Boom, Station
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SolverError
-from ..records import Array
-from .peer import exudyn
+from ....errors import SolverError
+from ....types import Array
+from .module import exudyn
 from .system import Boom
 
 STEP_FORCE = 1e-6  # N, absolute tolerance of a step

@@ -1,14 +1,18 @@
-"""The Exudyn system under construction: nodes, rigid frames, markers, pins and weights."""
+"""Build the Exudyn system: nodes, rigid frames, markers, pins, weights, and where every part lies."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..records import Array
-from ..scene.parts import Point, Scene
-from .peer import items
-from .play import Bush
+import numpy as np
+
+from ....scene.kinematics import joint_angles_of_strokes
+from ....scene.schema import Joint, Point, Scene
+from ....types import Array
+from .module import items
+from .pin_clearance import Bush
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +104,7 @@ class Boom:
     def body(self, node: int, mass: float, com: Point, inertia: float) -> int:
         """A rigid body on a node; inertia (kg m^2) about the NODE."""
         body = int(
-            self.system.AddObject(
-                items.ObjectRigidBody2D(mass=mass, inertia=inertia, centerOfMass=[*com], nodeNumber=node)
-            )
+            self.system.AddObject(items.ObjectRigidBody2D(mass=mass, inertia=inertia, centerOfMass=[*com], nodeNumber=node))
         )
         if mass > 0.0:
             self.weigh(body)
@@ -112,3 +114,54 @@ class Boom:
         """Gravity on a body or beam."""
         marker = self.system.AddMarker(items.MarkerBodyMass(bodyNumber=body))
         self.system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self.gravity))
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Origin (m) and angle (rad) of a straight section in the base's axes."""
+
+    x: float
+    y: float
+    angle: float
+
+    def point(self, local: Point) -> Array:
+        """Base coordinates (2,) of a point given in the section's axes."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return np.array([self.x + c * local[0] - s * local[1], self.y + s * local[0] + c * local[1]])
+
+
+def gravity_in_base(scene: Scene) -> Point:
+    """Gravity (m/s^2) in the axes of the base, which its inclination turns anticlockwise."""
+    c, s = math.cos(scene.base.inclination), math.sin(scene.base.inclination)
+    gx, gy = scene.gravity
+    return c * gx + s * gy, -s * gx + c * gy
+
+
+def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
+    """Frames of the straight sections on incompressible cylinders at absolute `strokes` (m)."""
+    angles = np.cumsum(joint_angles_of_strokes(scene, strokes))
+    frames, origin = [], np.array(scene.base.pivot)
+    for section, angle in zip(scene.sections, angles, strict=True):
+        frames.append(Frame(float(origin[0]), float(origin[1]), float(angle)))
+        origin = frames[-1].point((section.length, 0.0))
+    return frames
+
+
+def six_bar_points(scene: Scene, frames: list[Frame], index: int) -> dict[str, Array]:
+    """Points C, D, E, Q (m, base axes) of the six-bar at joint `index` (0-based)."""
+    joint: Joint = scene.joints[index]
+    length = scene.sections[index - 1].length
+    assert joint.C and joint.D and joint.E and joint.lL and joint.lR
+    c = frames[index - 1].point((length + joint.C[0], joint.C[1]))
+    d = frames[index - 1].point((length + joint.D[0], joint.D[1]))
+    e = frames[index].point(joint.E)
+    return {"C": c, "D": d, "E": e, "Q": _left_apex(d, e, joint.lL, joint.lR)}
+
+
+def _left_apex(start: Array, end: Array, from_start: float, from_end: float) -> Array:
+    """Third corner, left of start->end, of the triangle with these two sides (law of cosines)."""
+    base = end - start
+    span = float(np.hypot(*base))
+    opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))
+    heading = math.atan2(base[1], base[0]) + opening
+    return start + from_start * np.array([math.cos(heading), math.sin(heading)])

@@ -1,7 +1,7 @@
-"""Convergence of motions with play towards the run with steps of 1 us, beside a model integrated by SciPy between contacts.
+"""Convergence of motions with clearance towards steps of 1 us, beside a SciPy reference.
 
 The study's four pins on the elastic boom, and one pin on the rigid boom whose other cylinders are incompressible: that is the
-boom part which `boom_twin.peers.play` moves with equations and contact of its own.
+boom part which `boom_twin.validation.reference.worn_pin` moves with equations and contact of its own.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.march import March, march
-from ..peers.play.booms import freed
-from ..peers.play.contact import HYSTERESIS, Contact, stiffness
-from ..peers.play.geometry import cylinder_length
-from ..peers.play.pinned_boom import Followed, PinnedBoom
-from ..records import Array
-from ..scene.parts import Cylinder, Joint, Scene
-from .clearance_scenes import pin_like, pins_of, treated, with_pins, without_friction
-from .halt import Halt, halt
+from ....analysis.methods import March, march
+from ....analysis.motions import Halt, halt
+from ....scene.schema import Cylinder, Joint, Scene
+from ....types import Array
+from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from ...reference.worn_pin.geometry import cylinder_length
+from ...reference.worn_pin.motion import Followed, PinnedBoom, freed
+from .scenes import pin_like, pins_of, treated, with_pins, without_friction
 
 STEPS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)  # s
 QUICK_STEPS = (2e-3, 1e-3, 5e-4)  # s
@@ -107,8 +106,14 @@ def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Conve
     lines += [
         line,
         Line(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
-        Line(line.case, "SciPy", "independent", tolerances, errors([track for track, _ in runs], independent),
-             tuple(seconds for _, seconds in runs)),
+        Line(
+            line.case,
+            "SciPy",
+            "independent",
+            tolerances,
+            errors([track for track, _ in runs], independent),
+            tuple(seconds for _, seconds in runs),
+        ),
     ]
     return Convergence(tuple(lines), errors([own], independent)[0], span)
 

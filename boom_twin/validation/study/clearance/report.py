@@ -1,19 +1,47 @@
-"""The report of the study of clearance, as Markdown."""
+"""Report of the clearance study, `boom_twin study clearance`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..scene.parts import IDEAL_BELOW, Scene
-from . import clearance_convergence as near
-from .clearance_convergence import MEASURES, Convergence, Line
-from .clearance_cost import HARD_BRAKE, RAMP, STOP, VIOLENT, Cost
-from .clearance_scenes import pins_of
-from .clearance_static import Shift
-from .clearance_stop import BRAKE, HOLD, SETTLED, Swing
-from .report import provenance, table
+from ....analysis.methods import march
+from ....compiler.compile import compile_scene
+from ....errors import UsageError
+from ....plots.history import Orbits
+from ....plots.posture import orbits_picture
+from ....plots.stability import Sinking, Trace, sinking_picture, swing_picture
+from ....plots.study import Curve, Panel, work_precision_picture
+from ....scene.schema import IDEAL_BELOW, Scene
+from ....system.atomic_files import write_atomic
+from ..report import machine, provenance, table, write_json
+from . import convergence as near
+from .convergence import MEASURES, Convergence, Line, convergence
+from .rest_stop_cost import (
+    BRAKE,
+    COUNT,
+    HARD_BRAKE,
+    HOLD,
+    QUICK_COUNT,
+    QUICK_HOLD,
+    RAMP,
+    SETTLED,
+    STEP,
+    STOP,
+    VIOLENT,
+    Cost,
+    Shift,
+    Swing,
+    costs,
+    shifts,
+    swings,
+    violent,
+)
+from .scenes import pins_of, treated, with_play
 
 STOP_HEAD = ("posture", "pins", "rest, mm", "peak, mm", "rms, mm", "peak acc., m/s²", "rms acc., m/s²", "halved after, s",
              "frequency, Hz", "contacts lost")  # fmt: skip
@@ -92,7 +120,8 @@ def _convergence(found: Convergence) -> list[str]:
         "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: "
         "boom_twin with steps of "
         f"{1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by hand in "
-        "three coordinates, integrated by SciPy's LSODA between touch and release (`boom_twin/peers/play`), tolerance "
+        "three coordinates, integrated by SciPy's LSODA between touch and release "
+        "(`boom_twin/validation/reference/worn_pin`), tolerance "
         f"{near.TIGHTEST:g}. It shares no equation with boom_twin but states the same contact law.\n",
     ]
     if np.isfinite(found.apart).all():
@@ -136,3 +165,92 @@ def _costs(found: list[Cost]) -> list[str]:
         "over run time.\n",
         table(("pins", "treatment", "gentle, us a step", "factor", "violent, us a step", "factor"), rows),
     ]
+
+
+NOTE = "surrogate parameters; computed, not measured on a rig"
+SHOWN = 3.0  # s after the stop
+FAMILIES = {
+    ("all rods' pins, elastic boom", "boom_twin"): "elastic",
+    ("one pin, rigid boom", "boom_twin"): "play",
+    ("one pin, rigid boom", "SciPy"): "events",
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that is reported."""
+
+    swings: list[Swing]
+    shifts: list[Shift]
+    convergence: Convergence
+    costs: list[Cost]
+
+
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+    """Measure, and write ``clearance.json``, ``clearance.md`` and pictures into `out`; returns their paths.
+
+    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene, convergence and
+    cost from `posture`.
+
+    Raises
+    ------
+    UsageError
+        The scene has no posture.
+    """
+    if not scene.postures:
+        raise UsageError("postures: the scene has none, and the study starts from them. Add one.")
+    scene, postures = with_play(scene), tuple(scene.postures)
+    found = Study(
+        swings(scene, postures, QUICK_HOLD if quick else HOLD),
+        shifts(scene, postures, QUICK_COUNT if quick else COUNT),
+        convergence(scene, posture, quick),
+        costs(scene, posture, quick),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png", "_orbits.png")]
+    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
+    write_atomic(paths[1], text)
+    traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]
+    swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
+    sinking = [Sinking(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
+    sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
+    work_precision_picture(paths[4], "Motions with play: error against run time", NOTE, panels(found.convergence))
+    _orbits(paths[5], scene, posture)
+    return paths
+
+
+def as_json(found: Study) -> dict[str, Any]:
+    """All numbers but the traces, SI units."""
+    traces = ("times", "height", "acceleration")
+    return {
+        "stops": [{key: value for key, value in asdict(own).items() if key not in traces} for own in found.swings],
+        "rests": [asdict(own) | {"jump": own.jump, "ratios": own.ratios} for own in found.shifts],
+        "convergence": {"span_s": found.convergence.span, "lines": [asdict(line) for line in found.convergence.lines]},
+        "references_differ": dict(zip(MEASURES, found.convergence.apart, strict=True)),
+        "costs": [asdict(own) for own in found.costs],
+    }
+
+
+def panels(found: Convergence) -> tuple[Panel, ...]:
+    """A panel a measure; the boom with one pin against the independent model where there is one."""
+    chosen = [line for line in found.lines if line.against == "independent" or line.case.startswith("all")]
+    curves = [tuple(_curve(found, line, k) for line in chosen) for k in range(len(MEASURES))]
+    return tuple(Panel(name.split(",")[0], name, own) for name, own in zip(MEASURES, curves, strict=True))
+
+
+def _curve(found: Convergence, line: Line, measure: int) -> Curve:
+    family = FAMILIES[line.case, line.program]
+    notes = [f"{1e3 * mark:g} ms" if line.program == "boom_twin" else f"{mark:.0e}" for mark in line.marks]
+    some = tuple(note if number % 3 == 1 else "" for number, note in enumerate(notes))
+    seconds = tuple(second / found.span for second in line.seconds)
+    return Curve(line.case, family, seconds, tuple(line.errors[:, measure].tolist()), some)
+
+
+def _orbits(path: Path, scene: Scene, posture: str | None) -> None:
+    """Of the violent stop that the costs are measured in."""
+    contact, drive = treated(scene, "contact"), violent(scene, posture)
+    moved, plan = march(contact, drive, VIOLENT, STEP, angles=drive.angles), compile_scene(contact)
+    lost = np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0, axis=0)
+    orbits = Orbits(moved.times, plan.pins, plan.tables.clearances.gap, moved.pins, lost)
+    orbits_picture(path, "Journals in their bushes: a violent start and stop", orbits, NOTE)

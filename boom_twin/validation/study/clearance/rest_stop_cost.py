@@ -1,18 +1,101 @@
-"""What play changes in how the tip swings after a stop: in every posture, against ideal pins."""
+"""Clearance study: its effect at rest, its effect after a stop, and its cost."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.march import March, march
-from ..analysis.statics import statics
-from ..records import Array
-from ..scene.parts import Scene
-from .clearance_scenes import ideal, treated
-from .halt import Halt, halt
+from ....analysis.equilibrium import settle, statics
+from ....analysis.methods import March, march
+from ....analysis.motions import Halt, halt, motion_of
+from ....compiler.compile import compile_scene
+from ....compiler.plan import first_row, taken_apart
+from ....scene.kinematics import posture_angles, strokes_of_posture
+from ....scene.schema import IDEAL_BELOW, Scene
+from ....types import Array
+from ...reference.worn_pin import geometry
+from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
+
+WIDEST = 1e-3  # m
+NUDGE = 1e-4  # m
+COUNT, QUICK_COUNT = 13, 3
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Tip at rest with play in one rod's pin against ideal pins. k clearances, falling to `IDEAL_BELOW`.
+
+    Attributes
+    ----------
+    clearances, shifts, penetrations : ndarray, shape (k,)
+        m; distance of the tips; how far the journal presses into the bush.
+    force : float
+        Of the pin at the last clearance, N.
+    lever, loaded : float
+        The tip's way for the cylinder's: of the rigid boom's geometry, and of the loaded elastic boom with ideal pins.
+    """
+
+    posture: str
+    pin: str
+    clearances: Array
+    shifts: Array
+    penetrations: Array
+    force: float
+    lever: float
+    loaded: float
+
+    @property
+    def jump(self) -> float:
+        """Of the tip at the switch to the ideal pin, m."""
+        return float(self.shifts[-1])
+
+    @property
+    def ratios(self) -> Array:
+        """Shifts over loaded lever x (clearance + penetration), shape (k,)."""
+        return np.asarray(self.shifts / (self.loaded * (self.clearances + self.penetrations)))
+
+
+def shifts(scene: Scene, postures: tuple[str, ...], count: int = COUNT) -> list[Shift]:
+    """Every cylinder in every posture."""
+    document, contact = scene.model_dump(exclude_none=True), treated(scene, "contact")
+    found = []
+    for posture in postures:
+        tip, joints = _rest(ideal(scene), posture)[:2]
+        levers = np.abs(geometry.levers(document, np.cumsum(joints)))
+        for i, lever in enumerate(levers.tolist()):
+            found.append(_shift(contact, posture, i, (lever, _loaded(ideal(scene), posture, i)), tip, count))
+    return found
+
+
+def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: Array, count: int) -> Shift:
+    clearances = np.geomspace(WIDEST, IDEAL_BELOW, count)
+    clearances[-1] = IDEAL_BELOW
+    name = f"cylinder_{index + 1}.rod"
+    rests = [_rest(with_pins(scene, [pin_like(scene, name, float(c))]), posture) for c in clearances]
+    pins = np.array([pin[0] for _, _, pin in rests])
+    return Shift(
+        posture, name, clearances, np.array([np.hypot(*(own - tip)) for own, _, _ in rests]),
+        np.hypot(pins[:, 0], pins[:, 1]) - clearances, float(pins[-1, 2]), *levers,
+    )  # fmt: skip
+
+
+def _loaded(scene: Scene, posture: str, index: int) -> float:
+    """Way of the resting tip per metre of stroke `index`, by central differences."""
+    ways = [_rest(scene, posture, side * NUDGE * np.eye(len(scene.joints))[index])[0] for side in (-1.0, 1.0)]
+    return float(np.hypot(*(ways[1] - ways[0])) / (2.0 * NUDGE))
+
+
+def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array, Array, Array]:
+    """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
+    plan = compile_scene(scene)
+    state = plan.state()
+    settle(plan, state, plan.work(), strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
+    row = taken_apart(plan, first_row(plan, state)[None])
+    return row.tip[0, 0, :2], row.joints[0], row.pins[0]
+
 
 STEP = 1e-3  # s
 HOLD, QUICK_HOLD = 15.0, 0.9  # s after the stop
@@ -102,3 +185,55 @@ def main_frequency(values: Array, step: float) -> float:
     count = max(len(values), round(1.0 / (FINEST * step)))
     spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)), count))
     return float(np.argmax(spectrum) / (count * step))
+
+
+GENTLE, QUICK_GENTLE = 2.0, 0.2  # s
+RAMP, STOP, HARD_BRAKE, VIOLENT = 0.05, 0.1, 0.01, 0.3  # s: full speed, stop, its length, end
+REPEATS, QUICK_REPEATS = 7, 1
+TREATMENTS: tuple[Treatment, ...] = ("contact", "spring-damper")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Time (s) of a step of 1 ms: in the gentle move, and in the violent start and stop."""
+
+    pins: int
+    treatment: str
+    gentle: float
+    violent: float
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """Real time over run time, of both."""
+        return STEP / self.gentle, STEP / self.violent
+
+
+def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
+    """No pin, the first rod's, all rods', and those of all joints too; least of several runs that lie apart."""
+    cases = list(_cases(scene))
+    gentle, least = QUICK_GENTLE if quick else GENTLE, np.full((len(cases), 2), np.inf)
+    for _ in range(QUICK_REPEATS if quick else REPEATS):
+        least = np.minimum(least, [_seconds(one, posture, gentle) for _, _, one in cases])
+    rows = zip(cases, (least * STEP / (gentle, VIOLENT)).tolist(), strict=True)
+    return [Cost(count, name, *times) for (count, name, _), times in rows]
+
+
+def violent(scene: Scene, posture: str | None) -> Halt:
+    """To full speed and to a stop as no operator would."""
+    return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
+
+
+def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
+    yield 0, "ideal", ideal(scene)
+    names = rods_and_joints(scene)
+    for treatment in TREATMENTS:
+        for count in sorted({1, len(scene.joints), len(names)}):
+            own = [pin_like(scene, name) for name in names[:count]]
+            yield count, treatment, treated(with_pins(scene, own), treatment)
+
+
+def _seconds(scene: Scene, posture: str | None, gentle: float) -> list[float]:
+    """Run times (s) of both motions."""
+    move = motion_of(scene, posture)
+    runs = ((move, gentle), (violent(scene, posture), VIOLENT))
+    return [march(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]

@@ -1,4 +1,4 @@
-"""Scenes of the study of clearance: which pins have play, how much, and how they are treated."""
+"""Scenes of the clearance study: which pins have clearance, how much, and how they are treated."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Literal
 
 from ruamel.yaml import YAML
 
-from ..scene.clearance import names_of
-from ..scene.load import clearance_text
-from ..scene.parts import Clearance, Pin, Scene
+from ....scene.checks.clearance import names_of
+from ....scene.load import clearance_text
+from ....scene.schema import Clearance, Pin, Scene
 
 Treatment = Literal["contact", "spring-damper"]
 

@@ -1,14 +1,14 @@
-"""What `study error` compares: ways of stepping the boom, here and in two other programs."""
+"""Cases of the error study: ways of stepping the boom, here and in two other programs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from ..analysis.march import Method
-from ..peers.stiff import Solver
-from ..plan.compile import BasisName
-from ..scene.parts import Scene
+from ....analysis.methods import Method
+from ....compiler.compile import BasisName
+from ....scene.schema import Scene
+from ...reference.segments.stiff_solver import Solver
 
 STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 4e-2)  # s; every one divides the longest
 DEFAULT_STEP = 1e-3

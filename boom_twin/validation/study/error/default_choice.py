@@ -1,15 +1,14 @@
-"""Why the default is where it is: sentences made from the rows."""
+"""Default choice explained: sentences made from the rows of the error study."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..scene.parts import Scene
-from .error_cases import DEFAULT_STEP, Own, with_modes
-from .error_front import NOISE, SAME, acceleration, better, fastest, front, of, tip
-from .error_run import Row
-from .error_text import name, run_time
+from ....scene.schema import Scene
+from .cases import DEFAULT_STEP, Own, with_modes
+from .pareto_tables import NOISE, SAME, acceleration, better, fastest, front, name, of, run_time, tip
+from .runner import Row
 
 GOALS = ((1.0, 0.03), (0.1, 0.01))  # mm, relative: what a user may want, for the advice on steps
 

@@ -1,17 +1,17 @@
-"""What the pictures of `study error` show."""
+"""Panels of the error study's pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ..scene.parts import Scene
-from ..view.work_precision import TONES, Curve, Panel
-from .error_cases import PAPERS, Case, Own, Peer, Stiff
-from .error_choice import find
-from .error_front import Measure, acceleration, best_way, front, of, tip
-from .error_problem import Problem
-from .error_run import Row
+from ....plots.study import TONES, Curve, Panel
+from ....scene.schema import Scene
+from .cases import PAPERS, Case, Own, Peer, Stiff
+from .default_choice import find
+from .pareto_tables import Measure, acceleration, best_way, front, of, tip
+from .problem import Problem
+from .runner import Row
 
 PAPERS_NAME = "as in the papers"
 

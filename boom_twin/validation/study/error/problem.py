@@ -1,19 +1,40 @@
-"""The motion that all programs step, and the two references that their errors are taken against."""
+"""Problem of the error study: the motion all programs step, the references, and the virtual rig to compare with."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import sys
 from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ..analysis.march import march
-from ..errors import BoomTwinError
-from ..records import Array
-from ..scene.parts import Scene
-from .error_cases import STEPS, with_modes
-from .exudyn import load_rig
-from .motion import Motion
+from ....analysis.methods import march
+from ....analysis.motions import Motion
+from ....errors import BoomTwinError
+from ....scene.schema import Scene
+from ....types import Array
+from .cases import STEPS, with_modes
+
+
+def load_rig() -> tuple[ModuleType | None, str]:
+    """`boom_twin.validation.rig`, or None and the reason. Exudyn's build without range checks, if none is loaded."""
+    if "exudyn" not in sys.modules:
+        sys.exudynFast = True  # type: ignore[attr-defined]  # where Exudyn looks
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            return import_module("boom_twin.validation.rig"), ""
+    except BoomTwinError as missing:
+        return None, str(missing)
+
+
+def build() -> str:
+    """Which build of Exudyn is loaded."""
+    return "without range checks" if "exudyn.exudynCPPfast" in sys.modules else "with range checks"
+
 
 ROW = STEPS[-1]  # s between the instants that are compared
 OWN_MODES, OWN_STEP = (6, 8), (2.5e-4, 1.25e-4)

@@ -1,4 +1,4 @@
-"""Runs the cases of `study error`: one row per case, also for those that fail."""
+"""Run the cases of the error study: one row per case, also for those that fail."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.march import march
-from ..peers.stiff import follow
-from ..records import Array
-from .error_cases import Case, Own, Peer, Stiff
-from .error_problem import ROW, Path, Problem, every, path_of
-from .exudyn import load_rig
+from ....analysis.methods import march
+from ....types import Array
+from ...reference.segments.stiff_solver import follow
+from .cases import Case, Own, Peer, Stiff
+from .problem import ROW, Path, Problem, every, load_rig, path_of
 
 ROUNDS = 5  # over all cases, so that the runs of a case lie minutes apart; the time is their median
 OWN_REPEATS = 3  # in each of them

@@ -1,16 +1,52 @@
-"""The cases of the stability study: what is varied, how the motion follows from it, what is right."""
+"""Cases of the stability study: what is varied, which motion follows, what is right."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
-from ..scene.load import load_scene
-from ..scene.parts import Scene
-from . import stability_scenes as made
-from .long_booms import long_boom, seven_sections
-from .stability_case import Case, Truth, short
-from .stability_motions import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
+from ....scene.load import load_scene
+from ....scene.schema import Scene
+from ..long_booms import long_boom, seven_sections
+from . import setups as made
+from .setups import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
+
+Truth = Literal["fine steps", "equilibrium", "swing", "none"]
+"""What is right: the default method at an eighth of the step; the equilibrium of the last strokes; a vibration that does not
+grow about a mean that stays; nothing, because there is no solution."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the matrix.
+
+    Attributes
+    ----------
+    group, name : str
+    varied : str
+        How scene, motion or step are derived.
+    make : callable
+        Returns the `Setup`.
+    truth : Truth
+    quick : bool
+        Whether it belongs to the quick subset.
+    """
+
+    group: str
+    name: str
+    varied: str
+    make: Callable[[], Setup]
+    truth: Truth = "fine steps"
+    quick: bool = False
+
+
+def short(value: float) -> str:
+    """A power of ten times a digit: 1e-6, 5e-2, 1e13."""
+    digit, _, power = f"{value:.0e}".partition("e")
+    return f"{digit}e{int(power)}"
+
 
 STIFFNESSES = (1e5, 1e6, 1e7, 1e8, 1e9, 1e11, 1e13)  # N/m
 FACTORS = (1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3, 1e4)

@@ -1,9 +1,9 @@
-"""One time step of a weightless undeformed boom as a single linear system: the witness of what the sweeps round away.
+"""Dense solver of one time step of a weightless boom: the witness of what the sweeps round away.
 
 Kinematics are written here from the tables of a plan alone, increment by increment, in extended precision; nothing is
 condensed. With all forces zero there is no geometric stiffness, so that
 
-    [ J' M A J + (1 + beta C) K_el   G' ] [ dz ]   [ J' w ]
+[ J' M A J + (1 + beta C) K_el   G' ] [ dz ]   [ J' w ]
     [ G                              -c ] [ df ] = [ 0    ]
 
 holds exactly: J moves all mass points, G all closures and cylinder lengths, c are compliances, w weights.
@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..chain.program import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
-from ..physics.cylinder import BARREL
-from ..physics.linkage import LINK_L
-from ..plan.plan import Plan
-from ..records import Array
+from ....compiler.plan import Plan
+from ....kernels.elements.cylinder import BARREL
+from ....kernels.elements.linkage import LINK_L
+from ....kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from ....types import Array
 
 Long = np.longdouble
 

@@ -1,4 +1,4 @@
-"""Digits that one Newton step loses: the Riccati sweep, and the plain product, against the whole system solved exactly."""
+"""Exact Newton step: digits lost by the Riccati sweep and the plain product against the whole system solved exactly."""
 
 from __future__ import annotations
 
@@ -10,19 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from ..analysis.march import FAMILIES
-from ..analysis.posture import set_undeformed
-from ..chain.place import place
-from ..chain.plain import new_product, plain_pass
-from ..chain.program import Motion, State, Work
-from ..chain.status import OK
-from ..chain.sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ..physics.integrators import prepare
-from ..plan.compile import compile_scene
-from ..plan.plan import Plan
-from ..records import Array
-from ..scene.parts import Scene
-from .stability_dense import Kinematics, Long
+from ....analysis.equilibrium import set_undeformed
+from ....analysis.methods import FAMILIES
+from ....compiler.compile import compile_scene
+from ....compiler.plan import Plan
+from ....kernels.integrators import prepare
+from ....kernels.tables import OK, Motion, State, Work
+from ....kernels.transfer.forward_kinematics import place
+from ....kernels.transfer.matrix_product import new_product, plain_pass
+from ....kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from ....scene.schema import Scene
+from ....types import Array
+from .dense_solver import Kinematics, Long
 
 EPS = float(np.finfo(float).eps)
 LOAD = 1e-15  # s^2, times the gain: share of gravity, small enough for the tangent not to change, see `_increments`

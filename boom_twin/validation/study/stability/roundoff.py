@@ -1,15 +1,80 @@
-"""Error of the tip over ever smaller steps: where it stops to fall with the square of the step, since round-off takes over."""
+"""Round-off study: digits lost over chain length, stiffness and step, and gravity limits of equilibrium."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.march import Method, march
-from ..records import Array
-from ..scene.parts import Scene
-from .stability_motions import smooth
+from ....analysis.equilibrium import settle
+from ....analysis.methods import Method, march
+from ....analysis.modal import natural_modes
+from ....analysis.motions import motion_of
+from ....analysis.simulate import RHO
+from ....compiler.compile import compile_scene
+from ....errors import SolverError
+from ....scene.kinematics import joint_angles_of_strokes
+from ....scene.schema import Scene
+from ....types import Array
+from ..long_booms import long_boom, seven_sections
+from . import setups as made
+from .cases import short
+from .exact_step import Step, one_step
+from .setups import Setup, lighter_gravity, smooth
+
+COUNTS, QUICK_COUNTS = (2, 3, 5, 10, 20, 50, 100, 200), (2, 5, 20)
+STEPS, QUICK_STEPS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 5e-2), (1e-5, 1e-3)  # s
+USUAL = 1e-3  # s
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Digits lost in one step: `group` is what is varied, `value` its amount."""
+
+    group: str
+    name: str
+    value: float
+    step: Step
+
+
+def losses(scene: Scene, quick: bool = False) -> list[Loss]:
+    """All measurements; `quick` leaves out the long ones."""
+    found = [*_by_count(QUICK_COUNTS if quick else COUNTS), *_by_step(scene, QUICK_STEPS if quick else STEPS)]
+    return found if quick else [*found, *_by_stiffness(scene)]
+
+
+def _by_count(counts: tuple[int, ...]) -> Iterator[Loss]:
+    for count in counts:
+        boom = long_boom(count)
+        yield Loss("sections", f"20 m in {count} sections", count, one_step(boom, _angles(boom), USUAL, RHO))
+
+
+def _by_step(scene: Scene, steps: tuple[float, ...]) -> Iterator[Loss]:
+    for step in steps:
+        yield Loss("time step", f"dt {short(step)} s", step, one_step(scene, _angles(scene), step, RHO))
+
+
+def _by_stiffness(scene: Scene) -> Iterator[Loss]:
+    changes: list[tuple[str, Callable[[Scene], Scene]]] = [
+        ("k 1e5 N/m", lambda s: made.cylinders(s, 1e5)),
+        ("k 1e13 N/m", lambda s: made.cylinders(s, 1e13)),
+        ("incompressible", lambda s: made.cylinders(s, None)),
+        ("EI x 1e-3", lambda s: made.bending(s, 1e-3)),
+        ("EI x 1e4", lambda s: made.bending(s, 1e4)),
+        ("links, barrels, rods x 1e-6", lambda s: made.cylinder_parts(made.links(s, 1e-6), ("barrel", "rod"), 1e-6)),
+        ("payload 10 x boom", lambda s: made.loaded(s, 10.0)),
+        ("10 modes", lambda s: made.with_modes(s, 10)),
+        ("101 m in 7 sections", lambda s: seven_sections()),
+    ]
+    for name, change in changes:
+        boom = change(scene)
+        yield Loss("extremes", name, float("nan"), one_step(boom, _angles(boom), USUAL, RHO))
+
+
+def _angles(scene: Scene) -> Array:
+    return motion_of(scene).angles
+
 
 SPAN, RISE, SHARE, ROWS = 0.2, 0.16, 0.1, 10  # s, s, of the study's move, rows compared
 TURN_UP_STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)  # s
@@ -73,3 +138,43 @@ def _rows(scene: Scene, step: float, method: Method | None) -> tuple[Array, Arra
     own = smooth(scene, None, SHARE, RISE, SPAN, step)
     found = march(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), method, angles=own.angles)
     return found.tip, found.tip_acceleration
+
+
+HALVINGS = 20
+COUNTED = 1e-6  # relative accuracy of the frequency
+
+
+@dataclass(frozen=True)
+class Limit:
+    """`share` of gravity carried at most; `frequency` (Hz) of the slowest vibration just below, and without load."""
+
+    share: float
+    frequency: float
+    unloaded: float
+
+
+def limit_of(setup: Setup) -> Limit:
+    """Halve the bracket of the load that still has a stable equilibrium, from no load to all of it.
+
+    At a true limit the slowest frequency goes to zero: stiffness is used up, and no equilibrium is near.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if np.isnan(_slowest(setup, middle)):
+            high = middle
+        else:
+            low = middle
+    return Limit(low, _slowest(setup, low), _slowest(setup, 0.0))
+
+
+def _slowest(setup: Setup, share: float) -> float:
+    """First natural frequency (Hz) at the setup's first strokes under `share` of gravity; NaN without an equilibrium."""
+    plan = compile_scene(lighter_gravity(setup.scene, share))
+    state, work = plan.state(), plan.work()
+    strokes = setup.drive(np.zeros(1))[0][0]
+    try:
+        settle(plan, state, work, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
+    except SolverError:
+        return float("nan")
+    return natural_modes(plan, state, work, 1, COUNTED)[0].frequency

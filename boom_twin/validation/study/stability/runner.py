@@ -1,4 +1,4 @@
-"""The matrix: every case marched by every method, judged against what is right there."""
+"""Run the stability study: every case by every method, judged against what is right there."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.march import March, Method, march
-from ..analysis.statics import settle
-from ..errors import SolverError
-from ..plan.compile import compile_scene
-from ..records import Array
-from ..scene.kinematics import joint_angles_of_strokes
-from .stability_case import Case
-from .stability_facts import against_motion, against_rest
-from .stability_motions import Setup
-from .stability_verdict import Facts, Verdict, verdict
+from ....analysis.equilibrium import settle
+from ....analysis.methods import March, Method, march
+from ....compiler.compile import compile_scene
+from ....errors import SolverError
+from ....scene.kinematics import joint_angles_of_strokes
+from ....types import Array
+from .cases import Case
+from .setups import Setup
+from .verdict import Facts, Verdict, against_motion, against_rest, verdict
 
 METHODS: dict[str, Method] = {
     "default": Method(),

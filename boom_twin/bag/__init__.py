@@ -1,0 +1,1 @@
+"""Session bags: reading, writing, inspecting and recovering rosbag2 directories of MCAP files."""

@@ -1,0 +1,1 @@
+"""From a scene to a compiled boom: where every number sits in memory."""

@@ -1,0 +1,1 @@
+"""States for ``/diagnostics`` (REP-107), judged without ROS."""

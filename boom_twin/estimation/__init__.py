@@ -1,0 +1,1 @@
+"""From strokes to a prediction: smoother, look-ahead, sensor model."""

@@ -1,0 +1,1 @@
+"""Inference of faults from residuals: sensitivities, whitening filter, hypothesis test."""

@@ -1,0 +1,1 @@
+"""How the boom behaves: compiled numerics."""

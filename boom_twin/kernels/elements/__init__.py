@@ -1,0 +1,1 @@
+"""Elements: beam, rigid body, cylinder, linkage, pin contact."""

@@ -1,0 +1,1 @@
+"""The transfer-matrix method: sweeps, substructures, time step."""

@@ -1,0 +1,1 @@
+"""ROS messages without ROS: CDR in and out, topics, sensor mapping, URDF."""

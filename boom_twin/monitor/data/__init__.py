@@ -1,0 +1,1 @@
+"""Data of the live page: feeds, tables, status, spectrum."""

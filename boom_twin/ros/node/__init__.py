@@ -1,0 +1,1 @@
+"""The live node: parameters, services, diagnostics."""

@@ -1,0 +1,1 @@
+"""What the twin is checked against: virtual rig, reference models, studies."""

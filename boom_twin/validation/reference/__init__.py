@@ -1,0 +1,1 @@
+"""Independent models of the same boom; none uses an equation of the twin."""

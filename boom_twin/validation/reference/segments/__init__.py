@@ -1,0 +1,1 @@
+"""Reference model of short rigid segments with springs between them."""

@@ -1,0 +1,1 @@
+"""The virtual rig's boom in Exudyn."""

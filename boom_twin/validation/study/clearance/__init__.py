@@ -1,0 +1,1 @@
+"""Effects, convergence and cost of clearance."""
