@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from ..errors import BoomTwinError
@@ -101,8 +100,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for name, streams in self._topics.heard.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            wire = Wire(topic.type, partial(deserialize_message, message_type=kind))
-            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, wire))
+            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, Wire(topic.type)))
             self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self.get_logger().info(f"active; listening to {heard}")
