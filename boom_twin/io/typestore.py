@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from functools import cache
 from typing import Any
 
@@ -40,7 +41,7 @@ def decode(data: bytes, type_name: str) -> Any:
 
     Raises
     ------
-    SerdeError, or another of `boom_twin.io.damage.STUMBLES`
+    SerdeError
         The message is not whole, or more stands behind it.
     """
     if data[:2] not in _ORDERS:
@@ -48,7 +49,10 @@ def decode(data: bytes, type_name: str) -> Any:
     store = jazzy()
     kind = store.get_msgdef(type_name)
     read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
-    message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+    try:
+        message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+    except (struct.error, ValueError) as error:
+        raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
     end = _ENCAPSULATION + size
     if len(data) > end + PADDING:
         behind = f"{len(data) - end} bytes stand behind its last field, which ends at byte {end}"
