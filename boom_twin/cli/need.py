@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..io.atomic import check_target, write_atomic
+from ..io.atomic import check_new, write_atomic
 from ..scene import Scene
 from ..scene.end_mark import with_end_mark
 from ..scene.load import default_text
@@ -51,9 +51,7 @@ def refuse_misuse(args: Namespace) -> None:
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
     if args.out is not None:
-        check_target(args.out, [Path(source) for source in (args.scene, args.against) if source])
-        if args.out.is_file() and args.out.stat().st_size:
-            raise UsageError(f"{args.out}: is there already, and no scene is written over. Name another file.")
+        check_new(args.out, [Path(source) for source in (args.scene, args.against) if source])
 
 
 def tip_error(text: str) -> float:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import UsageError
-from ..io.atomic import check_target, write_atomic
+from ..io.atomic import check_new, check_target, write_atomic
 from ..records import Array
 from ..scene import Scene
 from .common import add_scene, open_scene
@@ -42,7 +42,7 @@ def run(args: Namespace) -> int:
     sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
     check_target(Path(args.out), sources, _earlier(len(scene.joints)))
     if args.orbits:
-        check_target(Path(args.orbits), sources)
+        check_new(Path(args.orbits), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)

@@ -26,6 +26,8 @@ class Outcome:
         By topic; None where no sound count of the source says how many there were.
     nameless : int
         Sound messages that were left out, because the definition of their topic is lost.
+    copies : int
+        Messages that were left out, because they stand in a chunk that is the copy of one before it.
     faults : list of (Path, Fault)
         The first `MOST_FAULTS`.
     fault_count : int
@@ -35,6 +37,7 @@ class Outcome:
     unvouched: Counter[str] = field(default_factory=Counter)
     lost: dict[str, int] | None = None
     nameless: int = 0
+    copies: int = 0
     faults: list[tuple[Path, Fault]] = field(default_factory=list)
     fault_count: int = 0
 

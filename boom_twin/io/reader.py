@@ -23,7 +23,7 @@ from .definitions import check_encoding
 from .files import check_listed, mcap_files
 from .incomplete import incompleteness
 from .survey import McapFile, survey
-from .typestore import jazzy
+from .typestore import decode, jazzy
 
 RECOVERED = "recovered from"
 """The note of a session that was saved from a damaged one, which may have been ended by force."""
@@ -194,7 +194,6 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
     known = jazzy().types
     channels = file.channels
     seen: Counter[int] = Counter()
-    decode = jazzy().deserialize_cdr
     with blame(file.path):
         for message in messages(file.path, file.chunks):
             channel = channels[message.channel_id]

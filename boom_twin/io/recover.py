@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from hashlib import sha256
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -23,7 +24,7 @@ from .outcome import Outcome
 from .reader import RECOVERED, scan
 from .recorded import Recorded
 from .results import RECOVER, result_folder
-from .salvage import Fault, walk
+from .salvage import Fault, Piece, walk
 from .sheet import sheet_path
 
 
@@ -83,11 +84,15 @@ def _copy(
     metadata: BagMetadata | None,
     unverified: bool,
 ) -> None:
-    """Copy the messages of one file."""
+    """Copy the messages of one file; those of a chunk that is the copy of another are left out."""
     own: dict[int, int] = {}
+    seen: Counter[bytes] = Counter()
     for piece in walk(file, unverified, legend.channels):
         if isinstance(piece, Fault):
             outcome.note(file, piece)
+            continue
+        if _is_copy(piece, legend, seen):
+            outcome.copies += sum(opcode == Opcode.MESSAGE for opcode, _ in parts(piece.content))
             continue
         for opcode, body in parts(piece.content):
             if opcode != Opcode.MESSAGE:
@@ -103,6 +108,20 @@ def _copy(
             bag.write(key, message.log_time, message.data, message.publish_time, message.sequence)
             if not (piece.vouched or legend.is_summed):
                 outcome.unvouched[bag.topics[key].topic] += 1
+
+
+def _is_copy(piece: Piece, legend: Legend, seen: Counter[bytes]) -> bool:
+    """Whether a piece is a chunk that was `seen` before, and more often than the recorder wrote it.
+
+    Equal messages in one chunk were recorded as they stand there. So were equal chunks (a clock that stands still gives
+    such), if the checksum of all data fits, or as many as a sound index lists.
+    """
+    head = piece.chunk
+    if head is None or legend.is_summed:
+        return False
+    digest = sha256(piece.content).digest()
+    seen[digest] += 1
+    return seen[digest] > max(1, legend.listed[head.start, head.end, head.unpacked])
 
 
 def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:

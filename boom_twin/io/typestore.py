@@ -1,14 +1,60 @@
-"""The message definitions of ROS 2 Jazzy, generated once."""
+"""The message definitions of ROS 2 Jazzy, generated once, and the decoder of every message here."""
 
 from __future__ import annotations
 
+import struct
 from functools import cache
+from typing import Any
 
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
+
+PADDING = 12
+"""Bytes that may stand behind the last field of a message, whatever they are.
+
+``rmw_serialize`` of Fast DDS, by which ``serialize_message`` of rclpy and rosbag2's writers of whole messages encode, gives
+back a buffer of estimated size, not what Fast CDR has filled of it. The estimate aligns the elements of a sequence of doubles
+also where there are none, which is 4 bytes each; a JointState has three. They are not initialised.
+"""
+_ENCAPSULATION = 4  # bytes before the first field; the second one says in which order bytes are
+_ORDERS = (b"\x00\x00", b"\x00\x01")
 
 
 @cache
 def jazzy() -> Typestore:
     """The store that encodes, decodes and describes every message here; nothing is ever registered in it."""
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def decode(data: bytes, type_name: str) -> Any:
+    """The message in `data`, which may have as much behind its end as Fast DDS leaves there, see `PADDING`.
+
+    The `Typestore`'s own decoder takes 3 bytes.
+
+    Parameters
+    ----------
+    data : bytes
+        CDR (``PLAIN_CDR``), of either byte order.
+    type_name : str
+        One that Jazzy has.
+
+    Raises
+    ------
+    SerdeError
+        The message is not whole, or more stands behind it.
+    """
+    if data[:2] not in _ORDERS:
+        raise SerdeError(f"{type_name} begins with the bytes {data[:2].hex()!r}: only 0000 and 0001, plain CDR, can be read.")
+    store = jazzy()
+    kind = store.get_msgdef(type_name)
+    read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
+    try:
+        message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+    except (struct.error, ValueError) as error:
+        raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
+    end = _ENCAPSULATION + size
+    if len(data) > end + PADDING:
+        behind = f"{len(data) - end} bytes stand behind its last field, which ends at byte {end}"
+        raise SerdeError(f"{type_name} of {len(data)} bytes: {behind}; publishers leave up to {PADDING} there.")
+    return message

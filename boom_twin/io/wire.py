@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ..records import Stream
 from .cdr import names_in, stamp_in
 from .topics import TYPES
+from .typestore import decode
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
 _LITTLE = b"\x00\x01"
@@ -65,13 +66,13 @@ class Wire:
     ----------
     type_name : str
         ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
-    decode : callable
+    decode : callable, optional
         Decodes a message that is laid out in another way than the one before.
     """
 
-    def __init__(self, type_name: str, decode: Callable[[bytes], Any]) -> None:
+    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode) -> None:
         self._learn = _force_layout if type_name == TYPES[Stream.IMU] else _joints_layout
-        self._decode = decode
+        self._type, self._decode = type_name, decode
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> tuple[int, Any]:
@@ -86,7 +87,7 @@ class Wire:
         if layout is not None and layout.is_of(data):
             msg: Any = layout.make(layout.numbers.unpack_from(data, layout.at))
         else:
-            msg = self._decode(data)
+            msg = self._decode(data, self._type)
             self._layout = self._learn(data) if data[:2] == _LITTLE else None
         stamp = stamp_in(data)
         if stamp is None:

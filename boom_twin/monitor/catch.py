@@ -14,7 +14,7 @@ from typing import Any
 from ..io.health import decode_health
 from ..io.intake import Intake, stamp_of
 from ..io.topics import Output, Topics
-from ..io.typestore import jazzy
+from ..io.typestore import decode
 from ..records import Sample, Stream, channels_of
 from . import checks
 from .dropped import Dropped, MalformedError
@@ -104,7 +104,7 @@ class Catch:
         """The same of one in CDR."""
         with self.dropped.guard(topic):
             checks.count("bytes", len(data), LONGEST)
-            self._takers[topic](jazzy().deserialize_cdr(data, self._types[topic]), now)
+            self._takers[topic](decode(data, self._types[topic]), now)
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first."""

@@ -8,17 +8,24 @@ from math import isfinite
 from typing import Any
 
 from .alarms import Alarm
+from .dropped import Dropped
 from .lamps import HEALTH, Lamp, Level, overall, worst
 from .store import Store
 
 
-def state(store: Store, now: float, time: float) -> dict[str, Any]:
-    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s)."""
+def state(store: Store, now: float, time: float, dropped: Dropped | None = None) -> dict[str, Any]:
+    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s), and what was dropped.
+
+    All is not well where messages were dropped, whatever the lamps say: they may have told otherwise.
+    """
     groups = store.board(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
+    losses = [] if dropped is None else dropped.told()
+    if losses and level == Level.OK:
+        level, reason = Level.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
-    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told}
+    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told, "dropped": losses}
 
 
 def layout(store: Store) -> dict[str, Any]:

@@ -9,7 +9,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from ..io.topics import Topic
+from ..printable import printable
 from ..watch.status import Level, Status
+from .log import Log
 from .qos import qos_profile
 
 
@@ -24,7 +26,7 @@ class Board:
     """
 
     def __init__(self, node: Node, topic: Topic) -> None:
-        self._node = node
+        self._node, self._logger = node, Log(node)
         self._name = node.get_fully_qualified_name().lstrip("/")
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
@@ -48,19 +50,19 @@ class Board:
             groups.setdefault(status.message, []).append(status.name)
         text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
         if any(status.level != Level.OK for status in changed):
-            self._node.get_logger().warning(text)
+            self._logger.warning(text)
         elif changed:
-            self._node.get_logger().info(text)
+            self._logger.info(text)
 
     def _message(self, status: Status) -> DiagnosticStatus:
         return DiagnosticStatus(
             name=f"{self._name}: {status.name}",
             level=bytes([status.level]),
-            message=status.message,
+            message=_text(status.message),
             values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
         )
 
 
 def _text(value: str | int | float) -> str:
-    """As a program reads it; nine digits of a float."""
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
+    """As a program reads it: nine digits of a float; what files and other nodes put into a text is escaped, as in the log."""
+    return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")

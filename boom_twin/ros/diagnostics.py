@@ -17,6 +17,7 @@ from ..twin import EVENTS, TOLD_AT_ONCE, Twin
 from ..watch.sensors import sensors_of
 from ..watch.twin import TwinWatch
 from .board import Board
+from .log import Log
 from .peers import PeerBook
 from .receive_queue import ReceiveQueue
 
@@ -37,7 +38,7 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
-        self._node, self._queue = node, queue
+        self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
         self._board = Board(node, topics.outputs[Output.DIAGNOSTICS])
@@ -132,4 +133,4 @@ class Diagnostics:
         """Log something once."""
         if name not in self._told:
             self._told.add(name)
-            self._node.get_logger().warning(text)
+            self._logger.warning(text)

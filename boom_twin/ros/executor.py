@@ -10,6 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from .context import STOPPED, one_line
+from .log import Log
 from .receive_queue import ReceiveQueue
 
 WAKE = 0.2
@@ -33,7 +34,7 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
         raise
     except Exception as error:
         told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
-        node.get_logger().warning(told % one_line(error))
+        Log(node).warning(told % one_line(error))
         _drive(SingleThreadedExecutor(), node, queue, is_over)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 from ..records import Change, Report
+from .log import Log
 
 BETWEEN = 1.0
 """Least time (s) between starts that are told: a source whose clock jumps at every sample does not fill the log."""
@@ -16,11 +16,11 @@ class Started:
 
     Parameters
     ----------
-    logger : logger of a node
+    log : Log
     """
 
-    def __init__(self, logger: Any) -> None:
-        self._logger = logger
+    def __init__(self, log: Log) -> None:
+        self._log = log
         self._before: dict[str, float] | None = None
         self._told = -BETWEEN
 
@@ -38,4 +38,4 @@ class Started:
         elif "clock set" in report.events:
             words.insert(0, "clock set; the model goes on")
         self._told = time.monotonic()
-        self._logger.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")
+        self._log.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")
