@@ -55,8 +55,8 @@ test-extra: $(READY) $(COLCON_READY) ament client
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
 study: warm
-	for kind in error stability parts clearance; do $(BIN)/boom_twin study $$kind --out out/study || exit 1; done
-	mkdir -p docs/study && cp out/study/*.md out/study/*.png docs/study/
+	for kind in error stability parts clearance; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
+	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
 
 soak: warm
 	$(BIN)/python test/bench/soak.py

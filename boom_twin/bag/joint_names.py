@@ -76,10 +76,7 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """The names in the messages of strokes and angles, in order: within the window, and on until every cylinder was named.
-
-    Nothing where a message cannot be decoded.
-    """
+    """The names in the messages of strokes and angles, in order: within the window, and on until every cylinder was named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:
@@ -87,15 +84,11 @@ def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[s
     found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
     needed = {sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values()}
     first: int | None = None
-    wanted = {name: topics.inputs[streams[0]].type for name, streams in present.items()}
-    try:
-        for name, log, message in read(session, wanted):
-            first = log if first is None else first
-            for stream in present[name]:
-                if len(found[stream]) < LONGEST:
-                    found[stream].update(dict.fromkeys(message.name[:LONGEST]))
-            if log - first > WINDOW and needed <= found.get(Stream.STROKES, {}).keys():
-                break
-    except BagError:  # a message that cannot be decoded: whoever needs it tells of it, and nothing is known of the names
-        return {}
+    for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
+        first = log if first is None else first
+        for stream in present[name]:
+            if len(found[stream]) < LONGEST:
+                found[stream].update(dict.fromkeys(message.name[:LONGEST]))
+        if log - first > WINDOW and needed <= found.get(Stream.STROKES, {}).keys():
+            break
     return found

@@ -20,7 +20,7 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import TypesysError, get_types_from_msg
 
 from ..errors import BagError
-from ..messages.cdr_encoder import jazzy
+from ..messages.type_store import decode, jazzy
 from ..system.received_files import holds_file
 from .integrity import RESCUE, STUMBLES, blame, compare_counts
 from .mcap_records import messages
@@ -270,7 +270,6 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
     known = jazzy().types
     channels = file.channels
     seen: Counter[int] = Counter()
-    decode = jazzy().deserialize_cdr
     with blame(file.path):
         for message in messages(file.path, file.chunks):
             channel = channels[message.channel_id]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..messages.cdr_encoder import RosbagsTypes
 from ..messages.message_fields import FRAME, fill_header
 from ..messages.topic_table import TYPES, load_topics
+from ..messages.type_store import RosbagsTypes
 from ..types import Array, Sample, Stream
 from .writer import SessionWriter
 

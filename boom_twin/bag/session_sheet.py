@@ -164,10 +164,10 @@ def incompleteness(path: Path) -> str:
     Parameters
     ----------
     path : Path
-        Of the folder or of a file in it; also ``bag`` in the folder of a replay.
+        Of the folder or of a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
     """
     folder = path if path.is_dir() else path.parent
-    for place in (folder, folder.resolve().parent):
+    for place in (folder, *folder.resolve().parents[:2]):
         if is_unfinished(place):
             return f"incomplete: {place / UNFINISHED} says that its command was stopped, or is still at work. Run it again."
     sheet = folder / FILE_NAME

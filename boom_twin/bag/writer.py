@@ -14,8 +14,8 @@ from typing import Any, Self
 from mcap.writer import CompressionType, Writer
 
 from ..errors import BagError
-from ..messages.cdr_encoder import jazzy
 from ..messages.topic_table import Topic
+from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from . import metadata as bagmeta
 from .mcap_summary import NOTES, PROFILE

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..scene import Scene
 from ..scene.load import default_text
 from ..scene.yaml_reader import read_text, with_end_mark
-from ..system.atomic_files import check_target, write_atomic
+from ..system.atomic_files import check_new, write_atomic
 
 if TYPE_CHECKING:
     from ..reduction.search import Proposal
@@ -51,9 +51,7 @@ def refuse_misuse(args: Namespace) -> None:
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
     if args.out is not None:
-        check_target(args.out, [Path(source) for source in (args.scene, args.against) if source])
-        if args.out.is_file() and args.out.stat().st_size:
-            raise UsageError(f"{args.out}: is there already, and no scene is written over. Name another file.")
+        check_new(args.out, [Path(source) for source in (args.scene, args.against) if source])
 
 
 def tip_error(text: str) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..scene import Scene
-from ..system.atomic_files import check_target, write_atomic
+from ..system.atomic_files import check_new, check_target, write_atomic
 from ..types import Array
 from .main import add_scene, open_scene
 
@@ -42,7 +42,7 @@ def run(args: Namespace) -> int:
     sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
     check_target(Path(args.out), sources, _earlier(len(scene.joints)))
     if args.orbits:
-        check_target(Path(args.orbits), sources)
+        check_new(Path(args.orbits), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)

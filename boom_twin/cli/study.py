@@ -29,7 +29,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     for name, (_, purpose) in KINDS.items():
         own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
         add_scene(own)
-        own.add_argument("--out", required=True, metavar="DIR", help="folder for tables, numbers and pictures")
+        place = "folder for tables, numbers and pictures: new, empty, or of an earlier study of this kind"
+        own.add_argument("--out", required=True, metavar="DIR", help=place)
         own.add_argument("--posture", metavar="NAME", help="where the motion starts (default: arch, or the first)")
         own.add_argument("--quick", action="store_true", help="few cases on a short motion")
         if name == "stability":
@@ -38,10 +39,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compute and write the report; prints the files."""
+    from ..system.result_folder import result_folder, study
     from .main import open_scene
 
     write: Callable[..., list[Path]] = import_module(f"boom_twin.validation.study.{KINDS[args.kind][0]}").write
     options = {"soak": True} if getattr(args, "soak", False) else {}
-    for path in write(open_scene(args.scene), Path(args.out), quick=args.quick, posture=args.posture, **options):
-        print(path)
+    scene, out = open_scene(args.scene), Path(args.out)
+    with result_folder(out, study(args.kind), [Path(args.scene)] if args.scene else []) as building:
+        written = write(scene, building.folder, quick=args.quick, posture=args.posture, **options)
+    for path in written:
+        print(out / path.name)
     return 0

@@ -13,6 +13,7 @@ from mcap.records import Schema
 
 from ..types import Stream
 from .topic_table import TYPES
+from .type_store import decode
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
 _ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
@@ -118,13 +119,13 @@ class CdrDecoder:
     ----------
     type_name : str
         ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
-    decode : callable
+    decode : callable, optional
         Decodes a message that is laid out in another way than the one before.
     """
 
-    def __init__(self, type_name: str, decode: Callable[[bytes], Any]) -> None:
+    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode) -> None:
         self._learn = _force_layout if type_name == TYPES[Stream.IMU] else _joints_layout
-        self._decode = decode
+        self._type, self._decode = type_name, decode
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> tuple[int, Any]:
@@ -139,7 +140,7 @@ class CdrDecoder:
         if layout is not None and layout.is_of(data):
             msg: Any = layout.make(layout.numbers.unpack_from(data, layout.at))
         else:
-            msg = self._decode(data)
+            msg = self._decode(data, self._type)
             self._layout = self._learn(data) if data[:2] == _LITTLE else None
         stamp = stamp_in(data)
         if stamp is None:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..types import Array, Prediction
-from .cdr_encoder import NumberFields, RosbagsTypes, Template, stamped
+from .cdr_encoder import NumberFields, Template, stamped
 from .message_fields import fill_xz
 from .topic_table import TYPES, Output
+from .type_store import RosbagsTypes
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0

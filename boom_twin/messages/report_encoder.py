@@ -17,11 +17,12 @@ from ..health.alarms import alarm_of, values_of
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
 from ..types import Alarm, Change, Health, Prediction, Report, Residuals
-from .cdr_encoder import NumberFields, RosbagsTypes, Template, jazzy, stamped
+from .cdr_encoder import NumberFields, Template, stamped
 from .marker_encoder import ShapeMarkers
 from .message_fields import fill_header, fill_xz
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
+from .type_store import RosbagsTypes, jazzy
 
 OK, WARN, ERROR = range(3)
 """Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""

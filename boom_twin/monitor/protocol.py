@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .data.dropped_messages import DroppedMessages
 from .data.status import HEALTH, Alarm, Level, StatusLamp, overall, worst
 from .data.store import Store
 
@@ -43,13 +44,19 @@ def pack(kind: int, table: int, times: NDArray[np.float64], values: NDArray[np.f
     return HEAD.pack(kind, table, columns, rows) + times.astype("<f8").tobytes() + body + bytes(-len(body) % 8)
 
 
-def state(store: Store, now: float, time: float) -> dict[str, Any]:
-    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s)."""
+def state(store: Store, now: float, time: float, dropped: DroppedMessages | None = None) -> dict[str, Any]:
+    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s), and what was dropped.
+
+    All is not well where messages were dropped, whatever the lamps say: they may have told otherwise.
+    """
     groups = store.board(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
+    losses = [] if dropped is None else dropped.told()
+    if losses and level == Level.OK:
+        level, reason = Level.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
-    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told}
+    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told, "dropped": losses}
 
 
 def layout(store: Store) -> dict[str, Any]:

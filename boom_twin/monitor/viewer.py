@@ -107,11 +107,11 @@ class Viewer:
     async def _say_state(self, position: float) -> None:
         feed, play = self._feed, self._playback
         now = feed.now() if play is None else position
-        message = state(feed.store, now, position)
+        message = state(feed.store, now, position, feed.catch.dropped)
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        message |= {"trouble": feed.trouble, "dropped": feed.catch.dropped.told(), "is_recording": self._desk.is_recording}
+        message |= {"trouble": feed.trouble, "is_recording": self._desk.is_recording}
         await self._say(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:

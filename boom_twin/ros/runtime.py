@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from ..errors import UsageError
 from ..messages.topic_table import Qos
+from .log import Log
 from .node.receive_queue import ReceiveQueue
 
 STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
@@ -77,7 +78,7 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
         raise
     except Exception as error:
         told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
-        node.get_logger().warning(told % one_line(error))
+        Log(node).warning(told % one_line(error))
         _drive(SingleThreadedExecutor(), node, queue, is_over)
 
 

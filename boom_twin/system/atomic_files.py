@@ -85,6 +85,13 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) 
                 raise UsageError(f"{path}: is there already, and is no earlier result of this command. Name another file.")
 
 
+def check_new(path: Path, sources: Sequence[Path]) -> None:
+    """As `check_target`, of a file that is never replaced: none may be there but an empty one."""
+    check_target(path, sources)
+    if path.is_file() and path.stat().st_size:
+        raise UsageError(f"{path}: is there already, and is not written over. Name another file.")
+
+
 def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
     """Put the names in a folder on the disk, where its file system can do that."""
     handle = os.open(folder, os.O_RDONLY)

@@ -51,9 +51,18 @@ class ResultKind:
 
     def has(self, name: str) -> bool:
         """Whether a path is one of its files, or of its drafts of them."""
-        place, _, last = name.rpartition("/")
-        is_draft = last.startswith(".") and last.endswith(DRAFT) and place in ("", "bag")
+        last = name.rpartition("/")[2]
+        is_draft = last.startswith(".") and last.endswith(DRAFT) and _folders(name)[0] in _folders(*self.files)
         return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
+
+    def has_folder(self, name: str) -> bool:
+        """Whether a path, with a slash behind, is a folder that some of its files lie in."""
+        return name in _folders(*self.files)
+
+
+def _folders(*names: str) -> list[str]:
+    """The folders that files lie in, innermost first, each with a slash behind; ``./`` is the result's own."""
+    return [f"{parent}/" for name in names for parent in Path(name).parents]
 
 
 _SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
@@ -62,6 +71,14 @@ _FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.
 REPLAY = ResultKind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
 RIG = ResultKind("rig", _SESSION, is_replaced=False)
 RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
+COMPARE = ResultKind(
+    "compare", ("compare.png", *(f"{side}/{name}" for side in "AB" for name in REPLAY.files)), is_replaced=True
+)
+
+
+def study(kind: str) -> ResultKind:
+    """What a study of that kind writes: its name is what the names of all its files begin with."""
+    return ResultKind(f"study {kind}", (f"{kind}.json", f"{kind}.md", f"{kind}*.png"), is_replaced=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +87,11 @@ class UnfinishedResult:
 
     folder: Path
     lock: int
+
+    def inner(self, name: str) -> UnfinishedResult:
+        """A folder in it, for a part of the result."""
+        (self.folder / name).mkdir()
+        return UnfinishedResult(self.folder / name, self.lock)
 
 
 @contextmanager
@@ -166,7 +188,7 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
     if command != kind.command:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
-    folders = {str(parent) + "/" for name in own for parent in Path(name).parents}
+    folders = set(_folders(*own))
     for name in entries:
         if name not in own and name not in folders and name not in (MANIFEST, UNFINISHED):
             raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
@@ -254,7 +276,7 @@ def _check_left(building: Path, kind: ResultKind) -> None:
     if entries and entries != [UNFINISHED] and _command(building) != kind.command:
         raise BagError(f"{building}: holds {entries[0]}, and no unfinished {kind.command} left it. {remedy}.")
     for name in entries:
-        if not (kind.has(name) or name in (MANIFEST, UNFINISHED, "bag/")):
+        if not (kind.has(name) or kind.has_folder(name) or name in (MANIFEST, UNFINISHED)):
             raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
     if not kind.is_replaced and MANIFEST in entries:
         whole = f"holds a whole result of an earlier {kind.command}, which was not put in its place"

@@ -22,8 +22,8 @@ from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.topic_table import Qos, Topic, load_topics
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]

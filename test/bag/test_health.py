@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.report_encoder import decode_health, encode_health
 from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.type_store import jazzy
 from boom_twin.types import Alarm, Health, Ranked
 
 BEGIN = 1_700_000_000_123_000_000

@@ -16,9 +16,9 @@ from boom_twin.bag.advice import missing, names_extra, names_missing, remarks
 from boom_twin.bag.inspect import inspect
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.messages.cdr_encoder import RosbagsTypes
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.messages.type_store import RosbagsTypes
 from boom_twin.types import Stream
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"

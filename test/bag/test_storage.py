@@ -21,8 +21,8 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
 from boom_twin.errors import BagError
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.types import Stream
 
 TOPIC = load_topics().inputs[Stream.STROKES]

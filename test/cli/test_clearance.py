@@ -53,6 +53,10 @@ def test_simulate_tells_lost_contacts_and_draws_orbits(
     still = dict(zip(header.split(","), map(float, rows[-1].split(",")), strict=True))
     assert still["cylinder_1_rod_contact"] == 1.0
     assert np.hypot(still["cylinder_1_rod_dx_m"], still["cylinder_1_rod_dy_m"]) > 1e-4
+    picture.write_bytes(b"mine")
+    assert main([*given, "--orbits", str(picture)]) == 1
+    assert "orbits.png: is there already, and is not written over" in capsys.readouterr().err
+    assert picture.read_bytes() == b"mine"
 
 
 def test_orbits_need_a_pin(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -31,10 +31,11 @@ def rewrite(
     encoding: str = "cdr",
     schema_encoding: str = "ros2msg",
     change: Callable[[bytes], bytes] = bytes,
+    recode: Callable[[bytes], bytes] = bytes,
     backwards: bool = False,
     **options: Any,
 ) -> Path:
-    """Write the messages of `source` into `target` with other options, order, or names."""
+    """Write the messages of `source` into `target` with other options, order, definitions (`change`) or content (`recode`)."""
     options = {"chunk_size": 2048, "compression": CompressionType.NONE, **options}
     with source.open("rb") as old, target.open("wb") as new:
         writer = Writer(new, **options)
@@ -45,7 +46,7 @@ def rewrite(
             if channel.topic not in channels:
                 kind = writer.register_schema(schema.name, schema_encoding, change(schema.data))
                 channels[channel.topic] = writer.register_channel(channel.topic, encoding, kind)
-            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+            writer.add_message(channels[channel.topic], message.log_time, recode(message.data), message.publish_time)
         writer.finish()
     return target
 

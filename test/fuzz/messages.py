@@ -23,10 +23,10 @@ from boom_twin.bag.session_files import _Messages
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.messages.type_store import PADDING, decode, jazzy
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
@@ -72,8 +72,8 @@ def _true(random: Generator, number: int, stream: Stream) -> Sample:
     return Sample(stream, stamp, random.normal((0.0, 9.81), 0.05, 2))
 
 
-def _encoded(sample: Sample) -> bytes:
-    return bytes(jazzy().serialize_cdr(_rig().of(sample), TYPES[sample.stream]))
+def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
+    return bytes(jazzy().serialize_cdr(_rig().of(sample), TYPES[sample.stream], little_endian=little_endian))
 
 
 @cache
@@ -121,8 +121,10 @@ def _hostile(random: Generator, number: int, stream: Stream) -> list[Any]:
     true = _true(random, number, stream)
     if how < 0.35:
         return [stream.name, random.bytes(int(random.integers(200))).hex()]
-    if how < 0.6:
+    if how < 0.55:
         return [stream.name, _mangled(random, _encoded(true)).hex()]
+    if how < 0.6:
+        return [stream.name, _padded(random, true).hex()]
     stamp = _stamp(random, true.stamp)
     values = true.values.copy()
     if random.random() < 0.6:
@@ -152,6 +154,11 @@ def _mangled(random: Generator, data: bytes) -> bytes:
     return data[:at] + number + data[at + size :]
 
 
+def _padded(random: Generator, sample: Sample) -> bytes:
+    """Of either byte order, with as much behind its end as may stand there, or more."""
+    return _encoded(sample, bool(random.integers(2))) + random.bytes(int(random.integers(1, 2 * PADDING)))
+
+
 # -- judging --------------------------------------------------------------------------------------------------------------
 
 
@@ -172,8 +179,7 @@ class _Listener:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
         self._twin, self._intake = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
-        self._decoders = {stream: _decoder(TYPES[stream]) for stream in Stream}
-        self._wires = {stream: CdrDecoder(TYPES[stream], self._decoders[stream]) for stream in Stream}
+        self._wires = {stream: CdrDecoder(TYPES[stream]) for stream in Stream}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 
     def told(self) -> str:
@@ -205,7 +211,7 @@ class _Listener:
             return None
         if stream is not Stream.IMU:
             try:
-                whole = self._decoders[stream](data)
+                whole = decode(data, TYPES[stream])
             except STUMBLES:
                 return "read, and a full decoder refuses it"
             if list(whole.name) != list(message.name) or not np.array_equal(whole.position, message.position, equal_nan=True):
@@ -219,10 +225,6 @@ class _Listener:
         for words in (dump(layout(store)), dump(state(store, 0.0, store.newest)), dump(alarms(store.alarms.all))):
             json.loads(words, parse_constant=_refuse_constant)
         return ""
-
-
-def _decoder(type_name: str) -> Any:
-    return lambda data: jazzy().deserialize_cdr(data, type_name)
 
 
 def _refuse_constant(name: str) -> None:

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boom_twin.messages.cdr_encoder import RosbagsTypes
 from boom_twin.messages.sample_decoder import LONGEST, SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import Sensor, Topics, channels, load_topics, usual
+from boom_twin.messages.type_store import RosbagsTypes
 from boom_twin.types import Stream
 
 TYPES = RosbagsTypes()

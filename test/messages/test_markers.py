@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.type_store import jazzy
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Prediction
 

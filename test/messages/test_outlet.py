@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.offline.writer_process import pack, unpack
 from boom_twin.scene import load_scene
 from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream

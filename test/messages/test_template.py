@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.messages.cdr_encoder import NumberFields, RosbagsTypes, Template, jazzy, stamped
+from boom_twin.messages.cdr_encoder import NumberFields, Template, stamped
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 
 MARKER = "visualization_msgs/msg/Marker"
 

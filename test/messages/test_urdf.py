@@ -12,9 +12,9 @@ import pytest
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.cli.main import main
 from boom_twin.config.settings import Settings
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.type_store import jazzy
 from boom_twin.messages.urdf import urdf
 from boom_twin.scene.kinematics import PassiveJoints, skeleton, strokes_of_posture
 from boom_twin.scene.schema import Scene

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import TYPES
+from boom_twin.messages.type_store import RosbagsTypes, decode, jazzy
 from boom_twin.types import Stream
 
 MAKE = RosbagsTypes()
 
 
-def decoder(stream: Stream, calls: list[bytes]) -> Any:
-    def decode(data: bytes) -> Any:
+def counted(calls: list[bytes]) -> Any:
+    def counting(data: bytes, type_name: str) -> Any:
         calls.append(data)
-        return jazzy().deserialize_cdr(data, TYPES[stream])
+        return decode(data, type_name)
 
-    return decode
+    return counting
 
 
 def joint_state(stamp: int, names: list[str], values: Any, frame: str = "", effort: int = 0) -> bytes:
@@ -42,7 +42,7 @@ def imu(stamp: int, frame: str, covariance: float, x: float, z: float) -> bytes:
 
 def same(wire: CdrDecoder, stream: Stream, data: bytes) -> None:
     """What an intake makes of it, with and without decoding all of it."""
-    decoded = jazzy().deserialize_cdr(data, TYPES[stream])
+    decoded = decode(data, TYPES[stream])
     stamp, msg = wire.read(data)
     assert stamp == decoded.header.stamp.sec * 10**9 + decoded.header.stamp.nanosec
     mine, theirs = SampleDecoder(4), SampleDecoder(4)
@@ -55,7 +55,7 @@ def same(wire: CdrDecoder, stream: Stream, data: bytes) -> None:
 
 def test_strokes_of_every_layout() -> None:
     random, calls = np.random.default_rng(2), []
-    wire = CdrDecoder(TYPES[Stream.STROKES], decoder(Stream.STROKES, calls))
+    wire = CdrDecoder(TYPES[Stream.STROKES], counted(calls))
     names = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
     for frame in ("", "base_link", "x" * 7):
         for extra in ([], ["boom_é"], ["a", "bb", "ccc"]):
@@ -68,7 +68,7 @@ def test_strokes_of_every_layout() -> None:
 
 def test_accelerations_of_every_frame() -> None:
     calls: list[bytes] = []
-    wire = CdrDecoder(TYPES[Stream.IMU], decoder(Stream.IMU, calls))
+    wire = CdrDecoder(TYPES[Stream.IMU], counted(calls))
     for frame in ("", "tip", "tip_link", "base_footprint"):
         for k, covariance in enumerate((0.0, -1.0, 0.2)):
             same(wire, Stream.IMU, imu(10**18 + k, frame, covariance, 0.1 * k, -9.0))
@@ -77,7 +77,7 @@ def test_accelerations_of_every_frame() -> None:
 
 def test_other_names_of_the_same_length() -> None:
     calls: list[bytes] = []
-    wire = CdrDecoder(TYPES[Stream.ANGLES], decoder(Stream.ANGLES, calls))
+    wire = CdrDecoder(TYPES[Stream.ANGLES], counted(calls))
     for names in (["joint_1", "joint_2"], ["joint_2", "joint_1"], ["joint_1", "joint_2"]):
         same(wire, Stream.ANGLES, joint_state(5, names, [1.0, 2.0]))
     assert len(calls) == 3
@@ -85,7 +85,7 @@ def test_other_names_of_the_same_length() -> None:
 
 @pytest.mark.parametrize("cut", [0, 3, 8, 11, 20, 40, 60])
 def test_a_message_that_is_cut_off_is_refused_and_the_next_one_read(cut: int) -> None:
-    wire = CdrDecoder(TYPES[Stream.STROKES], decoder(Stream.STROKES, []))
+    wire = CdrDecoder(TYPES[Stream.STROKES])
     data = joint_state(7, ["cylinder_1", "cylinder_2"], [1.0, 2.0])
     wire.read(data)
     with pytest.raises(Exception):  # noqa: B017 - whatever the decoder raises
@@ -96,7 +96,7 @@ def test_a_message_that_is_cut_off_is_refused_and_the_next_one_read(cut: int) ->
 @pytest.mark.parametrize("length", [0, 1])
 def test_lengths_behind_the_numbers_count_too(length: int) -> None:
     """Else a message that a full decoder refuses is taken, and the recording of it can never be replayed."""
-    wire = CdrDecoder(TYPES[Stream.STROKES], decoder(Stream.STROKES, []))
+    wire = CdrDecoder(TYPES[Stream.STROKES])
     data = joint_state(7, ["cylinder_1", "cylinder_2"], [1.0, 2.0])
     wire.read(data)
     velocity = len(data) - 8

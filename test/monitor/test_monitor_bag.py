@@ -16,8 +16,8 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Alarm, Level, overall

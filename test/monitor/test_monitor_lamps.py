@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from boom_twin.monitor.data.dropped_messages import DroppedMessages, MalformedError
 from boom_twin.monitor.data.status import MOST, SILENCE, Alarms, Level, StatusTable, overall, worst
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, state
@@ -144,6 +145,22 @@ def test_an_alarm_is_seen_without_a_word_from_the_twin() -> None:
     judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
     found = state(store, 3.0, 3.0)
     assert (found["level"], found["reason"]) == ("ERROR", "joint_3: stuck")
+
+
+def test_all_is_not_well_where_messages_were_dropped() -> None:
+    """They may have told of a fault: the headline says so, a fault that is known goes before it."""
+    store, dropped = Store(10), DroppedMessages()
+    store.light(0.0, StatusTable().told(0.0, [status("n: model")], 0.0))
+    found = state(store, 0.0, 0.0, dropped)
+    assert (found["level"], found["reason"], found["dropped"]) == ("OK", "everything as expected", [])
+    for _ in range(2):
+        with dropped.guard("/diagnostics"):
+            raise MalformedError("no stamp")
+    found = state(store, 0.0, 0.0, dropped)
+    assert (found["level"], found["reason"]) == ("WARN", "messages dropped: 2, see below")
+    assert found["dropped"] == [{"topic": "/diagnostics", "count": 2, "reason": "no stamp"}]
+    store.light(0.0, StatusTable().told(0.0, [status("n: model", ERROR)], 0.0))
+    assert state(store, 0.0, 0.0, dropped)["reason"].startswith("model: ")
 
 
 def test_an_alarm_lasts_until_its_lamp_is_well_or_out() -> None:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.messages.cdr_encoder import RosbagsTypes, jazzy
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
+from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.monitor import log_limit as log
 from boom_twin.monitor.data import topic_rows as catching
 from boom_twin.monitor.data.analyst import Analyst

@@ -11,10 +11,10 @@ import pytest
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.health.baseline import load_baseline
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.ground_truth import load_truth
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"

@@ -54,6 +54,26 @@ def test_a_session_and_a_replay_of_it_are_the_same(
     assert not (tmp_path / "B").exists()
 
 
+def test_nothing_is_written_over_but_an_earlier_comparison(
+    replays: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for held in ("compare.png", "metadata.yaml", "A/summary.json"):
+        (place := tmp_path / held.replace("/", "_")).mkdir()
+        (place / held).parent.mkdir(exist_ok=True)
+        (place / held).write_text("mine")
+        assert main(["compare", *map(str, replays), "--out", str(place)]) == 1
+        assert f"holds {held.split('/')[0]}" in capsys.readouterr().err
+        assert [path.read_text() for path in place.rglob("*") if path.is_file()] == ["mine"]
+    (out := tmp_path / "out").mkdir()
+    for pair in (replays, replays[::-1]):
+        assert main(["compare", *map(str, pair), "--out", str(out)]) == 0
+        assert sorted(path.name for path in out.iterdir()) == ["compare.png", "manifest.json"]
+    (out / "compare.png").write_bytes(b"painted over")
+    assert main(["compare", *map(str, replays), "--out", str(out)]) == 1
+    assert (out / "compare.png").read_bytes() == b"painted over"
+    assert not list(tmp_path.glob("*.unfinished"))
+
+
 def test_a_fault_shows(replays: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", *map(str, replays)]) == 0
     lines = capsys.readouterr().out.splitlines()

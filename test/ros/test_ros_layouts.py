@@ -14,9 +14,9 @@ from ruamel.yaml import YAML
 
 import boom_twin
 from boom_twin.cli.main import COMMANDS, _parser
-from boom_twin.messages.cdr_encoder import RosbagsTypes
 from boom_twin.messages.marker_encoder import ShapeMarkers
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.messages.type_store import RosbagsTypes
 
 ROOT = Path(boom_twin.__file__).parent
 LAUNCH = sorted((ROOT / "launch").iterdir())

@@ -16,10 +16,10 @@ pytest.importorskip("rclpy")
 from boom_twin.bag.reader import read, scan
 from boom_twin.config.settings import load_settings
 from boom_twin.health.baseline import load_baseline
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.report_encoder import ReportEncoder, decode_changes
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.reader_process import recorded_changes
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene

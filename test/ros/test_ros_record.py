@@ -28,7 +28,7 @@ from boom_twin.bag.inspect import inspect
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.errors import UsageError
-from boom_twin.messages.cdr_encoder import jazzy
+from boom_twin.messages.type_store import jazzy
 from boom_twin.ros.bag import subscriptions as definition
 from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.ros.bag.subscriptions import wanted_of

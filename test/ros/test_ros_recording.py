@@ -27,9 +27,9 @@ from ruamel.yaml import YAML
 from boom_twin.bag.reader import read, read_both, scan
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.config.settings import Settings
-from boom_twin.messages.cdr_encoder import jazzy
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
+from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text

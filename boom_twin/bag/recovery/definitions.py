@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
+from mcap.records import Channel, ChunkIndex, DataEnd, Header, Metadata, Schema, Statistics
 
 from ...errors import BagError
 from ...system.received_files import open_received
@@ -34,6 +34,8 @@ class FileDefinitions:
         Messages by topic as a sound summary has them.
     is_summed : bool
         Whether all bytes up to the end of the data are under a checksum that fits.
+    listed : Counter of (int, int, int)
+        Chunks in the index of a sound summary, by first and last log time (ns) and size of the content.
     """
 
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -41,6 +43,7 @@ class FileDefinitions:
     notes: dict[str, str] = field(default_factory=dict)
     told: Counter[str] | None = None
     is_summed: bool = False
+    listed: Counter[tuple[int, int, int]] = field(default_factory=Counter)
 
     def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
         """The topic of a channel; None if its definition is lost."""
@@ -94,6 +97,9 @@ def legend_of(path: Path, unverified: bool = False) -> FileDefinitions:
                 legend.is_summed = _is_summed(path, piece.offset, body)
             elif opcode == Opcode.STATISTICS and is_in_summary:
                 statistics = Statistics.read(ReadDataStream(BytesIO(body)))
+            elif opcode == Opcode.CHUNK_INDEX and is_in_summary:
+                index = ChunkIndex.read(ReadDataStream(BytesIO(body)))
+                legend.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
             elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (taker is legend or is_data):
                 budget -= len(body)
                 if budget < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -21,7 +22,7 @@ from ..reader import RECOVERED, scan, sources
 from ..session_sheet import sheet_path
 from ..writer import BagWriter
 from .definitions import FileDefinitions, legend_of
-from .scanner import DamagedBytes, walk
+from .scanner import DamagedBytes, SoundRecords, walk
 
 MOST_FAULTS = 1000
 """Faults that are told one by one."""
@@ -41,6 +42,8 @@ class Recovery:
         By topic; None where no sound count of the source says how many there were.
     nameless : int
         Sound messages that were left out, because the definition of their topic is lost.
+    copies : int
+        Messages that were left out, because they stand in a chunk that is the copy of one before it.
     faults : list of (Path, Fault)
         The first `MOST_FAULTS`.
     fault_count : int
@@ -50,6 +53,7 @@ class Recovery:
     unvouched: Counter[str] = field(default_factory=Counter)
     lost: dict[str, int] | None = None
     nameless: int = 0
+    copies: int = 0
     faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)
     fault_count: int = 0
 
@@ -116,11 +120,15 @@ def _copy(
     metadata: BagMetadata | None,
     unverified: bool,
 ) -> None:
-    """Copy the messages of one file."""
+    """Copy the messages of one file; those of a chunk that is the copy of another are left out."""
     own: dict[int, int] = {}
+    seen: Counter[bytes] = Counter()
     for piece in walk(file, unverified, legend.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
+            continue
+        if _is_copy(piece, legend, seen):
+            outcome.copies += sum(opcode == Opcode.MESSAGE for opcode, _ in parts(piece.content))
             continue
         for opcode, body in parts(piece.content):
             if opcode != Opcode.MESSAGE:
@@ -136,6 +144,20 @@ def _copy(
             bag.write(key, message.log_time, message.data, message.publish_time, message.sequence)
             if not (piece.vouched or legend.is_summed):
                 outcome.unvouched[bag.topics[key].topic] += 1
+
+
+def _is_copy(piece: SoundRecords, legend: FileDefinitions, seen: Counter[bytes]) -> bool:
+    """Whether a piece is a chunk that was `seen` before, and more often than the recorder wrote it.
+
+    Equal messages in one chunk were recorded as they stand there. So were equal chunks (a clock that stands still gives
+    such), if the checksum of all data fits, or as many as a sound index lists.
+    """
+    head = piece.chunk
+    if head is None or legend.is_summed:
+        return False
+    digest = sha256(piece.content).digest()
+    seen[digest] += 1
+    return seen[digest] > max(1, legend.listed[head.start, head.end, head.unpacked])
 
 
 def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:

@@ -41,11 +41,22 @@ _READERS: dict[int, Callable[[ReadDataStream], kinds.McapRecord]] = {
 
 @dataclass(frozen=True, slots=True)
 class SoundRecords:
-    """Whole records, one behind the other. `vouched` says whether the checksum of their chunk fits."""
+    """Whole records, one behind the other.
+
+    Attributes
+    ----------
+    offset : int
+    vouched : bool
+        Whether the checksum of their chunk fits.
+    content : bytes
+    chunk : ChunkHead or None
+        Of the chunk whose whole content they are.
+    """
 
     offset: int
     vouched: bool
     content: bytes
+    chunk: ChunkHead | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +113,7 @@ def _next(
         return _broken(head, size - offset, reason, start), size
     try:
         content, after = sound_content(file, head, size, budget)
-        return [SoundRecords(offset, head.crc != 0, content)], after
+        return [SoundRecords(offset, head.crc != 0, content, head)], after
     except UnsoundError as error:
         if not head.is_certain:
             return [], None

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from ...messages.cdr_encoder import jazzy
 from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
 from ...messages.topic_table import Output, Topics
+from ...messages.type_store import decode
 from ...types import Sample, Stream, channels_of
 from . import message_checks as checks
 from .dropped_messages import DroppedMessages, MalformedError
@@ -104,7 +104,7 @@ class TopicRows:
         """The same of one in CDR."""
         with self.dropped.guard(topic):
             checks.count("bytes", len(data), LONGEST)
-            self._takers[topic](jazzy().deserialize_cdr(data, self._types[topic]), now)
+            self._takers[topic](decode(data, self._types[topic]), now)
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first."""

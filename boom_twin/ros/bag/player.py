@@ -14,7 +14,7 @@ from rclpy.publisher import Publisher
 from ...bag.advice import publishable
 from ...bag.reader import Session, read_both
 from ...errors import BagError, BoomTwinError
-from ...messages.cdr_encoder import jazzy
+from ...messages.type_store import jazzy
 from ..node.diagnostics import node_name
 from ..runtime import message_class, qos_profile
 from .subscriptions import installed_class

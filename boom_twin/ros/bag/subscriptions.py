@@ -13,8 +13,8 @@ from ...bag.metadata import Recorded, dump, offered_qos
 from ...bag.writer import recorded
 from ...config.yaml_text import plain, with_value
 from ...errors import UsageError
-from ...messages.cdr_encoder import jazzy
 from ...messages.topic_table import NODE, Qos, Topic, Topics
+from ...messages.type_store import jazzy
 from ..runtime import message_class, qos_profile
 
 _BASE = {"double": "float64", "float": "float32", "boolean": "bool", "octet": "byte"}

@@ -21,8 +21,10 @@ from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
+from ...system.terminal_text import printable
 from ...twin.twin import EVENTS, TOLD_AT_ONCE, Twin
 from ...types import Report, Sample, Stream
+from ..log import Log
 from ..runtime import qos_profile
 from .receive_queue import ReceiveQueue
 
@@ -38,7 +40,7 @@ class DiagnosticsPublisher:
     """
 
     def __init__(self, node: Node, topic: Topic) -> None:
-        self._node = node
+        self._node, self._logger = node, Log(node)
         self._name = node.get_fully_qualified_name().lstrip("/")
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
@@ -62,22 +64,22 @@ class DiagnosticsPublisher:
             groups.setdefault(status.message, []).append(status.name)
         text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
         if any(status.level != Level.OK for status in changed):
-            self._node.get_logger().warning(text)
+            self._logger.warning(text)
         elif changed:
-            self._node.get_logger().info(text)
+            self._logger.info(text)
 
     def _message(self, status: Status) -> DiagnosticStatus:
         return DiagnosticStatus(
             name=f"{self._name}: {status.name}",
             level=bytes([status.level]),
-            message=status.message,
+            message=_text(status.message),
             values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
         )
 
 
 def _text(value: str | int | float) -> str:
-    """As a program reads it; nine digits of a float."""
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
+    """As a program reads it: nine digits of a float; what files and other nodes put into a text is escaped, as in the log."""
+    return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")
 
 
 class GraphPeers:
@@ -156,7 +158,7 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
-        self._node, self._queue = node, queue
+        self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
         self._board = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
@@ -251,4 +253,4 @@ class Diagnostics:
         """Log something once."""
         if name not in self._told:
             self._told.add(name)
-            self._node.get_logger().warning(text)
+            self._logger.warning(text)

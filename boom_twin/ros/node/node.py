@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from ...bag.session_model import scene_from
@@ -22,6 +21,7 @@ from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
 from ...twin.twin import Twin
 from ...types import Stream
+from ..log import Log
 from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
@@ -46,6 +46,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def __init__(self) -> None:
         super().__init__(NODE)
+        self._log = Log(self)
         self.finished = False  # after the transition to shut down
         self._twin: Twin | None = None
         self._page: MonitorProcess | None = None
@@ -74,10 +75,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         try:
             self._build()
         except BoomTwinError as error:
-            self.get_logger().fatal(str(error))
+            self._log.fatal(str(error))
             return FAILURE
         except Exception:  # rclpy would swallow it
-            self.get_logger().fatal(traceback.format_exc())
+            self._log.fatal(traceback.format_exc())
             raise
         for key, topic in self._topics.outputs.items():
             if key is not Output.DIAGNOSTICS:
@@ -99,11 +100,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for name, streams in self._topics.heard.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            wire = CdrDecoder(topic.type, partial(deserialize_message, message_type=kind))
-            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, wire))
+            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, CdrDecoder(topic.type)))
             self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
-        self.get_logger().info(f"active; listening to {heard}")
+        self._log.info(f"active; listening to {heard}")
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -140,20 +140,20 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         found = scene_from(scene_path(self))
         scene, name = found.scene, found.source
         for oddity in found.oddities:
-            self.get_logger().warning(str(oddity))
+            self._log.warning(str(oddity))
         settings, joints = settings_of(self), len(scene.joints)
         topics = load_mapping(mapping_path(self), joints)
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
-        self.get_logger().info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
+        self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._intake = twin, SampleDecoder(joints, topics)
         self._outlet = ReportEncoder(scene, settings)
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._asked = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
-        self._started = Started(self.get_logger())
+        self._started = Started(self._log)
         self._diagnostics.watch(twin, self._intake, name)
-        self.get_logger().info("model ready")
+        self._log.info("model ready")
 
     def _tune(self, live: dict[str, float]) -> None:
         """Live parameters were set."""

@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from ...errors import UsageError
 from ...twin.twin import Twin
 from ...types import Change, Report
+from ..log import Log
 
 PAUSE = 1.0
 """Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
@@ -111,11 +112,11 @@ class Started:
 
     Parameters
     ----------
-    logger : logger of a node
+    log : Log
     """
 
-    def __init__(self, logger: Any) -> None:
-        self._logger = logger
+    def __init__(self, log: Log) -> None:
+        self._log = log
         self._before: dict[str, float] | None = None
         self._told = -BETWEEN
 
@@ -133,4 +134,4 @@ class Started:
         elif "clock set" in report.events:
             words.insert(0, "clock set; the model goes on")
         self._told = time.monotonic()
-        self._logger.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")
+        self._log.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")

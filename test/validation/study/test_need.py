@@ -155,7 +155,7 @@ def test_no_other_scene_is_written_over(capsys: pytest.CaptureFixture[str], tmp_
     other = tmp_path / "other.yaml"
     other.write_text("# by hand\n")
     assert main(["check", "--need", "tip=1mm", "--out", str(other)]) == 1
-    assert "other.yaml: is there already, and no scene is written over" in capsys.readouterr().err
+    assert "other.yaml: is there already, and is not written over" in capsys.readouterr().err
     assert other.read_text() == "# by hand\n"
 
 

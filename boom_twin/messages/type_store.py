@@ -1,0 +1,105 @@
+"""Message types of ROS 2 Jazzy: the type store, decoding of whole messages, and new messages by type name."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable
+from functools import cache, partial
+from operator import call
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+PADDING = 12
+"""Bytes that may stand behind the last field of a message, whatever they are.
+
+``rmw_serialize`` of Fast DDS, by which ``serialize_message`` of rclpy and rosbag2's writers of whole messages encode, gives
+back a buffer of estimated size, not what Fast CDR has filled of it. The estimate aligns the elements of a sequence of doubles
+also where there are none, which is 4 bytes each; a JointState has three. They are not initialised.
+"""
+_ENCAPSULATION = 4  # bytes before the first field; the second one says in which order bytes are
+_ORDERS = (b"\x00\x00", b"\x00\x01")
+
+
+@cache
+def jazzy() -> Typestore:
+    """The store that encodes, decodes and describes every message here; nothing is ever registered in it."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def decode(data: bytes, type_name: str) -> Any:
+    """The message in `data`, which may have as much behind its end as Fast DDS leaves there, see `PADDING`.
+
+    The `Typestore`'s own decoder takes 3 bytes.
+
+    Parameters
+    ----------
+    data : bytes
+        CDR (``PLAIN_CDR``), of either byte order.
+    type_name : str
+        One that Jazzy has.
+
+    Raises
+    ------
+    SerdeError
+        The message is not whole, or more stands behind it.
+    """
+    if data[:2] not in _ORDERS:
+        raise SerdeError(f"{type_name} begins with the bytes {data[:2].hex()!r}: only 0000 and 0001, plain CDR, can be read.")
+    store = jazzy()
+    kind = store.get_msgdef(type_name)
+    read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
+    try:
+        message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+    except (struct.error, ValueError) as error:
+        raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
+    end = _ENCAPSULATION + size
+    if len(data) > end + PADDING:
+        behind = f"{len(data) - end} bytes stand behind its last field, which ends at byte {end}"
+        raise SerdeError(f"{type_name} of {len(data)} bytes: {behind}; publishers leave up to {PADDING} there.")
+    return message
+
+
+Maker = Callable[[], Any]
+
+
+class RosbagsTypes:
+    """Messages as plain dataclasses of rosbags; needs no ROS."""
+
+    def __init__(self) -> None:
+        self._makers: dict[str, Maker] = {}
+
+    def make(self, type_name: str) -> Any:
+        """A new message of ``package/msg/Name`` with every field zero or empty (a quaternion's w too)."""
+        return self._maker(type_name)()
+
+    def doubles(self, values: Iterable[float]) -> Any:
+        """`values` as a new float64 array, shape (len(values),)."""
+        return np.array(values, dtype=np.float64)
+
+    def _maker(self, type_name: str) -> Maker:
+        """The function that makes `type_name`, built once from its definition."""
+        if type_name not in self._makers:
+            store = jazzy()
+            kind: Any = store.types[type_name]
+            fields = [self._field(description) for _, description in store.fielddefs[type_name][1]]
+            self._makers[type_name] = lambda: kind(*map(call, fields))
+        return self._makers[type_name]
+
+    def _field(self, description: Any) -> Maker:
+        """The function that makes one field of the given description."""
+        node, detail = description
+        if node is Nodetype.NAME:
+            return self._maker(detail)
+        if node is Nodetype.BASE:
+            return {"string": str, "bool": bool, "float32": float, "float64": float}.get(detail[0], int)
+        element, length = detail if node is Nodetype.ARRAY else (detail[0], 0)
+        if element[0] is Nodetype.BASE and element[1][0] != "string":
+            kind = {"byte": "uint8", "char": "uint8"}.get(element[1][0], element[1][0])
+            return partial(np.zeros, length, dtype=kind)
+        single = self._field(element)
+        return lambda: [single() for _ in range(length)]

@@ -1,0 +1,129 @@
+"""Messages with bytes behind their end, as Fast DDS leaves them there: decoder, wire and replay read them all alike."""
+
+from __future__ import annotations
+
+from array import array
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fuzz.mcap_files import rewrite
+from rosbags.serde import SerdeError
+
+from boom_twin import load_scene, replay
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.writer import FILE_NAME
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.messages.cdr_decoder import CdrDecoder
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.topic_table import TYPES
+from boom_twin.messages.type_store import PADDING, RosbagsTypes, decode, jazzy
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.types import Stream
+
+JOINT_STATE = TYPES[Stream.STROKES]
+NOISE = np.random.default_rng(5)
+
+
+def padded(data: bytes, size: int = PADDING) -> bytes:
+    """What stands behind the end is not initialised."""
+    return data + NOISE.bytes(size)
+
+
+def joint_state(values: list[float]) -> Any:
+    msg = RosbagsTypes().make(JOINT_STATE)
+    fill_header(msg.header, 7, "rig")
+    msg.name, msg.position = [f"cylinder_{i}" for i in range(1, len(values) + 1)], np.array(values)
+    return msg
+
+
+def both_orders(msg: Any, type_name: str) -> list[bytes]:
+    return [bytes(jazzy().serialize_cdr(msg, type_name, little_endian=little)) for little in (True, False)]
+
+
+@pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
+def test_every_type_is_read_with_as_much_behind_it_as_there_may_be(type_name: str) -> None:
+    for data in both_orders(RosbagsTypes().make(type_name), type_name):
+        for size in range(PADDING + 1):
+            again = jazzy().serialize_cdr(decode(padded(data, size), type_name), type_name, little_endian=bool(data[1]))
+            assert bytes(again) == data, size
+        for size in (PADDING + 1, 1000):
+            told = f"{size} bytes stand behind its last field, which ends at byte {len(data)};"
+            with pytest.raises(SerdeError, match=f"{type_name} of {len(data) + size} bytes: {told}"):
+                decode(padded(data, size), type_name)
+
+
+def test_what_rclpy_hands_to_raw_publishers_is_read() -> None:
+    """And that is as much behind the end as we take: more than rosbags does."""
+    serialization = pytest.importorskip("rclpy.serialization")
+    from sensor_msgs.msg import JointState
+
+    most = 0
+    for filled in range(8):
+        msg = JointState(name=["cylinder_1"])
+        msg.position, msg.velocity, msg.effort = (array("d", [1.5] * bool(filled & bit)) for bit in (1, 2, 4))
+        for msg.header.frame_id in ("", "a", "ab", "abc", "abcd", "abcde", "abcdef", "abcdefg"):
+            data = serialization.serialize_message(msg)
+            found = decode(data, JOINT_STATE)
+            for key in ("position", "velocity", "effort"):
+                assert list(getattr(found, key)) == list(getattr(msg, key))
+            most = max(most, len(data) - len(bytes(jazzy().serialize_cdr(found, JOINT_STATE))))
+    assert most == PADDING
+
+
+def test_the_wire_reads_what_the_decoder_reads_and_refuses_what_it_refuses() -> None:
+    for sizes in ((0, 8, 12, 13), (8, 8, 13, 13), (13, 12, 4, 14)):
+        for data in both_orders(joint_state([0.1, 0.2]), JOINT_STATE):
+            wire = CdrDecoder(JOINT_STATE)
+            for message in (padded(data, size) for size in sizes):
+                if len(message) > len(data) + PADDING:
+                    with pytest.raises(SerdeError, match="stand behind its last field"):
+                        wire.read(message)
+                    continue
+                for _ in range(2):  # once learned, it is read where it stands
+                    stamp, found = wire.read(message)
+                    assert (stamp, list(found.name)) == (7, ["cylinder_1", "cylinder_2"])
+                    assert list(found.position) == [0.1, 0.2]
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A second of a gentle move, without padding."""
+    scene, path = load_scene(), tmp_path_factory.mktemp("plain") / "bag"
+    time_s = np.arange(200) / 200.0
+    strokes = strokes_of_posture(scene, "arch") + 0.01 * (1.0 - np.cos(3.0 * time_s))[:, None]
+    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
+    imu = np.random.default_rng(2).normal((0.0, 9.81), 0.05, (200, 2))
+    stamps = 1_700_000_000_000_000_000 + np.round(time_s * 1e9).astype(np.int64)
+    write_session(path, stamps, strokes, joints, imu, description={"origin": "synthetic, made for a test"})
+    return path
+
+
+def test_a_session_with_padding_is_replayed_to_the_same_outputs(plain: Path, tmp_path: Path) -> None:
+    scene, types = load_scene(), cycle((JOINT_STATE, JOINT_STATE, TYPES[Stream.IMU]))  # in the order of the session
+
+    def recoded(data: bytes) -> bytes:
+        """Of either byte order, with anything behind it."""
+        orders = both_orders(decode(data, name := next(types)), name)
+        return padded(orders[int(NOISE.integers(2))], int(NOISE.integers(PADDING + 1)))
+
+    found = {}
+    for name, recode in {"none": bytes, "some": recoded}.items():
+        other = rewrite(plain / FILE_NAME, tmp_path / f"{name}.mcap", recode=recode)
+        summary = replay(other, scene, tmp_path / name).summary
+        found[name] = summary["output_sha256"], summary["samples"]
+    assert set(found.values()) == {(found["none"][0], 200)}
+
+
+def test_one_byte_more_is_refused_by_topic_time_and_place(plain: Path, tmp_path: Path, capsys: Any) -> None:
+    other = rewrite(plain / FILE_NAME, tmp_path / "more.mcap", recode=lambda data: padded(data, PADDING + 1))
+    told = r"more\.mcap: topic /cylinder_strokes at log time 1700000000000000000 ns: .*: 13 bytes stand behind its last field"
+    with pytest.raises(BagError, match=told):
+        list(read(scan(other), {"cylinder_strokes": JOINT_STATE}))
+    for command in (["replay", str(other), "--out", str(tmp_path / "out")], ["monitor", "--bag", str(other), "--port", "0"]):
+        assert main(command) == 1
+        assert "13 bytes stand behind its last field" in capsys.readouterr().err
