@@ -61,6 +61,7 @@ def run(args: Namespace) -> int:
     require_rclpy()
     from ..io.bagwriter import BagWriter
     from ..io.incomplete import incompleteness
+    from ..io.results import check_lasting
     from ..io.storage import Split, Storage
     from ..ros.context import ros
     from ..ros.recorder import record, recorder_node
@@ -72,7 +73,8 @@ def run(args: Namespace) -> int:
     known, thresholds = load_mapping(args.mapping), load_thresholds(args.params or DEFAULT_PARAMETERS)
     wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
-    if (told := incompleteness(args.out)) and args.out.is_dir():
+    check_lasting(args.out)
+    if args.out.is_dir() and (told := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
     with ros(["--ros-args", *args.ros_args]), recorder_node() as node:
         wanted = [resolved(each, node) for each in wanted]

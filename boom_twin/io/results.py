@@ -91,6 +91,7 @@ def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Bu
         `out` holds anything else, another command is at work on it, or it cannot be written.
     """
     place = out.resolve()
+    check_lasting(out)
     if not place.name or os.path.ismount(place):
         raise BagError(f"{out}: results are built beside it, and it cannot be renamed. Name a folder inside it.")
     if place.exists() and place.samefile(Path.cwd()):
@@ -117,6 +118,19 @@ def result_folder(out: Path, kind: Kind, sources: Sequence[Path]) -> Iterator[Bu
 def is_unfinished(folder: Path) -> bool:
     """Whether a folder says that its results are not whole."""
     return (folder / UNFINISHED).is_file() and not (folder / MANIFEST).is_file()
+
+
+def check_lasting(out: Path) -> None:
+    """Refuse a place in what a command is building or left unfinished: its next run would remove what is put there.
+
+    Raises
+    ------
+    BagError
+    """
+    place = out.resolve()
+    if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
+        told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"
+        raise BagError(f"{out}: {told}. Choose another folder.")
 
 
 # -- what may not be touched ------------------------------------------------------------------------------------------

@@ -199,6 +199,18 @@ def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys:
     assert not (tmp_path / "bag").exists()
 
 
+@pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
+def test_no_place_that_a_killed_replay_left_is_recorded_into(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from boom_twin.cli.main import main
+
+    left = tmp_path / "out.unfinished"
+    left.mkdir()
+    (left / "unfinished.json").write_text('{"command": "replay"}')
+    assert main(["record", "--out", str(left / inner), "--duration", "0.1"]) == 1
+    assert "lies in an unfinished result" in capsys.readouterr().err
+    assert [entry.name for entry in left.iterdir()] == ["unfinished.json"]
+
+
 @pytest.mark.parametrize("name", ["sensor_msgs/msg/Imu", "visualization_msgs/msg/MarkerArray", "std_msgs/msg/Empty"])
 def test_definitions_from_classes_are_those_of_the_packages(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Nothing:
