@@ -14,6 +14,7 @@ from mcap.writer import CompressionType, Writer
 from ..errors import BagError
 from . import bagmeta
 from .claim import claim
+from .content import BYTES_PER_BYTE, LARGEST
 from .recorded import Recorded
 from .summary import file_information, metadata_of
 from .survey import NOTES, PROFILE
@@ -21,6 +22,10 @@ from .survey import NOTES, PROFILE
 CHUNK_SIZE = 64 * 1024
 """Bytes of messages that wait in memory: about one second of a 200 Hz session."""
 LIBRARY = "boom_twin"
+LARGEST_MESSAGE = LARGEST - 2**20
+"""Bytes of a message that can be read again: a chunk holds its topic and type too."""
+PACKED = BYTES_PER_BYTE // 10
+"""Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
 
 
 class BagWriter:
@@ -62,6 +67,7 @@ class BagWriter:
         self._files: list[bagmeta.FileInformation] = []
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
+        self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
         claim(directory)
         self._open()
 
@@ -83,7 +89,14 @@ class BagWriter:
         return list(range(first, len(self.topics)))
 
     def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
-        """Append one encoded message; times in ns, the publish time by default the log time."""
+        """Append one encoded message of at most `LARGEST_MESSAGE`; times in ns, the publish time by default the log time.
+
+        Where so much has packed so well (blank pictures) that this file could not be read with more of it, the next
+        one begins, and nothing is packed any more.
+        """
+        if self._compression != CompressionType.NONE and self._excess + self._pending + len(data) > LARGEST_MESSAGE:
+            self._compression = CompressionType.NONE
+            self.split()
         self.counts[key] += 1
         first, last, count = self._span or (log_time, log_time, 0)
         self._span = min(first, log_time), max(last, log_time), count + 1
@@ -92,6 +105,14 @@ class BagWriter:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
+        self._weigh(len(data))
+
+    def _weigh(self, size: int) -> None:
+        """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
+        self._pending += size
+        if (end := self._buffered.tell()) > self._end:
+            self._excess += max(0, self._pending - PACKED * (end - self._end))
+            self._pending, self._end = 0, end
 
     def flush(self) -> int:
         """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
@@ -137,12 +158,13 @@ class BagWriter:
     def _open(self) -> None:
         with self._told():
             self._raw = self.file.open("xb", buffering=0)
-            buffered = BufferedWriter(self._raw)
-            self._writer = Writer(buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
+            self._buffered = BufferedWriter(self._raw)
+            self._writer = Writer(self._buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
             self._writer.start(profile=PROFILE, library=LIBRARY)
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
+            self._pending, self._end, self._excess = 0, self._buffered.tell(), 0
             self._register(self.topics)
 
     def _register(self, topics: list[Recorded]) -> None:

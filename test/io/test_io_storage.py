@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,22 @@ def test_metadata_is_there_after_each_split_and_a_lost_rest_is_noticed(tmp_path:
 def numbers_of_metadata(path: Path) -> tuple[list[str], int]:
     metadata = read_metadata(path / "metadata.yaml")
     return metadata.relative_file_paths, metadata.message_count
+
+
+def test_blank_pictures_are_read_again(tmp_path: Path) -> None:
+    """Zeros pack better than 1000 to 1, as bombs do; readers allow that for 64 MiB in a file."""
+    count, size = 25, 4_000_000
+    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    keys = [storage.add(replace(recorded(TOPIC), topic=name)) for name in ("/strokes", "/picture")]
+    for number in range(count):
+        storage.put(keys[0], number * STEP, message(number), number * STEP, number)
+        storage.put(keys[1], number * STEP, bytes(size), number * STEP, number)
+    assert storage.close() == [count, count]
+    session = scan(tmp_path / "bag")
+    assert {topic.name: topic.count for topic in session.topics} == {"/strokes": count, "/picture": count}
+    stamps = [msg.header.stamp.sec for _, _, msg in read(session, {"/strokes": TOPIC.type})]
+    assert stamps == list(range(count))
+    assert recover(tmp_path / "bag", tmp_path / "out").saved == {"/strokes": count, "/picture": count}
 
 
 def test_a_topic_may_come_late(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_types_from_msg
 from ruamel.yaml import YAML
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Image, JointState
 
 from boom_twin import __version__
 from boom_twin.errors import UsageError
@@ -115,6 +115,25 @@ def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], tmp_path:
     assert found == {name: (count, count, 0) for name, count in counts.items()} | {"/never": (0, 0, None)}
     assert sheet["started"] < sheet["ended"]
     assert sheet["topics"] == {"/cylinder_strokes": JOINT_STATE, "/odd": None, "/never": "std_msgs/msg/String"}
+
+
+def test_what_could_not_be_read_again_is_left_out_and_told(spawn: Callable[..., Any], tmp_path: Path) -> None:
+    """A chunk above 64 MiB is refused by readers, with all that is in its file."""
+    huge = Image(data=bytes(67_500_000))
+    with (
+        publishing("cylinder_strokes", JointState, 50.0, strokes),
+        publishing("/huge", Image, 0.5, lambda _: huge),
+    ):
+        topics = ["cylinder_strokes", "/huge:sensor_msgs/Image"]
+        record = spawn("boom_twin.cli.main", "record", "--out", str(tmp_path / "bag"), "--topics", *topics)
+        record.wait_for("/huge: a message of 67500")
+        assert record.stop(signal.SIGINT) == 0, record.said()
+    assert "is left out" in record.said()
+    counts = {tally.name: tally.count for tally in inspect(tmp_path / "bag").tallies}
+    assert counts["/huge"] == 0 < counts["/cylinder_strokes"]
+    sheet = YAML(typ="safe").load((tmp_path / "bag" / "session.yaml").read_text())
+    told = next(count for count in sheet["counts"] if count["topic"] == "/huge")
+    assert (told["received"], told["written"]) == (0, 0) and told["missed"] > 0
 
 
 def test_the_state_of_a_recording_is_published_until_its_disk_is_full(
