@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -26,6 +27,10 @@ LARGEST_MESSAGE = LARGEST - 2**20
 """Bytes of a message that can be read again: a chunk holds its topic and type too."""
 PACKED = BYTES_PER_BYTE // 10
 """Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
+
+
+REST = 10.0
+"""Time from one writing of ``metadata.yaml`` at a split to the next, over what it takes: it grows with every file."""
 
 
 class BagWriter:
@@ -65,6 +70,7 @@ class BagWriter:
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
         self._files: list[bagmeta.FileInformation] = []
+        self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
@@ -124,6 +130,11 @@ class BagWriter:
         return self._raw.fileno()
 
     @property
+    def completed(self) -> int:
+        """Files that are complete."""
+        return len(self._files)
+
+    @property
     def size(self) -> int:
         """Bytes of the open file on the disk, without what is in memory."""
         return 0 if self._raw.closed else self._raw.tell()
@@ -139,16 +150,19 @@ class BagWriter:
         return self._span[0] if self._span else None
 
     def split(self) -> None:
-        """Complete the open file, tell of it in ``metadata.yaml``, and begin the next one."""
-        self.close()
+        """Complete the open file, tell of it in ``metadata.yaml`` unless that takes too long by now, and begin the next one."""
+        with self._told():
+            self._finish()
+            if (began := time.monotonic()) >= self._due:
+                self._write_metadata()
+                self._due = began + (1.0 + REST) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
         with self._told():
             self._finish()
-            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
-            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
+            self._write_metadata()
 
     def abandon(self) -> None:
         """Let go of the open file; what waits in memory is given up."""
@@ -176,6 +190,10 @@ class BagWriter:
         for each in topics:
             number = self._schemas[each.type, each.definition_encoding, each.definition]
             self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
+
+    def _write_metadata(self) -> None:
+        metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+        bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
 
     def _finish(self) -> None:
         """Complete the open file."""

@@ -205,6 +205,7 @@ def test_a_recorder_killed_many_times(spawn: Callable[..., Any], tmp_path: Path,
         (["--topics", "/a", "a"], "topic /a is named twice"),
         (["--scene", "/no/such/scene.yaml"], "/no/such/scene.yaml"),
         (["--split-size", "10"], "must be at least 1M"),
+        (["--split-duration", "0.01"], "must be at least 1 s"),
     ],
 )
 def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
