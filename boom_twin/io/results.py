@@ -240,13 +240,24 @@ def _locked(building: Path, kind: Kind) -> Iterator[int]:
             busy = f"another `boom_twin {kind.command}` is at work there. Wait for its end, or choose another folder."
             raise BagError(f"{building}: {busy}")
         _check_left(building, kind)
-        note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
-        os.truncate(lock, 0)
-        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
-        os.fsync(lock)
+        _mark(lock, marker, kind)
         yield lock
     finally:
         os.close(lock)
+
+
+def _mark(lock: int, marker: Path, kind: Kind) -> None:
+    """Write into the open marker whose it is; where it cannot be written, it is removed, with the folder if that is empty."""
+    note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
+    try:
+        os.truncate(lock, 0)
+        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
+        os.fsync(lock)
+    except OSError as error:
+        if _entries(marker.parent) == [UNFINISHED]:
+            marker.unlink()
+            _remove_empty(marker.parent)
+        raise BagError(f"{marker}: cannot be written ({error.strerror}). Make room or choose another disk.") from None
 
 
 def _is_taken(lock: int, marker: Path) -> bool:

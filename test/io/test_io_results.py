@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -190,6 +191,21 @@ def test_no_session_is_made_in_what_a_killed_run_left(tmp_path: Path) -> None:
     ):
         (building.folder / "session_0.mcap").write_bytes(b"a recording")
     build(tmp_path / "out")
+
+
+def test_a_disk_that_is_full_from_the_start_is_named_and_left_as_it_was(tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        with (
+            pytest.raises(BagError, match=r"out\.unfinished/unfinished\.json: cannot be written \(.*\)\. Make room"),
+            result_folder(tmp_path / "out", REPLAY, []),
+        ):
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 def test_no_source_is_built_over(tmp_path: Path) -> None:
