@@ -158,7 +158,8 @@ def _new(path: Path) -> Iterator[TextIO]:
         with path.open("x", encoding="utf-8") as file:
             yield file
     except OSError as error:
-        raise BoomTwinError(f"{path}: cannot be written ({error.strerror}). Make room, or give another folder with --out.") from None
+        reason = f"cannot be written ({error.strerror}). Make room, or give another folder with --out."
+        raise BoomTwinError(f"{path}: {reason}") from None
 
 
 def _free(folder: Path) -> Path:

@@ -41,7 +41,7 @@ class Count:
     topic : str
     received, written : int
     missed : int or None
-        Published but never received, by the publisher's numbers, or left out; None where there were several publishers, or none.
+        Published but never received, by the publisher's numbers, or left out; None where there were several publishers or none.
     """
 
     topic: str
@@ -106,7 +106,7 @@ class _Channel:
     def _leave_out(self, size: int) -> None:
         """Tell once of what could not be read again, and would end the reading of all else."""
         if not self._left_out:
-            told = f"a message of {size} bytes is left out, as is every one above {LARGEST_MESSAGE}: they could not be read again"
+            told = f"a message of {size} bytes is left out, as all above {LARGEST_MESSAGE} are: they could not be read again"
             self._tell(f"warning: {self.wanted.name}: {told} (told once)")
         self._left_out += 1
 

@@ -10,7 +10,6 @@ from .gate import Bounds
 from .judge import Judge
 from .status import Level, Status
 
-
 ENDED = "ended"
 """Key of a status that says of itself, by 1, that it is the last one: silence after it is no news."""
 

@@ -220,7 +220,7 @@ def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys:
 
 
 @pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
-def test_no_place_that_a_killed_replay_left_is_recorded_into(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_recorded_into_what_a_killed_replay_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from boom_twin.cli.main import main
 
     left = tmp_path / "out.unfinished"
