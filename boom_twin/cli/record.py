@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..ros.wanted import Wanted
 
 SMALLEST = 2**20
-SHORTEST = 1.0
+SHORTEST = 0.1
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 

@@ -57,7 +57,8 @@ class _Channel:
         self.wanted, self._storage, self._tell = wanted, storage, tell
         self.subscription: Any = None
         self.count = Count(wanted.name)
-        self._key = -1
+        self._key, self._type = -1, ""
+        self._other_types: set[str] = set()
         self._number: int | None = None
         self._has_one = True
         self._left_out = 0
@@ -68,14 +69,26 @@ class _Channel:
             return
         found = subscription_of(node, self.wanted)
         if found is not None:
-            self._key = self._storage.add(found.recorded)
+            self._key, self._type = self._storage.add(found.recorded), found.recorded.type
             self.subscription = node.create_subscription(found.kind, self.wanted.name, self._store, found.qos, raw=True)
 
-    def look(self) -> int:
+    def look(self, node: Any) -> int:
         """How many publishers there are; with more than one, their numbers tell nothing."""
-        number: int = self.subscription.get_publisher_count() if self.subscription is not None else 0
+        if self.subscription is None:
+            return 0
+        self._tell_other_types(node)
+        number: int = self.subscription.get_publisher_count()
         self._has_one = self._has_one and number <= 1
         return number
+
+    def _tell_other_types(self, node: Any) -> None:
+        """Tell once of each type that is published beside the recorded one: DDS never connects its publishers."""
+        published = {each.topic_type for each in node.get_publishers_info_by_topic(self.subscription.topic_name)}
+        new = published - self._other_types - {self._type, ""}
+        for other in sorted(new):
+            told = f"is published as {other}, of which nothing is recorded: {self._type} is"
+            self._tell(f"warning: {self.wanted.name}: {told}")
+        self._other_types |= new
 
     @property
     def missed(self) -> int | None:
@@ -128,7 +141,7 @@ class _Recording:
         self.storage.check()
         for channel in self.channels:
             channel.open(self.node)
-        numbers = [channel.look() for channel in self.channels]
+        numbers = [channel.look(self.node) for channel in self.channels]
         return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
 
     def twin(self) -> dict[str, object]:

@@ -136,6 +136,15 @@ def test_what_could_not_be_read_again_is_left_out_and_told(spawn: Callable[..., 
     assert (told["received"], told["written"]) == (0, 0) and told["missed"] > 0
 
 
+def test_a_publisher_of_another_type_is_told(spawn: Callable[..., Any], tmp_path: Path) -> None:
+    """DDS never connects it, so that nothing would be missed."""
+    with publishing("/joint_angles", ParameterEvent, 50.0, lambda number: ParameterEvent()):
+        record = spawn("boom_twin.cli.main", "record", "--out", str(tmp_path / "bag"), "--only", "inputs")
+        record.wait_for("/joint_angles: is published as rcl_interfaces/msg/ParameterEvent, of which nothing is recorded")
+        assert record.stop(signal.SIGINT) == 1, record.said()  # nothing came
+    assert record.said().count("is published as") == 1
+
+
 def test_the_state_of_a_recording_is_published_until_its_disk_is_full(
     spawn: Callable[..., Any], bench: Any, tmp_path: Path
 ) -> None:
@@ -205,7 +214,7 @@ def test_a_recorder_killed_many_times(spawn: Callable[..., Any], tmp_path: Path,
         (["--topics", "/a", "a"], "topic /a is named twice"),
         (["--scene", "/no/such/scene.yaml"], "/no/such/scene.yaml"),
         (["--split-size", "10"], "must be at least 1M"),
-        (["--split-duration", "0.01"], "must be at least 1 s"),
+        (["--split-duration", "0.01"], "must be at least 0.1 s"),
     ],
 )
 def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -220,7 +229,7 @@ def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys:
 
 
 @pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
-def test_nothing_is_recorded_into_what_a_killed_replay_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_recorded_into_what_was_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from boom_twin.cli.main import main
 
     left = tmp_path / "out.unfinished"
