@@ -8,6 +8,7 @@ from enum import IntEnum
 from math import inf, isfinite, isnan, nan
 from typing import Any
 
+from ..watch.recording import ENDED
 from .checks import text
 
 SILENCE = 3.0
@@ -47,6 +48,8 @@ class Lamp:
     value, limit : float
     age : float
         Seconds that the level had lasted when it was told; NaN if not known.
+    is_last : bool
+        Whether its node said that no further one comes.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Lamp:
     value: float = nan
     limit: float = nan
     age: float = nan
+    is_last: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,12 +90,12 @@ class Board:
         return Board(nodes)
 
     def groups(self, now: float) -> dict[str, list[Lamp]]:
-        """Lamps by group; those of a node that is silent are stale, whatever they were."""
+        """Lamps by group; those of a node that is silent, and did not say that it ended, are stale, whatever they were."""
         found: dict[str, list[Lamp]] = {group: [] for group in GROUPS}
         for node, (heard, lamps) in self.nodes.items():
             silence = now - heard
             for lamp in lamps:
-                if silence > SILENCE:
+                if silence > SILENCE and not lamp.is_last:
                     words = f"no word from {node}"
                     lamp = Lamp(lamp.name, lamp.group, Level.STALE, words, "silence_s", silence, SILENCE, silence)
                 found[lamp.group].append(lamp)
@@ -117,7 +121,8 @@ def _lamp(name: str, status: Any, clock: float) -> Lamp:
     values = {pair.key: _number(pair.value) for pair in status.values}
     quantity, limit = _judged(values, level)
     age = clock - values["since_s"] if isfinite(values.get("since_s", nan)) else nan
-    return Lamp(name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age)
+    is_last = values.get(ENDED) == 1.0
+    return Lamp(name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age, is_last)
 
 
 def _group(name: str) -> str:
