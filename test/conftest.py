@@ -1,4 +1,4 @@
-"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; the ROS domain of the run."""
+"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; who runs what; the ROS domain."""
 
 from __future__ import annotations
 
@@ -12,12 +12,24 @@ import pytest
 if TYPE_CHECKING:
     from boom_twin.ros.isolation import Isolation
 
-sys.path.insert(0, str(Path(__file__).parent))
+HERE = Path(__file__).parent
+TOGETHER = ("calibrate", "monitor", "report")
+"""Folders whose costly fixtures are made once for all their files."""
+
+sys.path.insert(0, str(HERE))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep what shares fixtures in one process where several run the tests: a file, or one of the folders `TOGETHER`."""
+    assert all((HERE / folder).is_dir() for folder in TOGETHER)
+    for item in items:
+        folder = item.path.parent.name
+        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else str(item.path.relative_to(HERE))))
 
 
 @pytest.fixture(scope="session")
 def isolation() -> Iterator[Isolation]:
-    """A ROS domain that only this test run uses, closed to others.
+    """A ROS domain that only this process of the test run uses, closed to others.
 
     All that starts a ROS node in this process needs it: the middleware takes a process into a partition when its first node
     starts, and never again.
