@@ -73,13 +73,13 @@ def test_sessions_with_different_mappings(short, two_sections, tmp_path):
 def test_missing_values_are_left_out(short, two_sections, tmp_path):
     rng = np.random.default_rng(0)
     lost = np.where(rng.random((30 * SECOND, 2)) < 0.02, np.nan, 0.0)
-    found = calibrate([short.write(tmp_path / "bag", 3, zeros=lost)], two_sections, Choice(zeros="angles"))
+    found = calibrate([short.write(tmp_path / "bag", 3, zeros=lost)], two_sections, Choice(zeros="none"))
     assert found.misfit < 1.15 and found.after.spread[0] == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_moving_load_or_fault_is_told_by_the_misfit(short, two_sections, tmp_path):
     drift = np.linspace(0.0, 0.01, 30 * SECOND)[:, None] * [1.0, 0.0]
-    found = calibrate([short.write(tmp_path / "bag", 3, zeros=drift)], two_sections)
+    found = calibrate([short.write(tmp_path / "bag", 3, zeros=drift)], two_sections, Choice(zeros="none"))
     assert found.misfit > 1.5 and "times what noise explains" in found.remarks[0]
 
 
