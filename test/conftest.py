@@ -14,29 +14,13 @@ import pytest
 if TYPE_CHECKING:
     from boom_twin.ros.isolation import Isolation
 
-HERE = Path(__file__).parent
-TOGETHER = ("calibrate", "monitor", "report")
-"""Folders whose costly fixtures are made once for all their files."""
-
-sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(Path(__file__).parent))
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep what shares fixtures in one process where several run the tests: a file, or one of the folders `TOGETHER`.
-
-    These folders, which take longest, come first; files come mixed, so that not all wait for a ROS node at a time.
-    """
-    assert all((HERE / folder).is_dir() for folder in TOGETHER)
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(_group(item)))
+    """Mix the files where several processes share the tests, so that not all of them wait for a ROS node at a time."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: (_group(item) not in TOGETHER, crc32(_group(item).encode())))
-
-
-def _group(item: pytest.Item) -> str:
-    folder = item.path.parent.name
-    return folder if folder in TOGETHER else str(item.path.relative_to(HERE))
+        items.sort(key=lambda item: crc32(item.location[0].encode()))
 
 
 @pytest.fixture(scope="session")
