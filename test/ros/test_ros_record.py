@@ -200,7 +200,7 @@ def test_a_killed_recorder_loses_little(spawn: Callable[..., Any], tmp_path: Pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(20))
+@pytest.mark.parametrize("number", range(10))
 def test_a_recorder_killed_many_times(spawn: Callable[..., Any], tmp_path: Path, number: int) -> None:
     """At a moment drawn anew in each run; every other one while its files are split."""
     kill_once(spawn, tmp_path, random.uniform(1.3, 4.0), *(["--split-duration", "0.4"] if number % 2 else []))
