@@ -8,7 +8,11 @@ COLCON_READY := $(COLCON)/.ready
 NODE := .node
 export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# With PYTHONDONTWRITEBYTECODE every process that a test starts would compile all modules again.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# Processes that share the tests; those that wait for a ROS node leave the core to the others.
+WORKERS ?= 3
+PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 .PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures clean
 
@@ -42,16 +46,16 @@ demo: warm
 demo-live: warm
 	$(BIN)/python -P -m boom_twin.ros.demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
 
-test: lint
-	$(BIN)/python -m pytest -m "not slow"
+test: lint warm
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check boom_twin test setup.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test-extra: $(READY) $(COLCON_READY) ament client
-	$(BIN)/python -m pytest -m slow
+test-extra: warm $(COLCON_READY) ament client
+	$(BIN)/python -m pytest $(PARALLEL) -m slow
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
 study: warm

@@ -46,6 +46,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<8", "ros-jazzy-common-interfaces>=5.3,<6"],
         "test": [
             "pytest>=9.0.3,<10",
+            "pytest-xdist>=3.6,<4",
             "hypothesis>=6.100,<7",
             "ruff>=0.6,<1",
             "mypy>=1.11,<3",

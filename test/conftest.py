@@ -1,11 +1,13 @@
-"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; the ROS domain of the run."""
+"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; who runs what; the ROS domain."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
+from zlib import crc32
 
 import pytest
 
@@ -15,9 +17,15 @@ if TYPE_CHECKING:
 sys.path.insert(0, str(Path(__file__).parent))
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mix the files where several processes share the tests, so that not all of them wait for a ROS node at a time."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: crc32(item.location[0].encode()))
+
+
 @pytest.fixture(scope="session")
 def isolation() -> Iterator[Isolation]:
-    """A ROS domain that only this test run uses, closed to others.
+    """A ROS domain that only this process of the test run uses, closed to others.
 
     All that starts a ROS node in this process needs it: the middleware takes a process into a partition when its first node
     starts, and never again.

@@ -84,6 +84,9 @@ PATIENCE = 30.0
 MOST = 256 * 2**20
 """Bytes of messages that may wait in memory."""
 
+MOST_FILES = 2000
+"""Files of one recording: ``metadata.yaml`` lists them all, and of half as many more its readers would refuse it."""
+
 _Message = tuple[int, int, bytes, int, int]
 
 
@@ -112,7 +115,7 @@ class Storage:
         From now on only used here.
     split : Split
     tell : callable
-        Told in words that the disk does not answer, and that it does again.
+        Told in words that the disk does not answer, and that it does again; and that no further file begins.
     """
 
     def __init__(self, bag: BagWriter, split: Split, tell: Callable[[str], None]) -> None:
@@ -123,7 +126,7 @@ class Storage:
         self._syncer = Syncer()
         bag.sync = lambda file: self._syncer.put(file, self._taken)
         self._free = self._written = 0
-        self._is_late = False
+        self._is_late = self._is_last = False
         self._error: BaseException | None = None
         self._topics = 0
         self._thread = Thread(target=self._run, name="storage", daemon=True)
@@ -240,7 +243,16 @@ class Storage:
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message
-        if self._split.is_due(self._bag, log_time):
+        if self._split.is_due(self._bag, log_time) and not self._is_in_last_file():
             self._bag.split()
         self._bag.write(key, log_time, data, publish_time, sequence)
         self._taken += len(data)
+
+    def _is_in_last_file(self) -> bool:
+        """Whether there are `MOST_FILES`, which is told once."""
+        if self._bag.completed + 1 < MOST_FILES:
+            return False
+        if not self._is_last:
+            self._tell(f"{self._bag.file}: is the last file of {MOST_FILES}, and goes on to the end. Split less often.")
+        self._is_last = True
+        return True

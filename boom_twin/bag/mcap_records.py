@@ -33,7 +33,7 @@ PREFIX = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
 
-_TOO_MUCH = "the most that is read. No recorder packs like that"
+_TOO_MUCH = "the most that is read. Bombs pack like that, or many blank pictures"
 _WINDOW = 2**27  # of zstd, as its command line allows without --long
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,6 +19,7 @@ from ..messages.topic_table import Topic
 from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from . import metadata as bagmeta
+from .mcap_records import BYTES_PER_BYTE, LARGEST
 from .mcap_summary import NOTES, PROFILE
 from .metadata import Recorded, file_information, metadata_of
 
@@ -42,6 +44,14 @@ def claim(directory: Path) -> None:
 CHUNK_SIZE = 64 * 1024
 """Bytes of messages that wait in memory: about one second of a 200 Hz session."""
 LIBRARY = "boom_twin"
+LARGEST_MESSAGE = LARGEST - 2**20
+"""Bytes of a message that can be read again: a chunk holds its topic and type too."""
+PACKED = BYTES_PER_BYTE // 10
+"""Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
+
+
+REST = 10.0
+"""Time from one writing of ``metadata.yaml`` at a split to the next, over what it takes: it grows with every file."""
 
 
 class BagWriter:
@@ -81,8 +91,10 @@ class BagWriter:
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
         self._files: list[bagmeta.FileInformation] = []
+        self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
+        self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
         claim(directory)
         self._open()
 
@@ -104,7 +116,14 @@ class BagWriter:
         return list(range(first, len(self.topics)))
 
     def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
-        """Append one encoded message; times in ns, the publish time by default the log time."""
+        """Append one encoded message of at most `LARGEST_MESSAGE`; times in ns, the publish time by default the log time.
+
+        Where so much has packed so well (blank pictures) that this file could not be read with more of it, the next
+        one begins, and nothing is packed any more.
+        """
+        if self._compression != CompressionType.NONE and self._excess + self._pending + len(data) > LARGEST_MESSAGE:
+            self._compression = CompressionType.NONE
+            self.split()
         self.counts[key] += 1
         first, last, count = self._span or (log_time, log_time, 0)
         self._span = min(first, log_time), max(last, log_time), count + 1
@@ -113,6 +132,14 @@ class BagWriter:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
+        self._weigh(len(data))
+
+    def _weigh(self, size: int) -> None:
+        """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
+        self._pending += size
+        if (end := self._buffered.tell()) > self._end:
+            self._excess += max(0, self._pending - PACKED * (end - self._end))
+            self._pending, self._end = 0, end
 
     def flush(self) -> int:
         """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
@@ -122,6 +149,11 @@ class BagWriter:
         with self._told():
             self._writer.flush()  # type: ignore[no-untyped-call]
         return self._raw.fileno()
+
+    @property
+    def completed(self) -> int:
+        """Files that are complete."""
+        return len(self._files)
 
     @property
     def size(self) -> int:
@@ -139,16 +171,19 @@ class BagWriter:
         return self._span[0] if self._span else None
 
     def split(self) -> None:
-        """Complete the open file, tell of it in ``metadata.yaml``, and begin the next one."""
-        self.close()
+        """Complete the open file, tell of it in ``metadata.yaml`` unless that takes too long by now, and begin the next one."""
+        with self._told():
+            self._finish()
+            if (began := time.monotonic()) >= self._due:
+                self._write_metadata()
+                self._due = began + (1.0 + REST) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
         with self._told():
             self._finish()
-            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
-            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
+            self._write_metadata()
 
     def abandon(self) -> None:
         """Let go of the open file; what waits in memory is given up."""
@@ -158,12 +193,13 @@ class BagWriter:
     def _open(self) -> None:
         with self._told():
             self._raw = self.file.open("xb", buffering=0)
-            buffered = BufferedWriter(self._raw)
-            self._writer = Writer(buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
+            self._buffered = BufferedWriter(self._raw)
+            self._writer = Writer(self._buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
             self._writer.start(profile=PROFILE, library=LIBRARY)
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
+            self._pending, self._end, self._excess = 0, self._buffered.tell(), 0
             self._register(self.topics)
 
     def _register(self, topics: list[Recorded]) -> None:
@@ -175,6 +211,10 @@ class BagWriter:
         for each in topics:
             number = self._schemas[each.type, each.definition_encoding, each.definition]
             self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
+
+    def _write_metadata(self) -> None:
+        metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+        bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
 
     def _finish(self) -> None:
         """Complete the open file."""

@@ -92,10 +92,11 @@ def _printable(stream: TextIO) -> TextIO:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    args = _parser(arguments).parse_args(arguments)
-    command = _command(args.command)
+    name = ""
     try:
-        code = command.run(args)
+        args = _parser(arguments).parse_args(arguments)
+        name = f" {args.command}"
+        code = _command(args.command).run(args)
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # the reader of stdout has gone; let nothing be flushed to it at exit
@@ -107,7 +108,7 @@ def _run(arguments: Sequence[str]) -> int:
         reason = f"{error.filename}: {error.strerror}" if error.filename else str(error)
     except KeyboardInterrupt:
         reason = "stopped"
-    print(f"boom_twin {args.command}: {reason}", file=sys.stderr)
+    print(f"boom_twin{name}: {reason}", file=sys.stderr)
     return 1
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 
 SMALLEST = 2**20
+SHORTEST = 0.1
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
@@ -45,7 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (on Ctrl-C)")
     parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file from this size on: 500M, 2G")
-    parser.add_argument("--split-duration", type=positive, metavar="S", help="begin a new file after so many seconds")
+    parser.add_argument("--split-duration", type=long_enough, metavar="S", help="begin a new file after so many seconds")
     kept = "kept in session.yaml (that of the running twin, if it is there)"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=f"scene of the rig, {kept}")
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=f"what is known of the rig while all is well, {kept}")
@@ -67,13 +68,15 @@ def run(args: Namespace) -> int:
     from ..ros.bag.subscriptions import resolved, resolved_mapping
     from ..ros.runtime import ros
     from ..ros.startup import on_stop_signal
+    from ..system.result_folder import check_lasting
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
     known, thresholds = load_mapping(args.mapping), load_thresholds(args.params or DEFAULT_PARAMETERS)
     wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
-    if (told := incompleteness(args.out)) and args.out.is_dir():
+    check_lasting(args.out)
+    if args.out.is_dir() and (told := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
     with ros(["--ros-args", *args.ros_args]), recorder_node() as node:
         wanted = [resolved(each, node) for each in wanted]
@@ -164,6 +167,14 @@ def _wanted(args: Namespace, known: Topics) -> list[Wanted]:
         return wanted_of(args.topics, inputs | outputs)
     chosen = {**({} if args.only == "outputs" else inputs), **({} if args.only == "inputs" else outputs)}
     return [Wanted(name, topic.type, topic) for name, topic in chosen.items()]
+
+
+def long_enough(text: str) -> float:
+    """Seconds of a file."""
+    value = positive(text)
+    if value < SHORTEST:
+        raise ArgumentTypeError(f"{text}: must be at least {SHORTEST:g} s: completing a file takes a while")
+    return value
 
 
 def size(text: str) -> int:

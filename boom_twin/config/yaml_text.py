@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from ..errors import BoomTwinError
@@ -64,13 +64,22 @@ def plain(text: str) -> Any:
 
 
 class BoundedComposer(Composer):
-    """Stops at too many nodes, each of which takes a hundred times the memory of its text."""
+    """Stops at too many nodes, each of which takes a hundred times the memory of its text, and at another YAML than 1.2."""
 
     nodes = 0
 
     def __init__(self, loader: Any = None) -> None:
         super().__init__(loader)
         self.warn_double_anchors = False  # YAML allows them; the warning is one of Python
+
+    def compose_document(self) -> Any:
+        """The root; in YAML 1.1, `010` is 8 and `on` is true, which nobody means who writes a scene or a mapping."""
+        event = self.parser.peek_event()
+        if event.version not in (None, (1, 2)):
+            version = ".".join(map(str, event.version))
+            problem = f"the directive %YAML {version}: files are read as YAML 1.2. Remove that line"
+            raise MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+        return super().compose_document()
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         """The next node."""

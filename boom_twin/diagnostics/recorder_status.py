@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from ..config.settings import Thresholds
 from .levels import Bounds, ComponentJudge, Level, Status
 
+ENDED = "ended"
+"""Key of a status that says of itself, by 1, that it is the last one: silence after it is no news."""
+
 
 @dataclass(frozen=True, slots=True)
 class DiskState:
@@ -78,6 +81,8 @@ class RecordingJudge:
         judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
         room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
         judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
+        if end is not None:
+            judge.note(ENDED, 1)
         judge.note("disk_free_bytes", disk.free)
         judge.note("waiting_bytes", disk.waiting)
         judge.note("written_bytes", disk.written)

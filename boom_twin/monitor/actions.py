@@ -31,6 +31,7 @@ class Recording:
     def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
         self._folder, self._options = folder, options
         self._process: subprocess.Popen[bytes] | None = None
+        self._is_stopped = False
 
     @property
     def is_running(self) -> bool:
@@ -40,11 +41,12 @@ class Recording:
     def start(self) -> str:
         """Start one, unless it runs already; gives what was done."""
         if self.is_running:
-            return "recording already"
+            ending = "the recording before this one is still being completed: start again when it has ended"
+            return ending if self._is_stopped else "recording already"
         out = self._folder / datetime.now(UTC).strftime("session_%Y%m%d_%H%M%S")
         note = ("--note", "started from the monitor")
         command = python_command("boom_twin.cli.main", "record", "--out", str(out), *note, *self._options)
-        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+        self._process, self._is_stopped = subprocess.Popen(command, stdin=subprocess.DEVNULL), False
         return f"recording into {out}"
 
     def stop(self) -> str:
@@ -52,6 +54,7 @@ class Recording:
         if not self.is_running or self._process is None:
             return "not recording"
         self._process.send_signal(signal.SIGINT)
+        self._is_stopped = True
         return "recording stopped"
 
     def close(self) -> None:

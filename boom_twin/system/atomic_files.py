@@ -76,8 +76,8 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) 
     if not path.is_file():
         return
     real = path.resolve()
-    is_beside = any(entry.suffix in _RECORDINGS for entry in real.parent.iterdir())
-    if real.suffix in _RECORDINGS or (is_beside and real.name in _BESIDE_THEM):
+    is_beside = any(_is_recording(entry) for entry in real.parent.iterdir())
+    if _is_recording(real) or (is_beside and real.name in _BESIDE_THEM):
         raise UsageError(f"{path}: this is a file of a recording, and none is written over. Name another file.")
     if own is not None:
         with real.open("rb") as stream:
@@ -90,6 +90,11 @@ def check_new(path: Path, sources: Sequence[Path]) -> None:
     check_target(path, sources)
     if path.is_file() and path.stat().st_size:
         raise UsageError(f"{path}: is there already, and is not written over. Name another file.")
+
+
+def _is_recording(path: Path) -> bool:
+    """Whether the name is one of a recording, also of one that rosbag2 packed as a whole (``.mcap.zstd``)."""
+    return not _RECORDINGS.isdisjoint(path.suffixes[-2:])
 
 
 def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:

@@ -114,6 +114,7 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
         `out` holds anything else, another command is at work on it, or it cannot be written.
     """
     place = out.resolve()
+    check_lasting(out)
     if not place.name or os.path.ismount(place):
         raise BagError(f"{out}: results are built beside it, and it cannot be renamed. Name a folder inside it.")
     if place.exists() and place.samefile(Path.cwd()):
@@ -140,6 +141,19 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
 def is_unfinished(folder: Path) -> bool:
     """Whether a folder says that its results are not whole."""
     return (folder / UNFINISHED).is_file() and not (folder / MANIFEST).is_file()
+
+
+def check_lasting(out: Path) -> None:
+    """Refuse a place in what a command is building or left unfinished: its next run would remove what is put there.
+
+    Raises
+    ------
+    BagError
+    """
+    place = out.resolve()
+    if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
+        told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"
+        raise BagError(f"{out}: {told}. Choose another folder.")
 
 
 # -- what may not be touched ------------------------------------------------------------------------------------------
@@ -249,13 +263,24 @@ def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
             busy = f"another `boom_twin {kind.command}` is at work there. Wait for its end, or choose another folder."
             raise BagError(f"{building}: {busy}")
         _check_left(building, kind)
-        note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
-        os.truncate(lock, 0)
-        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
-        os.fsync(lock)
+        _mark(lock, marker, kind)
         yield lock
     finally:
         os.close(lock)
+
+
+def _mark(lock: int, marker: Path, kind: ResultKind) -> None:
+    """Write into the open marker whose it is; where it cannot be written, it is removed, with the folder if that is empty."""
+    note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
+    try:
+        os.truncate(lock, 0)
+        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
+        os.fsync(lock)
+    except OSError as error:
+        if _entries(marker.parent) == [UNFINISHED]:
+            marker.unlink()
+            _remove_empty(marker.parent)
+        raise BagError(f"{marker}: cannot be written ({error.strerror}). Make room or choose another disk.") from None
 
 
 def _is_taken(lock: int, marker: Path) -> bool:

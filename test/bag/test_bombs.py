@@ -62,7 +62,7 @@ DEFINED += record(4, struct.pack("<HH", 1, 1) + text("/empty") + text("cdr") + s
 MESSAGE = record(5, struct.pack("<HIQQ", 1, 0, 5, 5) + b"\0\1\0\0")
 CONTENTS = {"zeros": bytes(LARGEST), "messages": DEFINED + MESSAGE * ((LARGEST - len(DEFINED)) // len(MESSAGE))}
 UNPACK = UnpackBudget.unpack
-WORDS = {"zeros": "there is none", "messages": "the most that is read. No recorder packs like that"}
+WORDS = {"zeros": "there is none", "messages": "the most that is read. Bombs pack like that"}
 SUMS = {"wrong": lambda content: 1, "right": zlib.crc32, "none": lambda content: 0}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,16 +38,19 @@ def source(two_sections, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def ran(source, short, tmp_path_factory):
-    """The command's files, and what it said with --json."""
-    folder = tmp_path_factory.mktemp("run")
+    """The command's files, its arguments, and the calibration that it wrote."""
+    folder, found = tmp_path_factory.mktemp("run"), []
     bag = short.write(folder / "bag", 2, zeros=np.array([2e-3, 0.0]))
     arguments = ["calibrate", str(bag), "--scene", str(source), "--date", "2026-01-02", "--zeros", "angles"]
-    assert main([*arguments, "--out", str(folder / "new.yaml")]) == 0
-    return folder, arguments
+    calibrate = run.calibrate
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "calibrate", lambda *given: found.append(calibrate(*given)) or found[0])
+        assert main([*arguments, "--out", str(folder / "new.yaml")]) == 0
+    return folder, arguments, found[0]
 
 
 def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, short):
-    folder, _ = ran
+    folder, *_ = ran
     old, new = source.read_text(), (folder / "new.yaml").read_text()
     scene = load_scene(folder / "new.yaml")
     assert parameter(scene, "cylinder_1.k") == pytest.approx(parameter(short.truth, "cylinder_1.k"), rel=0.03)
@@ -60,7 +64,7 @@ def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, sh
 
 
 def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
-    folder, _ = ran
+    folder, *_ = ran
     sensors = load_mapping(folder / "new.mapping.yaml", 2).sensors
     assert sensors["joint_1"].zero == pytest.approx(2e-3, abs=2e-4)
     assert "cylinder_1" not in sensors
@@ -71,21 +75,23 @@ def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
 
 
 def test_pictures_are_drawn(ran):
-    folder, _ = ran
+    folder, *_ = ran
     for name in ("new.residuals.png", "new.parameters.png"):
         assert (folder / name).stat().st_size > 20_000
 
 
 def test_it_overwrites_only_when_told(ran, source, capsys):
-    folder, arguments = ran
+    folder, arguments, _ = ran
     assert main([*arguments, "--out", str(folder / "new.yaml")]) == 1
     assert "is there already. Name another file, or add --force" in capsys.readouterr().err
     assert main([*arguments, "--out", str(source), "--force"]) == 1
     assert "this file is read. Name another one" in capsys.readouterr().err
 
 
-def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path):
-    _, arguments = ran
+def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path, monkeypatch):
+    """The calibration is that of before, here and in the next two: what is tested is its writing."""
+    _, arguments, calibrated = ran
+    monkeypatch.setattr(run, "calibrate", lambda *given: calibrated)
     (tmp_path / "new.mapping.yaml").mkdir()
     assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--force", "--no-pictures"]) == 1
     assert "new.mapping.yaml: cannot be written" in capsys.readouterr().err
@@ -93,12 +99,11 @@ def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path):
 
 
 def test_a_file_that_comes_while_it_works_is_kept(ran, capsys, tmp_path, monkeypatch):
-    _, arguments = ran
-    calibrated = run.calibrate
+    _, arguments, calibrated = ran
 
     def calibrate_meanwhile(*given):
         (tmp_path / "new.yaml").write_text("mine")
-        return calibrated(*given)
+        return calibrated
 
     monkeypatch.setattr(run, "calibrate", calibrate_meanwhile)
     assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--no-pictures"]) == 1
@@ -106,8 +111,9 @@ def test_a_file_that_comes_while_it_works_is_kept(ran, capsys, tmp_path, monkeyp
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("new.yaml", "mine")]
 
 
-def test_a_mapping_of_an_earlier_calibration_is_told(ran, capsys, tmp_path):
-    _, arguments = ran
+def test_a_mapping_of_an_earlier_calibration_is_told(ran, capsys, tmp_path, monkeypatch):
+    _, arguments, calibrated = ran
+    monkeypatch.setattr(run, "calibrate", lambda *given: replace(calibrated, zeros={}))
     (tmp_path / "new.mapping.yaml").write_text("sensors: {joint_1: {zero: 0.1}}\n")
     options = ["--force", "--no-pictures", "--zeros", "none"]
     assert main([*arguments, "--out", str(tmp_path / "new.yaml"), *options]) == 0
@@ -115,7 +121,7 @@ def test_a_mapping_of_an_earlier_calibration_is_told(ran, capsys, tmp_path):
 
 
 def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_path):
-    _, arguments = ran
+    _, arguments, _ = ran
     (tmp_path / "own.yaml").write_text("sensors:\n  joint_1: {zero: 0.1, unit: deg, scale: 57.29577951308232}  # mine\n")
     out = tmp_path / "again.yaml"
     arguments = [*arguments, "--mapping", str(tmp_path / "own.yaml"), "--out", str(out), "--json", "--no-pictures"]

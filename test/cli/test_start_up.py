@@ -64,3 +64,24 @@ def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
 def test_what_a_bag_holds_is_told_without_a_compiler() -> None:
     """NumPy is there since the session is judged against its scene, whose checks need it."""
     assert imported_by("info", str(BAG)) == (0, {"rosbags"})
+
+
+INTERRUPTED = """
+import os, signal, sys
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "boom_twin.ros.startup":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder)
+from boom_twin.cli.main import main
+sys.exit(main(["record", "--out", sys.argv[1]]))
+"""
+
+
+def test_an_interruption_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, str(tmp_path / "bag")], capture_output=True, text=True, check=False, timeout=100
+    )
+    assert done.returncode == 1 and done.stderr == "boom_twin: stopped\n"
+    assert not (tmp_path / "bag").exists()

@@ -28,7 +28,8 @@ def test_a_healthy_recording() -> None:
     assert (status.level, status.message) == (Level.OK, "running")
     assert status.values["received /a"] == 500 and status.values["never_arrived /a"] == 0
     assert status.values["never_arrived /b"] == "nan"
-    assert judged(end="").message == "ended"
+    assert judged(end="").message == "ended" and "ended" not in status.values
+    assert judged(end="").values["ended"] == judged(end="the disk is full").values["ended"] == 1
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Every case of the corpus, and a minute of new ones."""
+"""Every case of the corpus, and, as a slow test, a minute of new ones."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def test_the_corpus(target: str, path: Path) -> None:
         assert verdict.kind in (Kind.REFUSED, Kind.TOLD)
 
 
+@pytest.mark.slow
 def test_a_minute_of_new_cases(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "fuzz.run", "--seconds", str(SECONDS), "--seed", "1", "--out", str(tmp_path / "found")]
     path = {**os.environ, "PYTHONPATH": str(ROOT / "test")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline
 from boom_twin.types import Alarm, Health, Report
@@ -34,6 +36,17 @@ def session(seconds: float = 12.0) -> tuple[Sample, ...]:
         values = np.array(msg.position) if force is None else np.array([force.x, force.z])
         found.append(Sample(stream, stamp, values))
     return tuple(found)
+
+
+def written(folder: Path, seconds: float) -> int:
+    """Write them as a session with the scene of the bundled one; the number of its stroke samples."""
+    found = {stream: [sample for sample in session(seconds) if sample.stream is stream] for stream in TYPES}
+    count = min(map(len, found.values()))
+    stamps = np.array([sample.stamp for sample in found[Stream.STROKES][:count]])
+    values = [np.array([sample.values for sample in found[stream][:count]]) for stream in TYPES]
+    write_session(folder, stamps, *values, {"origin": "synthetic, the beginning of the bundled session"})
+    shutil.copy(SESSION / "session.yaml", folder)
+    return count
 
 
 class Outcome(NamedTuple):

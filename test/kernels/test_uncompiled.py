@@ -59,8 +59,14 @@ def test_uncompiled_kernels_agree(compiled):
     agree(numbers(words, NUMBA_DISABLE_JIT="1"), expected)
 
 
+@pytest.fixture(scope="module")
+def bounds_checked(tmp_path_factory):
+    """Where the kernels are kept that are compiled once more (a minute)."""
+    return str(tmp_path_factory.mktemp("bounds_checked"))
+
+
 @pytest.mark.slow
-def test_bounds_checked_kernels_agree(compiled, tmp_path):
-    """No kernel reads or writes outside its arrays; compiles everything once more (a minute)."""
+def test_bounds_checked_kernels_agree(compiled, bounds_checked):
+    """No kernel reads or writes outside its arrays."""
     words, expected = compiled
-    agree(numbers(words, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=str(tmp_path)), expected)
+    agree(numbers(words, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=bounds_checked), expected)

@@ -79,10 +79,15 @@ def test_alarms_are_those_of_the_summary_and_of_the_result_bag(
     name: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     session = request.getfixturevalue(name)
-    summary = replay(session, load_scene(), tmp_path).summary
+    if name == "faulty":
+        out, feed = request.getfixturevalue("replayed"), request.getfixturevalue("feed")
+    else:
+        out, feed = tmp_path, read_all(bag_feed(session, load_scene(), Settings()))
+        replay(session, load_scene(), out)
+    summary = json.loads((out / "summary.json").read_text())
     told = [each for each in summary["alarms"] if each["kind"] != "gap"]
     assert told and bool(told[-1]["ranked"]) == (name == "drifting")
-    feeds = [read_all(bag_feed(path, load_scene(), Settings())) for path in (session, tmp_path / "bag")]
+    feeds = [feed, read_all(bag_feed(out / "bag", load_scene(), Settings()))]
     for feed in feeds:
         assert_same(judged(feed), told)
     states = [state(feed.store, 25.0, 25.0) for feed in feeds]

@@ -61,6 +61,17 @@ def test_a_silent_node_is_stale_and_never_green() -> None:
     assert level == Level.STALE and "no word from n" in reason
 
 
+def test_a_recorder_that_said_that_it_ended_is_not_missed() -> None:
+    """What it ended by stays to be seen; the twin beside it is as it is."""
+    for level, reason in ((OK, "ended"), (ERROR, "the disk is full")):
+        board = (
+            StatusTable().told(0.0, [status("r: recording", level, reason, ended=1)], 0.0).told(10.0, [status("n: model")], 0.0)
+        )
+        (lamp,) = board.groups(10.0)["recorder"]
+        assert (lamp.level, lamp.reason) == (Level.ERROR if level == ERROR else Level.OK, reason)
+        assert overall(board.groups(10.0))[0] == lamp.level
+
+
 def test_a_status_that_is_told_no_more_goes_out() -> None:
     board = (
         StatusTable().told(0.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0).told(1.0, [status("n: model")], 0.0)

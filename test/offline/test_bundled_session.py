@@ -52,7 +52,9 @@ def test_true_strokes_leave_the_lag_of_the_estimator_alone():
     assert load_truth(SESSION).errors(predictions)["tip_acceleration_error_rms_m_s2"] < 0.10
 
 
+@pytest.mark.slow
 def test_two_replays_give_the_same_bytes(first, tmp_path):
+    """Of a short session, `replay.test_replay_health` tests it too."""
     again = replay(SESSION, load_scene(), tmp_path)
     assert again.summary["output_sha256"] == first[0].summary["output_sha256"]
     files = [next((out / "bag").glob("*.mcap")).read_bytes() for out in (first[1], tmp_path)]

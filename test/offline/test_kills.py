@@ -9,6 +9,7 @@ import pytest
 from bench.kills import kills
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "count", "needs"), [("replay", 4, "numpy"), ("rig", 4, "exudyn"), ("record", 12, "rclpy")])
 def test_kills(command: str, count: int, needs: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     pytest.importorskip(needs)

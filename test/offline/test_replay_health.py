@@ -31,8 +31,13 @@ def session(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def result(session, tmp_path_factory):
-    return replay(session, load_scene(), tmp_path_factory.mktemp("out"))
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("out")
+
+
+@pytest.fixture(scope="module")
+def result(session, out):
+    return replay(session, load_scene(), out)
 
 
 def test_a_stuck_sensor_is_in_the_summary(result):
@@ -50,10 +55,12 @@ def test_every_alarm_is_there_once(result):
     assert len(result.recording.health) >= 5
 
 
-def test_the_result_bag_tells_of_the_alarm(result, tmp_path):
+def test_the_result_bag_tells_of_the_alarm_and_is_the_same_each_time(result, out, tmp_path):
     folder = result.session.path
     again = replay(folder, load_scene(), tmp_path)
     assert again.summary["output_sha256"] == result.summary["output_sha256"]
+    files = [next((place / "bag").glob("*.mcap")).read_bytes() for place in (out, tmp_path)]
+    assert files[0] == files[1] and len(files[0]) > 1e5
     topics = load_topics().outputs
     wanted = {topics[key].absolute: topics[key].type for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)}
     found = list(read(scan(tmp_path / "bag"), wanted))

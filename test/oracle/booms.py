@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 from ruamel.yaml import YAML
 
@@ -15,7 +18,12 @@ BARREL_PINS = ("root", "beam", "head", "given")
 
 
 def document():
-    """The default scene as plain dicts."""
+    """The default scene as plain dicts, to be changed at will."""
+    return deepcopy(_default())
+
+
+@cache
+def _default():
     return YAML(typ="safe").load(default_text())
 
 

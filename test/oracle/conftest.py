@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
+from oracle import booms
 
 from boom_twin.scene.kinematics import stroke_curve
-from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Scene
 
 
@@ -30,7 +29,7 @@ def random_scene(seed: int) -> Scene:
         section.pop("rod_pin", None)
     chosen[0]["rod_pin"] = [0.60, -0.12]
     mounted = [_joint(dict(joints[0]), rng), *(_joint(joints[i], rng) for i in rng.integers(1, 4, count - 1))]
-    document: dict[str, Any] = dict(YAML(typ="safe").load(default_text()))
+    document: dict[str, Any] = booms.document()
     document |= {"sections": chosen, "joints": mounted, "postures": {}}
     document["base"] = document["base"] | {"inclination": float(rng.uniform(-0.1, 0.1))}
     if rng.random() < 0.5:
@@ -52,7 +51,7 @@ def random_strokes(scene: Scene, seed: int) -> np.ndarray:
 
 
 def _parts(name: str) -> list[dict[str, Any]]:
-    return [dict(part) for part in YAML(typ="safe").load(default_text())[name]]
+    return booms.document()[name]
 
 
 def _section(section: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:

@@ -55,8 +55,7 @@ def assert_drawn(path: Path) -> None:
     assert all(part.max() > 0.01 for part in np.array_split(dark, 4)), "a quarter of the picture is empty"
 
 
-@pytest.mark.parametrize("joints", [1, 5])
-@pytest.mark.parametrize("imu", [True, False])
+@pytest.mark.parametrize(("joints", "imu"), [(1, False), (5, True)])
 def test_all_pictures_are_drawn(tmp_path: Path, joints: int, imu: bool) -> None:
     paths = replay_pictures(tmp_path / "new", history(joints, imu=imu), session="test")
     assert [path.name for path in paths] == ALL
@@ -89,7 +88,7 @@ def test_nan_and_gaps_are_survived_and_shown(tmp_path: Path) -> None:
 
 
 def test_truth_and_note_are_drawn(tmp_path: Path) -> None:
-    told = history(2)
+    told = replace(history(2, seconds=3.0), residual_names=(), shapes=[])  # just one picture
     truth = Truth(told.stamps_s, told.tip_position + 0.01, told.tip_acceleration + 0.3)
     plain, noted, true = (
         pixels(replay_pictures(tmp_path / name, told, given, session="test", note=note)[0])

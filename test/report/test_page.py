@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from health.recorded import written
 
 from boom_twin.cli.main import main
 
@@ -79,10 +80,11 @@ def test_the_scene_of_a_twin_has_stresses_by_assumed_heights(replays: tuple[Path
     assert "Heights are not in the scene: assumed are 2.4 radii" in outline(replays[0]).text
 
 
-def test_heights_may_be_given(sessions: tuple[Path, Path], tmp_path: Path) -> None:
-    heights = ["--section-height", "0.4,0.3,0.2,0.1"]
-    assert main(["replay", str(sessions[0]), "--out", str(tmp_path), "--report", "--no-health", *heights]) == 0
-    text = outline(tmp_path).text
+def test_heights_may_be_given(tmp_path: Path) -> None:
+    heights, out = ["--section-height", "0.4,0.3,0.2,0.1"], tmp_path / "out"
+    written(tmp_path / "bag", 6.0)
+    assert main(["replay", str(tmp_path / "bag"), "--out", str(out), "--report", "--no-health", *heights]) == 0
+    text = outline(out).text
     assert "Heights as given." in text and "The rig's health was not judged." in text
 
 

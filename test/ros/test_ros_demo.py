@@ -17,6 +17,7 @@ pytest.importorskip("rclpy")
 
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_files import write_session
+from boom_twin.errors import BoomTwinError
 from boom_twin.ros.demo.processes import DemoProcesses
 from boom_twin.scene.load import default_text
 
@@ -85,3 +86,20 @@ def test_nothing_of_earlier_demonstrations_is_written_over(tmp_path: Path) -> No
     assert (tmp_path / "recorded" / "session_0.mcap").read_bytes() == b"a recording"
     assert {(tmp_path / name).read_text() for name in ("scene.yaml", "node.log", "recorder.log")} == {"mine"}
     assert (tmp_path / "recorded_4.scene.yaml").read_text() == default_text()
+
+
+def test_the_second_of_two_that_start_at_once_is_told_so(tmp_path: Path) -> None:
+    with open(os.devnull) as lock:
+        first, second = (DemoProcesses(tmp_path, default_text(), lock.fileno()) for _ in range(2))
+        first.begin("a test")
+        try:
+            with pytest.raises(BoomTwinError, match=r"recorded\.scene\.yaml: cannot be written \(File exists\)"):
+                second.begin("a test")
+        finally:
+            first.end()
+
+
+def test_a_duration_that_is_no_number_is_refused(spawn: Callable[..., Any], tmp_path: Path) -> None:
+    demo = spawn("boom_twin.ros.demo.demo", "--duration", "nan", "--out", str(tmp_path))
+    assert demo.end() == 2
+    assert "must be > 0 and finite" in demo.said() and "Traceback" not in demo.said()

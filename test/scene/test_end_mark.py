@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
@@ -19,7 +20,7 @@ def printed(capsys: pytest.CaptureFixture[str], *given: str) -> str:
     return capsys.readouterr().out
 
 
-def silent_cuts(bench: Any, text: str, places: range) -> list[int]:
+def silent_cuts(bench: Any, text: str, places: Iterable[int]) -> list[int]:
     """Where the text can be cut so that it loads as another scene without a fault or a warning."""
     whole, found = examine(bench.text(text))[0], []
     for place in places:
@@ -34,7 +35,22 @@ def silent_cuts(bench: Any, text: str, places: range) -> list[int]:
     return found
 
 
-@pytest.mark.parametrize("given", [(), ("--clearance",)], ids=["default", "clearance"])
+PRINTED = pytest.mark.parametrize("given", [(), ("--clearance",)], ids=["default", "clearance"])
+
+
+@PRINTED
+def test_no_cut_at_an_end_of_line_or_in_the_last_lines_goes_by(
+    bench: Any, capsys: pytest.CaptureFixture[str], given: tuple[str, ...]
+) -> None:
+    """Where YAML is most likely to be whole, and all cuts around the mark and the promise of it."""
+    text = printed(capsys, *given).encode()
+    ends = [place for place, byte in enumerate(text) if byte == ord("\n")]
+    places = {end + more for end in ends for more in (0, 1)} | set(range(ends[1])) | set(range(ends[-4], len(text)))
+    assert silent_cuts(bench, text.decode(), sorted(places - {len(text)})) == []
+
+
+@pytest.mark.slow
+@PRINTED
 def test_no_cut_of_a_printed_scene_goes_by(bench: Any, capsys: pytest.CaptureFixture[str], given: tuple[str, ...]) -> None:
     text = printed(capsys, *given)
     assert silent_cuts(bench, text, range(len(text.encode()))) == []

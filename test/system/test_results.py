@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -181,6 +182,32 @@ def test_a_recording_in_what_a_killed_run_left_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "out.unfinished" / "mine" / "session_0.mcap").read_bytes() == b"a recording"
 
 
+def test_no_session_is_made_in_what_a_killed_run_left(tmp_path: Path) -> None:
+    """Its files have the names of those of a replay: the next run would remove them."""
+    assert run(tmp_path / "out", "old", 12) == -signal.SIGKILL
+    with (
+        pytest.raises(BagError, match=r"out\.unfinished/bag: lies in an unfinished result"),
+        result_folder(tmp_path / "out.unfinished" / "bag", RIG, []) as building,
+    ):
+        (building.folder / "session_0.mcap").write_bytes(b"a recording")
+    build(tmp_path / "out")
+
+
+def test_a_disk_that_is_full_from_the_start_is_named_and_left_as_it_was(tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        with (
+            pytest.raises(BagError, match=r"out\.unfinished/unfinished\.json: cannot be written \(.*\)\. Make room"),
+            result_folder(tmp_path / "out", REPLAY, []),
+        ):
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
 def test_no_source_is_built_over(tmp_path: Path) -> None:
     """Nor what the name of the result leads to beside it."""
     recording(tmp_path / "out.unfinished")
@@ -275,6 +302,14 @@ def test_files_that_are_read_and_files_of_recordings_are_no_targets(tmp_path: Pa
         with pytest.raises(UsageError, match="file of a recording"):
             check_target(path, [])
     check_target(tmp_path / "metadata.yaml", [scene])
+
+
+def test_files_of_a_recording_that_rosbag2_packed_are_no_targets(tmp_path: Path) -> None:
+    for name in ("bag_0.mcap.zstd", "metadata.yaml"):
+        (tmp_path / name).write_text("")
+    for path in tmp_path.iterdir():
+        with pytest.raises(UsageError, match="file of a recording"):
+            check_target(path, [])
 
 
 def test_a_link_to_a_file_of_a_recording_is_no_target(tmp_path: Path) -> None:

@@ -103,6 +103,8 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudg
     if head.crc == 0:
         return _fitting_content(file, head, budget), head.after
     reason, start = "its checksum does not fit its content", b""
+    if head.is_certain and head.size > LARGEST:
+        reason = f"{head.size} bytes: at most {LARGEST} are read"
     for packed, compression in _readings(head, size):
         for limit in dict.fromkeys((min(head.unpacked, LARGEST), LARGEST)):
             try:

@@ -9,6 +9,7 @@ from math import inf, isfinite, isnan, nan
 from typing import Any
 
 from ... import types as records
+from ...diagnostics.recorder_status import ENDED
 from .message_checks import text
 
 SILENCE = 3.0
@@ -48,6 +49,8 @@ class StatusLamp:
     value, limit : float
     age : float
         Seconds that the level had lasted when it was told; NaN if not known.
+    is_last : bool
+        Whether its node said that no further one comes.
     """
 
     name: str
@@ -58,6 +61,7 @@ class StatusLamp:
     value: float = nan
     limit: float = nan
     age: float = nan
+    is_last: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,12 +91,12 @@ class StatusTable:
         return StatusTable(nodes)
 
     def groups(self, now: float) -> dict[str, list[StatusLamp]]:
-        """Lamps by group; those of a node that is silent are stale, whatever they were."""
+        """Lamps by group; those of a node that is silent, and did not say that it ended, are stale, whatever they were."""
         found: dict[str, list[StatusLamp]] = {group: [] for group in GROUPS}
         for node, (heard, lamps) in self.nodes.items():
             silence = now - heard
             for lamp in lamps:
-                if silence > SILENCE:
+                if silence > SILENCE and not lamp.is_last:
                     words = f"no word from {node}"
                     lamp = StatusLamp(lamp.name, lamp.group, Level.STALE, words, "silence_s", silence, SILENCE, silence)
                 found[lamp.group].append(lamp)
@@ -118,7 +122,10 @@ def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
     values = {pair.key: _number(pair.value) for pair in status.values}
     quantity, limit = _judged(values, level)
     age = clock - values["since_s"] if isfinite(values.get("since_s", nan)) else nan
-    return StatusLamp(name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age)
+    is_last = values.get(ENDED) == 1.0
+    return StatusLamp(
+        name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age, is_last
+    )
 
 
 def _group(name: str) -> str:

@@ -17,6 +17,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from ...bag.async_writer import Storage
+from ...bag.writer import LARGEST_MESSAGE
 from ...config.settings import Settings, Thresholds
 from ...diagnostics.recorder_status import RecordingJudge, TopicState
 from ...errors import BagError, BoomTwinError
@@ -96,7 +97,7 @@ class Count:
     topic : str
     received, written : int
     missed : int or None
-        Published but never received, by the publisher's numbers; None where there were several publishers, or none.
+        Published but never received, by the publisher's numbers, or left out; None where there were several publishers or none.
     """
 
     topic: str
@@ -108,13 +109,15 @@ class Count:
 class _Channel:
     """One topic while it is recorded."""
 
-    def __init__(self, wanted: Wanted, storage: Storage) -> None:
-        self.wanted, self._storage = wanted, storage
+    def __init__(self, wanted: Wanted, storage: Storage, tell: Callable[[str], None]) -> None:
+        self.wanted, self._storage, self._tell = wanted, storage, tell
         self.subscription: Any = None
         self.count = Count(wanted.name)
-        self._key = -1
+        self._key, self._type = -1, ""
+        self._other_types: set[str] = set()
         self._number: int | None = None
         self._has_one = True
+        self._left_out = 0
 
     def open(self, node: Any) -> None:
         """Subscribe, if the type is known by now."""
@@ -122,19 +125,33 @@ class _Channel:
             return
         found = subscription_of(node, self.wanted)
         if found is not None:
-            self._key = self._storage.add(found.recorded)
+            self._key, self._type = self._storage.add(found.recorded), found.recorded.type
             self.subscription = node.create_subscription(found.kind, self.wanted.name, self._store, found.qos, raw=True)
 
-    def look(self) -> int:
+    def look(self, node: Any) -> int:
         """How many publishers there are; with more than one, their numbers tell nothing."""
-        number: int = self.subscription.get_publisher_count() if self.subscription is not None else 0
+        if self.subscription is None:
+            return 0
+        self._tell_other_types(node)
+        number: int = self.subscription.get_publisher_count()
         self._has_one = self._has_one and number <= 1
         return number
 
+    def _tell_other_types(self, node: Any) -> None:
+        """Tell once of each type that is published beside the recorded one: DDS never connects its publishers."""
+        published = {each.topic_type for each in node.get_publishers_info_by_topic(self.subscription.topic_name)}
+        new = published - self._other_types - {self._type, ""}
+        for other in sorted(new):
+            told = f"is published as {other}, of which nothing is recorded: {self._type} is"
+            self._tell(f"warning: {self.wanted.name}: {told}")
+        self._other_types |= new
+
     @property
     def missed(self) -> int | None:
-        """Messages that never arrived, if that can be known."""
-        return self.count.missed if self._has_one and self._number is not None else None
+        """Messages that never arrived or were left out, if that can be known."""
+        if self.count.missed is None or not self._has_one:
+            return None
+        return self.count.missed + self._left_out
 
     def finish(self, written: Sequence[int]) -> Count:
         """The final count."""
@@ -145,20 +162,32 @@ class _Channel:
     def _store(self, data: bytes, info: Mapping[str, Any]) -> None:
         received = info["received_timestamp"]
         number = info["publication_sequence_number"]
-        self.count.received += 1
         if number is not None:
             if self._number is not None and number > self._number:
                 self.count.missed = (self.count.missed or 0) + number - self._number - 1
             self._number, self.count.missed = number, self.count.missed or 0
+        if len(data) > LARGEST_MESSAGE:
+            self._leave_out(len(data))
+            return
+        self.count.received += 1
         self._storage.put(self._key, received, data, max(info["source_timestamp"], 0), (number or self.count.received) % 2**32)
+
+    def _leave_out(self, size: int) -> None:
+        """Tell once of what could not be read again, and would end the reading of all else."""
+        if not self._left_out:
+            told = f"a message of {size} bytes is left out, as all above {LARGEST_MESSAGE} are: they could not be read again"
+            self._tell(f"warning: {self.wanted.name}: {told} (told once)")
+        self._left_out += 1
 
 
 class _Recording:
     """What is recorded, told on ``/diagnostics``."""
 
-    def __init__(self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds) -> None:
+    def __init__(
+        self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds, tell: Callable[[str], None]
+    ) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
-        self.channels = [_Channel(each, storage) for each in wanted]
+        self.channels = [_Channel(each, storage, tell) for each in wanted]
         self._board, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
         self._parameters = RemoteParameters(node)
         self._texts = {name: RemoteText(node, name) for name in TEXTS}
@@ -168,7 +197,7 @@ class _Recording:
         self.storage.check()
         for channel in self.channels:
             channel.open(self.node)
-        numbers = [channel.look() for channel in self.channels]
+        numbers = [channel.look(self.node) for channel in self.channels]
         return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
 
     def twin(self) -> dict[str, object]:
@@ -220,7 +249,7 @@ def record(
     stopped : callable
         Asked after every message, and ten times a second.
     tell : callable
-        Told in words when recording begins, and once every required topic has a publisher (`COMPLETE`).
+        Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
     meet : callable
         Told what the twin says of itself, if there is one: its ``parameters``, and `TEXTS` by name.
 
@@ -236,7 +265,7 @@ def record(
     UsageError
         The type of a topic is not installed.
     """
-    recording = _Recording(node, storage, wanted, thresholds)
+    recording = _Recording(node, storage, wanted, thresholds, tell)
     try:
         try:
             _spin(recording, stopped, tell, meet)

@@ -10,6 +10,7 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -173,7 +174,10 @@ def _arguments() -> Namespace:
     parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
     add_domain(parser)
-    return parser.parse_args()
+    args = parser.parse_args()
+    if not 0.0 < args.duration < inf:
+        parser.error(f"--duration {args.duration}: must be > 0 and finite")
+    return args
 
 
 def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str, int]:

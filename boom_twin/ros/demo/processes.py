@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from ...errors import BoomTwinError
 from ...system.child_process import python_command
@@ -48,7 +48,7 @@ class DemoProcess:
 
     def __init__(self, arguments: list[str], log: Path, parting: signal.Signals, lock: int) -> None:
         self._name, self._log, self._parting = " ".join(arguments[:2]), log, parting
-        with log.open("x", encoding="utf-8") as file:
+        with _new(log) as file:
             command = python_command(*arguments)
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
@@ -98,7 +98,7 @@ class DemoProcesses:
     def begin(self, origin: str) -> None:
         """Start node and recorder; `origin` is kept in the recording."""
         scene = self._beside("scene.yaml")
-        with scene.open("x", encoding="utf-8") as file:
+        with _new(scene) as file:
             file.write(self._scene)
         self.start("node", ["boom_twin.ros.node.main", "--ros-args", "-p", f"scene:={scene}"], signal.SIGTERM)
         record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin, "--scene", str(scene)]
@@ -150,6 +150,17 @@ class DemoProcesses:
         with ExitStack() as stack:
             for child in self._children:
                 stack.callback(child.end)
+
+
+@contextmanager
+def _new(path: Path) -> Iterator[TextIO]:
+    """A file that is not there yet, to be written."""
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            yield file
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror}). Make room, or give another folder with --out."
+        raise BoomTwinError(f"{path}: {reason}") from None
 
 
 def _free(folder: Path) -> Path:

@@ -1,0 +1,22 @@
+"""A recorder that is started and stopped from the page."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+from boom_twin.monitor.actions import Recording
+
+
+def test_a_recording_that_is_being_completed_is_not_called_one_that_goes_on(tmp_path: Path) -> None:
+    recording = Recording(tmp_path / "bags")
+    recording.start()
+    assert recording._process is not None
+    recording._process.send_signal(signal.SIGSTOP)  # it takes its time to end
+    assert recording.start() == "recording already"
+    assert recording.stop() == "recording stopped"
+    assert "is still being completed: start again when it has ended" in recording.start()
+    recording._process.send_signal(signal.SIGCONT)
+    recording._process.wait(240.0)
+    assert recording.start().startswith("recording into")
+    recording.close()
