@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 from unicodedata import category
 
+from ..bag.async_writer import PATIENCE
 from ..system.child_process import python_command
 from .data.feed import Feed
 
-PARTING = 10.0
-"""Seconds that it may take to complete its files."""
+PARTING = 2 * PATIENCE
+"""Seconds that a recorder may take to end: longer than it waits for its disk, or a slow disk would cost messages."""
 
 
 class Recording:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
+from threading import Thread
+
+import pytest
 
 from boom_twin.monitor.actions import Recording
 
@@ -20,3 +23,20 @@ def test_a_recording_that_is_being_completed_is_not_called_one_that_goes_on(tmp_
     recording._process.wait(240.0)
     assert recording.start().startswith("recording into")
     recording.close()
+
+
+@pytest.mark.slow
+def test_a_recorder_may_take_as_long_as_its_disk(tmp_path: Path) -> None:
+    """The page ends while it does; before, it was killed after 10 s."""
+    recording = Recording(tmp_path / "bags")
+    recording.start()
+    process = recording._process
+    assert process is not None
+    process.send_signal(signal.SIGSTOP)
+    thread = Thread(target=recording.close)
+    thread.start()
+    thread.join(15.0)
+    assert thread.is_alive() and process.poll() is None
+    process.send_signal(signal.SIGCONT)
+    thread.join()
+    assert process.returncode != -signal.SIGKILL

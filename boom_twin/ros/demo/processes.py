@@ -12,6 +12,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from ...bag.async_writer import PATIENCE as DISK_PATIENCE
 from ...errors import BoomTwinError
 from ...system.child_process import python_command
 from ..isolation import isolated
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 300.0
 """Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
-PARTING = 10.0
-"""Seconds that a process may take to end."""
+PARTING = 2 * DISK_PATIENCE
+"""Seconds that a process may take to end: longer than a recorder waits for its disk, or a slow disk would cost messages."""
 LOOK = 1.0
 """Seconds between looks at whether all have found each other."""
 LISTENERS = 2
