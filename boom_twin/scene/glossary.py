@@ -5,7 +5,20 @@ from __future__ import annotations
 from pydantic import BaseModel
 
 from ..kernels.elements.pin_contact import LAWS
-from .schema import Base, Clearance, ContactLaw, Cylinder, CylinderPart, Joint, Material, Pin, RigidPart, Scene, Section, Tip
+from .schema import (
+    Base,
+    Clearance,
+    ContactLaw,
+    Cylinder,
+    CylinderPart,
+    Joint,
+    Material,
+    Pin,
+    RigidPart,
+    Scene,
+    Section,
+    Tip,
+)
 
 _LAWS = tuple(LAWS)
 

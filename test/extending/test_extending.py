@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from extending.worked_example import ROOT, WorkedExample
 
 DOCUMENT = ROOT / "docs" / "extending.md"
 
-MOST_FILES = {"command": 2, "output_topic": 3, "contact_law": 2, "fault": 3, "sensor_channel": 4}
+MOST_FILES = {"command": 2, "output_topic": 3, "contact_law": 2, "fault": 3, "sensor_channel": 4, "element": 8}
 """Files of the package that each kind of thing may touch."""
 
-UNCOMPILED = {"contact_law": {"NUMBA_DISABLE_JIT": "1"}}
-"""A changed kernel folder would be compiled anew, for most of a minute."""
+UNCOMPILED = ("contact_law", "element")
+"""Examples that change kernels, which would be compiled anew for most of a minute."""
 
 
 @pytest.mark.parametrize("name", MOST_FILES)
@@ -33,4 +36,6 @@ def test_the_document_shows_what_is_applied(name):
 def test_it_works(name, tmp_path):
     example = WorkedExample(name)
     example.apply(tmp_path)
-    example.check(tmp_path, **UNCOMPILED.get(name, {}))
+    rules = ["--config", str(ROOT / "pyproject.toml"), "--quiet"]
+    subprocess.run([sys.executable, "-m", "ruff", "check", *rules, str(tmp_path)], check=True)
+    example.check(tmp_path, **({"NUMBA_DISABLE_JIT": "1"} if name in UNCOMPILED else {}))
