@@ -216,8 +216,10 @@ READINGS: dict[Stream, Callable[[PredictedBoom], tuple[Array, Array]]] = {
 
 def expected_readings(boom: PredictedBoom, strokes: Array) -> Expected:
     """What all sensors should read, with the strokes (n,) in m as measured."""
-    found = {stream: reading(boom) for stream, reading in READINGS.items()}
-    values, sigmas = ({stream: pair[i] for stream, pair in found.items()} for i in range(2))
+    values: dict[Stream, Array] = {}
+    sigmas: dict[Stream, Array] = {}
+    for stream, reading in READINGS.items():
+        values[stream], sigmas[stream] = reading(boom)
     return Expected(boom.prediction.stamp, values, sigmas, strokes)
 
 
