@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import pi
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
@@ -32,13 +33,89 @@ class Stream(Enum):
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
 
+G = 9.80665
+"""m/s^2 of one g, by definition."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorKind:
+    """The sensors of one stream.
+
+    Attributes
+    ----------
+    message : str
+        Type of its messages: a JointState, whose ``position`` is read by names, or an Imu, whose ``linear_acceleration`` is
+        read by axes.
+    stem : str
+        Of the names of its channels: ``joint`` gives ``joint_1`` .. ``joint_n``.
+    ends : tuple of str
+        Of the names, where there is not one channel for each joint: ``x`` gives ``tip_imu_x``.
+    units : dict of str to float
+        How much of the SI unit, which is the first, each unit is.
+    noise, resolution : str
+        The fields of `boom_twin.config.settings.Settings` that have them; an empty one stands for 0.
+    lack : str
+        What there is not without these sensors.
+    """
+
+    message: str
+    stem: str
+    ends: tuple[str, ...]
+    units: dict[str, float]
+    noise: str
+    resolution: str
+    lack: str
+
+    @property
+    def is_imu(self) -> bool:
+        """Whether its messages are read by axes."""
+        return self.message == "sensor_msgs/msg/Imu"
+
+    @property
+    def unit(self) -> str:
+        """The SI unit."""
+        return next(iter(self.units))
+
+    def channels(self, joints: int) -> tuple[str, ...]:
+        """Names of the channels in the order of a sample, of a boom with so many joints."""
+        return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
+
+
+SENSORS: dict[Stream, SensorKind] = {
+    Stream.STROKES: SensorKind(
+        message="sensor_msgs/msg/JointState",
+        stem="cylinder",
+        ends=(),
+        units={"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+        noise="stroke_sigma",
+        resolution="stroke_resolution",
+        lack="nothing can be replayed",
+    ),
+    Stream.ANGLES: SensorKind(
+        message="sensor_msgs/msg/JointState",
+        stem="joint",
+        ends=(),
+        units={"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0},
+        noise="angle_sigma",
+        resolution="angle_resolution",
+        lack="there are no joint residuals",
+    ),
+    Stream.IMU: SensorKind(
+        message="sensor_msgs/msg/Imu",
+        stem="tip_imu",
+        ends=("x", "z"),
+        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
+        noise="imu_sigma",
+        resolution="",
+        lack="there are no residuals of the tip's acceleration (optional)",
+    ),
+}
+"""What they should read is in `boom_twin.twin.expected_readings.READINGS`, their topics are in ``topics.yaml``."""
+
+
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
     """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
-    return {
-        Stream.STROKES: tuple(f"cylinder_{i + 1}" for i in range(joints)),
-        Stream.ANGLES: tuple(f"joint_{i + 1}" for i in range(joints)),
-        Stream.IMU: ("tip_imu_x", "tip_imu_z"),
-    }
+    return {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
 
 
 LIMIT = 1e6

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import BagError
 from ..messages.topic_table import Qos, Topics
-from ..types import Stream
+from ..types import SENSORS, Stream
 from .inspect import NANO, BagInfo, Tally
 from .joint_names import other_names
 from .metadata import profiles
@@ -19,15 +19,9 @@ from .session_model import mapping_of
 SKEW = 0.05
 """Difference (s) of two streams' clocks that is worth a word: a boom moves by centimetres in it."""
 
-JOINT_STATES = (Stream.STROKES, Stream.ANGLES)
+JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
 MOST_JOINTS = 99
 """As far as numbers of channels are looked for where no scene tells it."""
-
-_WITHOUT = {
-    Stream.STROKES: "nothing can be replayed",
-    Stream.ANGLES: "there are no joint residuals",
-    Stream.IMU: "there are no residuals of the tip's acceleration (optional)",
-}
 
 
 def names_missing(info: BagInfo, joints: int | None = None) -> list[str]:
@@ -86,7 +80,7 @@ def missing(info: BagInfo, joints: int | None = None, scene: str = "") -> list[s
                 check_encoding(file, {name})
         except BagError as error:
             reason = str(error).removeprefix(f"{info.session.path}: ")
-            found.append(f"{reason} Without it {_WITHOUT[stream]}.")
+            found.append(f"{reason} Without it {SENSORS[stream].lack}.")
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)

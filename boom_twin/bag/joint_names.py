@@ -7,13 +7,13 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from ..errors import BagError
 from ..messages.sample_decoder import LONGEST
 from ..messages.topic_table import Topics
-from ..types import Stream
+from ..types import SENSORS, Stream
 from .reader import Session, read
 
 WINDOW = 5_000_000_000
 """Log time (ns) from the first message of strokes or angles on, in which all names are looked at."""
 
-KINDS = {Stream.STROKES: "cylinder", Stream.ANGLES: "joint"}
+KINDS = {stream: kind.stem for stream, kind in SENSORS.items() if not kind.ends}
 MOST = 12
 """Names that a sentence lists."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..messages.message_fields import FRAME, fill_header
-from ..messages.topic_table import TYPES, load_topics
+from ..messages.topic_table import load_topics
 from ..messages.type_store import RosbagsTypes
-from ..types import Array, Sample, Stream
+from ..types import SENSORS, Array, Sample, Stream
 from .writer import SessionWriter
 
 IMU_FRAME = "tip"
@@ -55,12 +55,18 @@ def write_session(
         If `directory` holds anything.
     """
     _check_shapes(stamps_ns, strokes, joints, imu)
-    topics = load_topics().inputs
-    if imu is None:
-        topics = {stream: topic for stream, topic in topics.items() if stream is not Stream.IMU}
-    messages = _Messages(strokes.shape[1])
-    with SessionWriter(directory, {stream.value: topic for stream, topic in topics.items()}, description) as bag:
-        for sample in samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns):
+    streams = (Stream.STROKES, Stream.ANGLES) if imu is None else (Stream.STROKES, Stream.ANGLES, Stream.IMU)
+    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns), streams, description)
+
+
+def write_samples(
+    directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
+) -> None:
+    """Write the bag of one session from `samples` in their order, with the topics of `streams`; else as `write_session`."""
+    inputs = load_topics().inputs
+    messages = _Messages()
+    with SessionWriter(directory, {stream.value: inputs[stream] for stream in streams}, description) as bag:
+        for sample in samples:
             bag.write(sample.stream.value, sample.stamp, messages.of(sample))
 
 
@@ -90,26 +96,20 @@ def samples_of(
 class _Messages:
     """Messages as the sensors of a rig would send them."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self) -> None:
         self._types = RosbagsTypes()
-        self._names = {kind: [f"{kind}_{i}" for i in range(1, count + 1)] for kind in ("cylinder", "joint")}
 
     def of(self, sample: Sample) -> Any:
-        if sample.stream is Stream.IMU:
-            return self.imu(sample.stamp, sample.values)
-        kind = "cylinder" if sample.stream is Stream.STROKES else "joint"
-        return self.joint_state(kind, sample.stamp, sample.values)
-
-    def joint_state(self, kind: str, stamp: int, values: Array) -> Any:
-        msg = self._types.make(TYPES[Stream.STROKES])
-        fill_header(msg.header, stamp, FRAME)
-        msg.name = self._names[kind]
-        msg.position = self._types.doubles(values)
+        kind = SENSORS[sample.stream]
+        msg = self._types.make(kind.message)
+        if kind.is_imu:
+            return self.imu(msg, sample.stamp, sample.values)
+        fill_header(msg.header, sample.stamp, FRAME)
+        msg.name, msg.position = list(kind.channels(len(sample.values))), self._types.doubles(sample.values)
         return msg
 
-    def imu(self, stamp: int, values: Array) -> Any:
+    def imu(self, msg: Any, stamp: int, values: Array) -> Any:
         """Of the three quantities of an Imu only the acceleration is there, and of it only the plane."""
-        msg = self._types.make(TYPES[Stream.IMU])
         fill_header(msg.header, stamp, IMU_FRAME)
         msg.linear_acceleration.x, msg.linear_acceleration.z = float(values[0]), float(values[1])
         msg.orientation.w = 1.0

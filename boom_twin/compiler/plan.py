@@ -7,30 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..kernels import tables as program
 from ..kernels.elements import pin_contact as contact
-from ..kernels.elements.beam import BEAM as BEAM_ROW
-from ..kernels.elements.cylinder import CYLINDER, CYLINDER_PART
-from ..kernels.elements.linkage import LINKAGE
-from ..kernels.elements.pin_contact import CLEARANCE
 from ..kernels.integrators import DEPTH, new_weights
-from ..kernels.tables import SLOTS, State, Tables, Work
+from ..kernels.tables import RECORDS, SLOTS, State, Tables, Work
 from ..kernels.transfer.time_step import observe, observe_pins
 from ..types import Array
-
-DTYPES = {
-    "operations": program.OPERATION,
-    "joints": program.JOINT,
-    "linkages": LINKAGE,
-    "links": program.LINK,
-    "offsets": program.OFFSET_ROW,
-    "bodies": program.BODY_ROW,
-    "beams": BEAM_ROW,
-    "outlets": program.OUTLET,
-    "cylinders": CYLINDER,
-    "parts": CYLINDER_PART,
-    "clearances": CLEARANCE,
-}
 
 
 @dataclass
@@ -41,7 +22,7 @@ class Layout:
     their number in `table`.
     """
 
-    rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: {name: [] for name in DTYPES})
+    rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: {name: [] for name in RECORDS})
     names: list[str] = field(default_factory=list)
     masses: list[float] = field(default_factory=list)
     weights: list[float] = field(default_factory=list)
@@ -68,7 +49,7 @@ class Layout:
 
     def table(self, name: str) -> np.recarray:
         """The finished table, possibly of length 0."""
-        rows = np.zeros(len(self.rows[name]), DTYPES[name])
+        rows = np.zeros(len(self.rows[name]), RECORDS[name])
         for i, values in enumerate(self.rows[name]):
             for key, value in values.items():
                 rows[key][i] = value + len(self.names) if key in ("history", "turn") else value

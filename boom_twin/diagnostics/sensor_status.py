@@ -9,7 +9,7 @@ from math import inf, isnan, radians
 from ..config.settings import Settings, Thresholds
 from ..health.sensor_monitor import readings_of_frozen
 from ..scene.schema import Scene
-from ..types import Mount, Stream
+from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
@@ -102,15 +102,15 @@ def sensors_of(
     mounts : sequence of Mount or None
         Of the sensor of each joint; an inclinometer (not None) has no range of its own.
     """
-    tuned = settings
-    stroke = tuned.stroke_sigma, tuned.stroke_resolution, required[Stream.STROKES]
-    angle = tuned.angle_sigma, tuned.angle_resolution, required[Stream.ANGLES]
-    force = tuned.imu_sigma, 0.0, required[Stream.IMU]
-    beyond, over = SLACK * tuned.stroke_sigma, SLACK * tuned.angle_sigma
-    strokes, angles = [], []
-    for number, (joint, mount) in enumerate(zip(scene.joints, mounts, strict=True), start=1):
-        low, high = (-inf, inf) if mount is not None else (radians(degrees) for degrees in joint.range_deg)
-        strokes.append(Sensor(f"cylinder_{number}", "m", -beyond, joint.cylinder.max_stroke + beyond, *stroke))
-        angles.append(Sensor(f"joint_{number}", "rad", low - over, high + over, *angle))
-    imu = [Sensor(f"tip_imu_{axis}", "m_s2", -inf, inf, *force) for axis in "xz"]
-    return {Stream.STROKES: strokes, Stream.ANGLES: angles, Stream.IMU: imu}
+    joints, found = len(scene.joints), {}
+    travels = [(0.0, joint.cylinder.max_stroke) for joint in scene.joints]
+    turns = [(radians(joint.range_deg[0]), radians(joint.range_deg[1])) for joint in scene.joints]
+    angles = [(-inf, inf) if mount is not None else turn for turn, mount in zip(turns, mounts, strict=True)]
+    ranges = {Stream.STROKES: travels, Stream.ANGLES: angles}
+    for stream, kind in SENSORS.items():
+        sigma, resolution = (getattr(settings, name) if name else 0.0 for name in (kind.noise, kind.resolution))
+        unit, over, channels = kind.unit.replace("/", "_").replace("^", ""), SLACK * sigma, kind.channels(joints)
+        bounds = zip(channels, ranges.get(stream, [(-inf, inf)] * len(channels)), strict=True)
+        about = sigma, resolution, required[stream]
+        found[stream] = [Sensor(name, unit, low - over, high + over, *about) for name, (low, high) in bounds]
+    return found

@@ -67,9 +67,8 @@ class Mounting:
         shaken = np.sqrt(np.maximum(joint_sigmas**2 - variance, 0.0))
         return np.where(self._absolute, np.sqrt(variance + np.cumsum(shaken) ** 2), joint_sigmas)
 
-    def residuals(self, measured: Array, expected: Array) -> Array:
+    def unwound(self, difference: Array) -> Array:
         """Measured minus expected, rad, shape (n,); of inclinometers the smallest of all whole turns."""
-        difference = measured - expected
         if not self._has_any:
             return difference
         return difference - np.where(self._absolute, TURN * np.round(difference / TURN), 0.0)

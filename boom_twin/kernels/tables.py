@@ -12,6 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..types import Array
+from .elements.beam import BEAM as BEAM_ROW
+from .elements.cylinder import CYLINDER, CYLINDER_PART
+from .elements.linkage import LINKAGE
+from .elements.pin_contact import CLEARANCE
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
 
@@ -51,6 +55,22 @@ LINK = np.dtype(
         ("inertia", float),  # about the middle, kg m^2
     ]
 )
+
+
+RECORDS = {
+    "operations": OPERATION,
+    "joints": JOINT,
+    "linkages": LINKAGE,
+    "links": LINK,
+    "offsets": OFFSET_ROW,
+    "bodies": BODY_ROW,
+    "beams": BEAM_ROW,
+    "outlets": OUTLET,
+    "cylinders": CYLINDER,
+    "parts": CYLINDER_PART,
+    "clearances": CLEARANCE,
+}
+"""What a row of every record array of `Tables` is."""
 
 
 class Tables(NamedTuple):

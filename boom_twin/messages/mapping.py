@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
+from ..types import SENSORS
 from .topic_table import (
     TYPES,
     Qos,
@@ -113,8 +114,7 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
     faults: list[Fault] = []
     for channel, given in values.items():
         if stream_of(str(channel)) is None:
-            bound = "channels are cylinder_1, cylinder_2 .., joint_1, joint_2 .., tip_imu_x and tip_imu_z"
-            faults.append(Fault(f"sensors.{channel}", given, bound, "Name one of them."))
+            faults.append(Fault(f"sensors.{channel}", given, f"channels are {_known_channels()}", "Name one of them."))
             continue
         merged = _merged(usual(channel), given or {})
         if isinstance(merged, dict):
@@ -125,6 +125,13 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
         except ValidationError as error:
             faults += [_fault(detail, "sensors", channel) for detail in error.errors(include_url=False)]
     return sensors, names, faults
+
+
+def _known_channels() -> str:
+    """All names that a channel can have."""
+    kinds = SENSORS.values()
+    *most, last = [name for kind in kinds for name in (kind.channels(0) or (f"{kind.stem}_1", f"{kind.stem}_2 .."))]
+    return f"{', '.join(most)} and {last}"
 
 
 def _fault(detail: ErrorDetails, *before: str) -> Fault:

@@ -5,9 +5,9 @@ The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a posi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..types import Alarm, Change, Health, Prediction, Report, Residuals
+from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals
 from .cdr_encoder import NumberFields, Template, stamped
 from .marker_encoder import ShapeMarkers
 from .message_fields import fill_header, fill_xz
@@ -90,6 +90,38 @@ def decode_changes(msg: Any) -> Change:
     return Change(stamp_of(msg), from_rest, settings, {name: value for name, value in values.items() if value != 0.0})
 
 
+class PredictedOutput(NamedTuple):
+    """An output that every prediction gives one message of: what is put into an empty message, and with which numbers.
+
+    ``put`` gets the message and the holes, which it places where numbers stand; ``numbers`` gives these in the same order.
+    """
+
+    output: Output
+    put: Callable[[Any, NumberFields], None]
+    numbers: Callable[[Prediction], Array | Sequence[float]]
+
+
+def _put_vector(msg: Any, holes: NumberFields) -> None:
+    fill_xz(msg.vector, holes.row(2))
+
+
+def _put_point(msg: Any, holes: NumberFields) -> None:
+    fill_xz(msg.point, holes.row(2))
+
+
+def _put_acceleration(msg: Any, holes: NumberFields) -> None:
+    fill_xz(msg.accel.linear, holes.row(2))
+    msg.accel.angular.y = holes.double()
+
+
+PREDICTED = (
+    PredictedOutput(Output.TIP_DISPLACEMENT, _put_vector, lambda p: p.tip_displacement),
+    PredictedOutput(Output.TIP_POSITION, _put_point, lambda p: p.tip_position),
+    PredictedOutput(Output.TIP_ACCELERATION, _put_acceleration, lambda p: [*p.tip_acceleration, -p.tip_angular_acceleration]),
+)
+"""In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
+
+
 Messages = list[tuple[Output, bytes]]
 
 
@@ -108,10 +140,8 @@ class ReportEncoder:
         self._types, count = RosbagsTypes(), len(scene.joints)
         self._passive = PassiveJoints(scene)
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
-        self._displacement = self._template(Output.TIP_DISPLACEMENT, _fill_displacement)
-        self._position = self._template(Output.TIP_POSITION, _fill_position)
-        self._acceleration = self._template(Output.TIP_ACCELERATION, _fill_acceleration)
-        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _fill_displacement)
+        self._predicted = [(row.output, self._template(row.output, row.put), row.numbers) for row in PREDICTED]
+        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _put_vector)
         self._joints = self._joint_states(names, count, 0)
         self._all_joints = self._joint_states([*names, *self._passive.names], count, len(self._passive.names))
         self._residuals: dict[tuple[str, ...], Template] = {}
@@ -123,19 +153,13 @@ class ReportEncoder:
         Returns
         -------
         list of (Output, bytes)
-            ``tip_displacement`` (m), ``tip_position`` (m), ``tip_acceleration`` (m/s^2, rad/s^2), ``joint_states``, and
-            ``shape`` where it has one, if there is a prediction; ``residuals`` for each set of them; ``health`` and
-            ``tip_uncertainty`` (m) where there is news of it.
+            Those of `PREDICTED`, ``joint_states``, and ``shape`` where it has one, if there is a prediction; ``residuals``
+            for each set of them; ``health`` and ``tip_uncertainty`` (m) where there is news of it.
         """
         messages: Messages = []
         if (p := report.prediction) is not None:
-            acceleration = [*p.tip_acceleration, -p.tip_angular_acceleration]
-            messages += [
-                (Output.TIP_DISPLACEMENT, self._displacement.fill(p.stamp, p.tip_displacement)),
-                (Output.TIP_POSITION, self._position.fill(p.stamp, p.tip_position)),
-                (Output.TIP_ACCELERATION, self._acceleration.fill(p.stamp, acceleration)),
-                (Output.JOINT_STATES, self._fill_joint_states(p)),
-            ]
+            messages += [(output, template.fill(p.stamp, numbers(p))) for output, template, numbers in self._predicted]
+            messages.append((Output.JOINT_STATES, self._fill_joint_states(p)))
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
             messages.append((Output.CHANGES, encode_changes(report.change)))
@@ -180,16 +204,3 @@ class ReportEncoder:
             template = self._residuals[residuals.names] = self._template(Output.RESIDUALS, put)
         numbers = np.concatenate([residuals.values, residuals.normalised, residuals.sigmas])
         return template.fill(residuals.stamp, numbers)
-
-
-def _fill_displacement(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.vector, holes.row(2))
-
-
-def _fill_position(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.point, holes.row(2))
-
-
-def _fill_acceleration(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.accel.linear, holes.row(2))
-    msg.accel.angular.y = holes.double()

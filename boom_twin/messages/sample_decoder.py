@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..types import LIMIT, Sample, Stream
+from ..types import LIMIT, SENSORS, Sample, Stream
 from .topic_table import Topics, factor, load_topics
 
 LATEST = 2**31 * 1_000_000_000
@@ -104,6 +104,7 @@ class SampleDecoder:
         self._channels = {stream: _Channels(topics, stream, joints) for stream in Stream}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._beside = pair if topics.is_shared else {}
+        self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
         self.strangers: dict[Stream, list[str]] = {}
 
@@ -127,7 +128,7 @@ class SampleDecoder:
         if not 0 < stamp_ns < LATEST:
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw = self._force(msg) if stream is Stream.IMU else self._positions(msg, stream)
+        raw = self._force(msg, stream) if stream in self._by_axis else self._positions(msg, stream)
         if raw is None:
             return None
         quantities = self._channels[stream].quantities(raw)
@@ -161,12 +162,12 @@ class SampleDecoder:
         end = len(positions)
         return [float(positions[place]) if 0 <= place < end else _ABSENT for place in places]
 
-    def _force(self, msg: Any) -> list[float] | None:
+    def _force(self, msg: Any, stream: Stream) -> list[float] | None:
         """Specific force along the axes that are taken for the tip's x and z."""
         if msg.linear_acceleration_covariance[0] == -1.0:
             self.oddities["no measurement"] += 1
             return None
-        return [float(getattr(msg.linear_acceleration, axis)) for axis in self._channels[Stream.IMU].names]
+        return [float(getattr(msg.linear_acceleration, axis)) for axis in self._channels[stream].names]
 
     def _reject(self, value: float) -> float:
         """NaN, and a count of why; a channel that is absent has been counted before."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
@@ -14,21 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import Mount, Stream, channels_of
-
-GRAVITY = 9.80665
-"""m/s^2 of one g, by definition."""
-
-UNITS: dict[Stream, dict[str, float]] = {
-    Stream.STROKES: {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-    Stream.ANGLES: {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "gon": math.pi / 200.0},
-    Stream.IMU: {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
-}
-"""How much of the SI unit each unit is."""
+from ..types import SENSORS, Mount, Stream, channels_of
 
 AXES = ("x", "y", "z")
-KINDS = {"cylinder": Stream.STROKES, "joint": Stream.ANGLES}
-CHANNEL = re.compile(r"(?P<kind>cylinder|joint)_(?P<number>[1-9]\d{0,3})|tip_imu_(?P<axis>[xz])")
+NUMBER = re.compile(r"[1-9]\d{0,3}")
 
 
 class Sensor(BaseModel):
@@ -46,8 +34,11 @@ class Sensor(BaseModel):
 
 def stream_of(channel: str) -> Stream | None:
     """Where a channel comes by; None if there can be no such channel."""
-    match = CHANNEL.fullmatch(channel)
-    return None if match is None else KINDS.get(match["kind"] or "", Stream.IMU)
+    stem, _, end = channel.rpartition("_")
+    for stream, kind in SENSORS.items():
+        if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
+            return stream
+    return None
 
 
 def number_of(channel: str) -> int:
@@ -64,25 +55,27 @@ def usual(channel: str) -> dict[str, Any]:
     """Name and unit of a channel that no mapping names."""
     stream = stream_of(channel)
     assert stream is not None
-    return {"name": channel[-1] if stream is Stream.IMU else channel, "unit": next(iter(UNITS[stream]))}
+    kind = SENSORS[stream]
+    return {"name": channel.rpartition("_")[2] if kind.is_imu else channel, "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
     """By what reading minus zero is multiplied."""
     stream = stream_of(channel)
     assert stream is not None
-    return sensor.sign * sensor.scale * UNITS[stream][sensor.unit]
+    return sensor.sign * sensor.scale * SENSORS[stream].units[sensor.unit]
 
 
 def kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
     """What a channel of this kind cannot have, of the keys as they stand in the file."""
     stream, place = stream_of(channel), f"sensors.{channel}"
     assert stream is not None
-    if (unit := given.get("unit", usual(channel)["unit"])) not in list(UNITS[stream]):
-        yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(UNITS[stream])}", "Use scale for any other.")
+    kind = SENSORS[stream]
+    if (unit := given.get("unit", kind.unit)) not in list(kind.units):
+        yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
     if stream is not Stream.ANGLES and (mount := given.get("absolute")) is not None:
         yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
-    if stream is Stream.IMU and (name := given.get("name", "x")) not in AXES:
+    if kind.is_imu and (name := given.get("name", "x")) not in AXES:
         yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")
 
 
@@ -102,8 +95,8 @@ def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterat
         if not any(channel in group for group in known.values()):
             bound = f"the scene has {joints} joints, so channels end at {channel.split('_')[0]}_{joints}"
             yield Fault(f"sensors.{channel}", channel, bound, "Remove it, or use the scene that this mapping is for.")
-    groups = [known[Stream.STROKES], known[Stream.ANGLES], known[Stream.IMU]]
-    for group in [groups[0] + groups[1], groups[2]] if is_shared else groups:
+    first, second, *others = known.values()
+    for group in [first + second, *others] if is_shared else known.values():
         users: dict[str, str] = {}
         for channel in group:
             name = names.get(channel, usual(channel)["name"])
@@ -133,9 +126,7 @@ class Output(StrEnum):
 
 
 TYPES: dict[Stream | Output, str] = {
-    Stream.STROKES: "sensor_msgs/msg/JointState",
-    Stream.ANGLES: "sensor_msgs/msg/JointState",
-    Stream.IMU: "sensor_msgs/msg/Imu",
+    **{stream: kind.message for stream, kind in SENSORS.items()},
     Output.TIP_DISPLACEMENT: "geometry_msgs/msg/Vector3Stamped",
     Output.TIP_POSITION: "geometry_msgs/msg/PointStamped",
     Output.TIP_ACCELERATION: "geometry_msgs/msg/AccelStamped",
@@ -217,7 +208,7 @@ class Topics(_Entry):
         ``cylinder_5`` of four; not if a channel reads that name, nor if `sensors` has every channel of the stream: then
         whoever wrote the mapping has said which of the names are the boom's.
         """
-        if stream is Stream.IMU or all(channel in self.sensors for channel in channels(stream, joints)):
+        if SENSORS[stream].ends or all(channel in self.sensors for channel in channels(stream, joints)):
             return []
         used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
         return [name for name in names if stream_of(name) is stream and number_of(name) > joints and name not in used]

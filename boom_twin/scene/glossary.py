@@ -4,7 +4,23 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from .schema import Base, Clearance, ContactLaw, Cylinder, CylinderPart, Joint, Material, Pin, RigidPart, Scene, Section, Tip
+from ..kernels.elements.pin_contact import LAWS
+from .schema import (
+    Base,
+    Clearance,
+    ContactLaw,
+    Cylinder,
+    CylinderPart,
+    Joint,
+    Material,
+    Pin,
+    RigidPart,
+    Scene,
+    Section,
+    Tip,
+)
+
+_LAWS = tuple(LAWS)
 
 MEANING: dict[type[BaseModel], dict[str, str]] = {
     Scene: {
@@ -85,7 +101,7 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
         "pins": "a list with one block per pin",
     },
     ContactLaw: {
-        "law": "hertz, lankarani-nikravesh, flores, hunt-crossley or hunt-crossley-exact",
+        "law": f"{', '.join(_LAWS[:-1])} or {_LAWS[-1]}",
         "exponent": "the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's",
         "restitution": "the coefficient of restitution, above 0 and at most 1",
         "friction": "Coulomb's coefficient of friction, 0 to 2",

@@ -7,7 +7,7 @@ All values are SI. ``None`` means "not named, therefore not in the model".
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -20,6 +20,11 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Modes = Annotated[int, Field(ge=0, le=10)]
+
+if TYPE_CHECKING:
+    LawName = str
+else:
+    LawName = Literal[tuple(LAWS)]  # pydantic refuses any other, and names them
 
 IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
 
@@ -119,7 +124,7 @@ class Joint(Part):
 class ContactLaw(Part):
     """How journal and bush touch: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
 
-    law: Literal["hertz", "lankarani-nikravesh", "flores", "hunt-crossley", "hunt-crossley-exact"] = "lankarani-nikravesh"
+    law: LawName = "lankarani-nikravesh"
     exponent: Annotated[float, Field(ge=1.3, le=3)] = 1.5
     restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
     friction: Annotated[float, Field(ge=0, le=2)] = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..errors import UsageError
-from ..types import Array, Change, Stream
+from ..types import SENSORS, Array, Change, Stream
 
 KEPT = 16  # sets of zeros that late samples may still need
 
@@ -62,6 +62,8 @@ class SensorZeros:
 
 SPAN = 1_000_000_000  # ns
 FEWEST = 5  # readings that make a mean
+WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
+"""Sensors with a zero for each of their channels; all others have one for each joint."""
 
 
 class ResidualBuffer:
@@ -106,8 +108,8 @@ class ResidualBuffer:
         UsageError
             It has too few readings in that time.
         """
-        if sensor == "tip_imu":
-            return {name: self._mean(name, now) for name in ("tip_imu_x", "tip_imu_z")}
+        if sensor in WHOLE:
+            return {name: self._mean(name, now) for name in WHOLE[sensor]}
         kind, _, number = sensor.partition("_")
         joint = f"joint_{number}"
         mean = self._mean(joint, now)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,21 +13,20 @@ from ..analysis.modal import StrokeNoise, stroke_noise
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.look_ahead import copy_state
+from ..estimation.sensor_model import Mounting
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import State
-from ..types import Array, Prediction
+from ..types import Array, Prediction, Stream
 
 SPAN = 2_000_000_000  # ns
 
 
 class Expected(NamedTuple):
-    """What sensors should read at a stamp (ns): angles (n,) rad, force (2,) m/s^2, deviations of both; strokes (n,) m."""
+    """What sensors should read at a stamp (ns) and with what deviations, by stream, shape (channels,); strokes (n,) m."""
 
     stamp: int
-    angles: Array
-    force: Array
-    angle_sigmas: Array
-    force_sigmas: Array
+    values: dict[Stream, Array]
+    sigmas: dict[Stream, Array]
     strokes: Array
 
 
@@ -56,9 +56,8 @@ class PredictionBuffer:
 
 def _between(old: Expected, new: Expected, stamp: int) -> Expected:
     share = (stamp - old.stamp) / (new.stamp - old.stamp)
-    angles = old.angles + share * (new.angles - old.angles)
-    force, strokes = old.force + share * (new.force - old.force), old.strokes + share * (new.strokes - old.strokes)
-    return Expected(stamp, angles, force, new.angle_sigmas, new.force_sigmas, strokes)
+    values = {stream: value + share * (new.values[stream] - value) for stream, value in old.values.items()}
+    return Expected(stamp, values, new.sigmas, old.strokes + share * (new.strokes - old.strokes))
 
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
@@ -170,6 +169,58 @@ class Deviations:
         copy_state(live, probe)
         tuned = self._settings
         return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
+
+
+class PredictedBoom(NamedTuple):
+    """The boom at one stamp, as expected readings need it.
+
+    Attributes
+    ----------
+    prediction : Prediction
+    live : State
+        The model's state.
+    gravity : ndarray, shape (2,)
+        m/s^2.
+    mounting : Mounting
+        Of the angle sensors.
+    settings : Settings
+    joint_sigmas, force_sigmas : ndarray, shape (n,), (2,)
+        See `Deviations.at`.
+    """
+
+    prediction: Prediction
+    live: State
+    gravity: Array
+    mounting: Mounting
+    settings: Settings
+    joint_sigmas: Array
+    force_sigmas: Array
+
+
+def _angles(boom: PredictedBoom) -> tuple[Array, Array]:
+    mounting = boom.mounting
+    sigmas = mounting.deviations(boom.joint_sigmas, boom.settings.angle_variance)
+    return mounting.expected(boom.prediction.joints, boom.live), sigmas
+
+
+def _force(boom: PredictedBoom) -> tuple[Array, Array]:
+    return specific_force(boom.prediction, boom.gravity), boom.force_sigmas
+
+
+READINGS: dict[Stream, Callable[[PredictedBoom], tuple[Array, Array]]] = {
+    Stream.ANGLES: _angles,
+    Stream.IMU: _force,
+}
+"""What the sensors of a stream should read, and the standard deviation of reading minus expected, SI, shape (channels,)."""
+
+
+def expected_readings(boom: PredictedBoom, strokes: Array) -> Expected:
+    """What all sensors should read, with the strokes (n,) in m as measured."""
+    values: dict[Stream, Array] = {}
+    sigmas: dict[Stream, Array] = {}
+    for stream, reading in READINGS.items():
+        values[stream], sigmas[stream] = reading(boom)
+    return Expected(boom.prediction.stamp, values, sigmas, strokes)
 
 
 def specific_force(prediction: Prediction, gravity: Array) -> Array:

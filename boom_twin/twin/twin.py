@@ -23,7 +23,7 @@ from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
 from ..types import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .expected_readings import Deviations, Expected, PredictionBuffer, specific_force
+from .expected_readings import Deviations, PredictedBoom, PredictionBuffer, expected_readings
 from .sample_check import SHORTEST, SampleCheck
 from .stamp_check import LASTING, StampCheck, TimeStep, explain, goes_on, is_close, jerk_densities, surprise
 from .stroke_check import FAR, StrokeCheck
@@ -422,10 +422,9 @@ class Twin:
         """Keep what residuals need."""
         boom, interval = self._boom, run.interval or self.settings.step
         joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, boom.variances, boom.live, boom.angles)
-        angles = self._mounting.expected(prediction.joints, boom.live)
-        angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
-        force = specific_force(prediction, self.plan.tables.gravity)
-        run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas, run.strokes))
+        gravity = self.plan.tables.gravity
+        now = PredictedBoom(prediction, boom.live, gravity, self._mounting, self.settings, joint_sigmas, force_sigmas)
+        run.memory.add(expected_readings(now, run.strokes))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
@@ -475,10 +474,9 @@ class Twin:
         expected = run.memory.at(sample.stamp)
         if expected is None:
             return None
+        values, sigmas = sample.values - expected.values[sample.stream], expected.sigmas[sample.stream]
         if sample.stream is Stream.ANGLES:
-            values, sigmas = self._mounting.residuals(sample.values, expected.angles), expected.angle_sigmas
-        else:
-            values, sigmas = sample.values - expected.force, expected.force_sigmas
+            values = self._mounting.unwound(values)
         self._recent.add(sample.stamp, sample.stream, values)
         zeros = self._zeros.of(sample.stream, sample.stamp)
         if zeros is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, replay
+from boom_twin import Sample, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import _Messages
 from boom_twin.bag.writer import SessionWriter
@@ -76,14 +76,14 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
     scene, topics = load_scene(), load_topics()
     strokes = strokes_of_posture(scene, "arch")
     joints = joint_angles_of_strokes(scene, strokes)
-    messages = _Messages(4)
+    messages = _Messages()
     keys = {"s": topics.inputs[Stream.STROKES], "a": topics.inputs[Stream.ANGLES], "c": topics.outputs[Output.CHANGES]}
     told = Change(5 * SECOND, True, Settings(payload=50.0).live, {"joint_1": 0.02})
     with SessionWriter(tmp_path / "bag", keys) as bag:
         for k in range(100):
             stamp = 4 * SECOND + 20_000_000 * k
-            bag.write("s", stamp, messages.joint_state("cylinder", stamp, strokes))
-            bag.write("a", stamp, messages.joint_state("joint", stamp, joints))
+            bag.write("s", stamp, messages.of(Sample(Stream.STROKES, stamp, strokes)))
+            bag.write("a", stamp, messages.of(Sample(Stream.ANGLES, stamp, joints)))
             if stamp == told.stamp:
                 bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")

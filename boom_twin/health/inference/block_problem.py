@@ -63,10 +63,13 @@ class BlockBuilder:
             block.strokes.append(strokes)
 
     def measured(self, residuals: Residuals, values: Array) -> None:
-        """Residuals of one sample with its values."""
+        """Residuals of one sample with its values; those of other streams than angles and IMU do not matter."""
         block = self._at(residuals.stamp)
         if block is not None:
-            (block.angles if residuals.stream is Stream.ANGLES else block.forces).append((residuals, values))
+            if residuals.stream is Stream.ANGLES:
+                block.angles.append((residuals, values))
+            elif residuals.stream is Stream.IMU:
+                block.forces.append((residuals, values))
 
     def close(self, stamp: int) -> list[Block]:
         """Blocks that nothing is waited for any more once a stroke has come with `stamp` (ns); they may be empty."""

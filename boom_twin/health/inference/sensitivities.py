@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,45 @@ class Signature(NamedTuple):
     tip: Array
     by_stroke: Array
     tip_by_stroke: Array
+
+
+class Posture(NamedTuple):
+    """Where columns are worked out: a boom of n joints at rest.
+
+    Attributes
+    ----------
+    joints : int
+        n.
+    strokes, forces : ndarray, shape (n,)
+        m; of the cylinders, N.
+    readings : ndarray, shape (n + 4,)
+        See `boom_twin.estimation.sensor_model.Reading`.
+    by_stroke : ndarray, shape (n + 4, n)
+        Their derivative, 1/m.
+    """
+
+    joints: int
+    strokes: Array
+    readings: Array
+    forces: Array
+    by_stroke: Array
+
+    def unit(self, place: int) -> Array:
+        """A column that adds 1 to the reading at `place`, shape (n + 4,)."""
+        column = np.zeros(self.joints + 4)
+        column[place] = 1.0
+        return column
+
+
+COLUMNS: dict[Form, Callable[[Posture, int], Array]] = {
+    Form.ANGLE: lambda at, i: at.unit(i),
+    Form.IMU: lambda at, i: at.unit(at.joints + i),
+    Form.STROKE: lambda at, i: -at.by_stroke[:, i],
+    Form.SCALE: lambda at, i: -at.by_stroke[:, i] * at.strokes[i],
+    Form.PLAY: lambda at, i: at.by_stroke[:, i] * np.sign(at.forces[i]),
+}
+"""Derivative of the readings by a parameter of that form and index; of `Form.SCENE` it comes from another boom at rest, and
+those that depend on motion or time are 0 here."""
 
 
 class _Boom:
@@ -132,8 +172,10 @@ class Signatures:
             if moved is None:
                 return None
             table[:, place] = (moved - base) / step
+        posture = Posture(n, strokes, base, forces, by_stroke)
         for place, each in enumerate(self.known):
-            table[:, place] += _direct(each, n, by_stroke, strokes, forces)
+            if (column := COLUMNS.get(each.form)) is not None:
+                table[:, place] += column(posture, each.index)
         return Signature(strokes.copy(), table[: n + 2], table[n + 2 :], by_stroke[: n + 2], by_stroke[n + 2 :])
 
     def _rest(self, strokes: Array) -> Array | None:
@@ -143,19 +185,3 @@ class Signatures:
         self.nominal.start(strokes)
         self._is_settled = True
         return self.nominal.rest(strokes)
-
-
-def _direct(each: Parameter, n: int, by_stroke: Array, strokes: Array, forces: Array) -> Array:
-    """The column of a parameter that is not the scene's, shape (n + 4,)."""
-    column, i = np.zeros(n + 4), each.index
-    if each.form is Form.ANGLE:
-        column[i] = 1.0
-    elif each.form is Form.IMU:
-        column[n + i] = 1.0
-    elif each.form is Form.STROKE:
-        column = -by_stroke[:, i]
-    elif each.form is Form.SCALE:
-        column = -by_stroke[:, i] * strokes[i]
-    elif each.form is Form.PLAY:
-        column = by_stroke[:, i] * np.sign(forces[i])
-    return column

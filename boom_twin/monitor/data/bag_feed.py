@@ -35,7 +35,6 @@ LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-SHOWN = frozenset(Output) - {Output.CHANGES}
 TURN = 0.04
 """Seconds of reading at a time, after which the pages have their turn."""
 
@@ -132,7 +131,7 @@ def bag_feed(
 
 def _names(topics: Topics) -> dict[str, Topic]:
     """Every topic that may be shown, by its absolute name."""
-    shown = [*topics.inputs.values(), *(topics.outputs[key] for key in Output if key in SHOWN), topics.events]
+    shown = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
     return {topic.absolute: topic for topic in shown}
 
 
@@ -175,7 +174,7 @@ class _Twin:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
         self._twin, self._outlet = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
-        self._names = {key: topic.absolute for key, topic in topics.outputs.items() if key in SHOWN}
+        self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.catch.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
-from ...messages.topic_table import Output, Topics
+from ...messages.topic_table import Output, Topics, stream_of
 from ...messages.type_store import decode
 from ...types import Sample, Stream, channels_of
 from . import message_checks as checks
@@ -33,6 +33,8 @@ WAITING = 1000
 GAP = 0.1
 """A longer pause between strokes (s) is told as an alarm."""
 IMU = channels_of(0)[Stream.IMU]
+NOT_SHOWN = frozenset(Stream) - {Stream.STROKES, Stream.ANGLES, Stream.IMU}
+"""Sensors whose residuals the page has no place for."""
 CYLINDER = re.compile(r"cylinder_[1-9][0-9]{0,2}")
 NO_MEASUREMENT = "no measurement"
 """Of the intake: an Imu that says that it has none is nothing odd."""
@@ -171,7 +173,7 @@ class TopicRows:
         if names == list(IMU):
             self._residuals[stamp] = (values, sigmas)
             self._join(stamp)
-        else:
+        elif not names or stream_of(names[0]) not in NOT_SHOWN:
             checks.joint_names(names)
             columns = [f"{name}_rad" for name in names] + [f"{name}_normalised" for name in names]
             self._append("joints", columns, stamp, values + ratios)

@@ -13,6 +13,7 @@ from rclpy.service import Service
 from std_srvs.srv import Trigger
 
 from ...errors import UsageError
+from ...twin.adjustments import WHOLE
 from ...twin.twin import Twin
 from ...types import Change, Report
 from ..log import Log
@@ -54,7 +55,7 @@ class Services:
     ) -> None:
         self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
-        sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + ["tip_imu"]
+        sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + list(WHOLE)
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
         self._called: dict[str, float] = {}

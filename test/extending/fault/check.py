@@ -1,0 +1,52 @@
+"""The fault is put on the (synthetic) bundled session by the virtual rig, and named by the health monitor, no other one."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.bag.reader import read, scan
+from boom_twin.health.baseline import Baseline
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.validation.rig.faults import parse, spoil
+from boom_twin.validation.rig.session import RigSession
+
+ANGLE, ONSET, LAST, NANO = 0.15, 4.0, 12.0, 1e-9
+session, topics, scene, found = scan(Path(sys.argv[1])), load_topics().inputs, load_scene(), {stream: [] for stream in Stream}
+streams, decoder = {f"/{topic.name}": stream for stream, topic in topics.items()}, SampleDecoder(len(scene.joints))
+for name, log, message in read(session, {name: topics[stream].type for name, stream in streams.items()}):
+    if (log - session.start) * NANO > LAST:
+        break
+    sample = decoder.put(streams[name], stamp_of(message), message)
+    found[sample.stream].append((sample.stamp, sample.values))
+stamps = np.array([stamp for stamp, _ in found[Stream.STROKES]])
+strokes, joints, imu = (np.array([values for _, values in found[stream]]) for stream in Stream)
+times = (stamps - stamps[0]) * NANO
+
+fault = parse(f"tip_imu.mount:turned:{ANGLE}@{ONSET}")
+spoilt = spoil(RigSession(stamps, strokes, joints, imu, stamps, {"t": times}), [fault], 0)
+c, s = math.cos(ANGLE), math.sin(ANGLE)
+assert np.array_equal(spoilt.imu[times < ONSET], imu[times < ONSET]) and np.array_equal(spoilt.joints, joints)
+assert np.allclose(spoilt.imu[-1], [c * imu[-1, 0] + s * imu[-1, 1], c * imu[-1, 1] - s * imu[-1, 0]])
+
+
+def alarms(readings):
+    """First time (s) of every cause that was ever named, with its last estimate."""
+    twin, named = Twin(scene, baseline=Baseline()), {}
+    for stamp, *rows in zip(stamps.tolist(), strokes, joints, readings, strict=True):
+        for stream, values in zip(Stream, rows, strict=True):
+            health = twin.update(Sample(stream, stamp, values)).health
+            for alarm in () if health is None else health.alarms:
+                since, _ = named.get(alarm.cause, ((stamp - stamps[0]) * NANO, 0.0))
+                named[alarm.cause] = since, alarm.ranked[0].parts[0][1]
+    return named
+
+
+assert alarms(imu) == {}
+causes = alarms(spoilt.imu)
+since, angle = causes.pop("tip_imu.mount")
+assert since >= ONSET and abs(angle - ANGLE) < 0.03
+assert set(causes) <= {None}, causes

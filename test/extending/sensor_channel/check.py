@@ -1,0 +1,78 @@
+"""The sensor is read in its unit, has residuals in the bag of a replay, a zero, and statuses of its own."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_samples
+from boom_twin.config.settings import Settings, Thresholds
+from boom_twin.diagnostics.sensor_status import sensors_of
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.diagnostics.twin_status import TwinWatch
+from boom_twin.health.baseline import Baseline
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.load import default_text
+from boom_twin.types import channels_of
+
+CHANNEL, WRONG, SLOPE, NANO = "tip_inclination", 0.01, 0.02, 1e-9
+INCLINATION, count = Stream.TIP_INCLINATION, 400
+scene = load_scene()
+scene = scene.model_copy(update={"base": scene.base.model_copy(update={"inclination": SLOPE})})
+assert channels_of(4)[INCLINATION] == (CHANNEL,)
+
+# A session: the sensor reads WRONG too much of a boom whose base stands inclined by SLOPE.
+times = 0.005 * np.arange(count)
+strokes = strokes_of_posture(scene, "arch") + np.outer(0.01 * np.sin(2.0 * times), [1.0, 0.0, 0.5, 0.0])
+noise, model, samples = np.random.default_rng(0), Twin(scene), []
+for stamp, row in zip((10**9 + np.round(times / NANO)).astype(int).tolist(), strokes, strict=True):
+    p = model.update(Sample(Stream.STROKES, stamp, row)).prediction
+    reading = p.tip_angle + SLOPE + WRONG + 1e-4 * noise.standard_normal()
+    samples += [Sample(Stream.STROKES, stamp, row), Sample(Stream.ANGLES, stamp, p.joints)]
+    samples.append(Sample(INCLINATION, stamp, np.array([reading])))
+
+# Through a twin, watched as the node watches its own.
+topics = load_topics()
+required = {stream: topic.required for stream, topic in topics.inputs.items()}
+sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: topic.name for s, topic in topics.inputs.items()}
+now = 0.0
+watch, twin = TwinWatch(sensors, names, Thresholds(), lambda: now), Twin(scene, baseline=Baseline())
+watch.begin()
+found = []
+for sample in samples:
+    now = (sample.stamp - samples[0].stamp) * NANO
+    watch.seen(sample.stream, sample.stamp)
+    report = twin.update(sample)
+    watch.took(sample, report, 0.0)
+    found += [residuals for residuals in report.residuals if residuals.stream is INCLINATION]
+assert {residuals.names for residuals in found} == {(CHANNEL,)} and len(found) == count
+values, ratios = (np.array([getattr(residuals, part)[0] for residuals in found]) for part in ("values", "normalised"))
+assert np.abs(values - WRONG).max() < 6e-4 and ratios.min() > 5.0
+looked = watch.look({}, True, {stream: Peers(name) for stream, name in names.items()}, (), now)
+statuses = {status.name: status.message for status in looked}
+assert statuses[f"sensor {CHANNEL}"] == "measuring"
+assert {"tip_inclination", "residual tip_inclination"} <= set(statuses)
+assert math.isclose(twin.rezero("tip")[CHANNEL], WRONG, abs_tol=5e-4)
+
+# From a bag, in degrees.
+mapping = Path("mapping.yaml")
+mapping.write_text(f"sensors: {{{CHANNEL}: {{unit: deg}}}}\n")
+write_samples(Path("session"), samples, (Stream.STROKES, Stream.ANGLES, INCLINATION), {"origin": "synthetic"})
+((_, _, message), *_) = read(scan(Path("session")), {f"/{CHANNEL}": "sensor_msgs/msg/JointState"})
+decoder = SampleDecoder(4, load_mapping(mapping, 4))
+assert math.isclose(decoder.put(INCLINATION, stamp_of(message), message).values[0], math.radians(message.position[0]))
+
+lines = default_text().replace("\nbase:\n", f"\nbase:\n  inclination: {SLOPE}\n")
+Path("scene.yaml").write_text(lines)
+options = ("--scene", "scene.yaml", "--out", "result", "--no-pictures", "--no-health")
+subprocess.run([sys.executable, "-m", "boom_twin.cli.main", "replay", "session", *options], check=True)
+kept = read(scan(Path("result/bag")), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
+kept = [message.position[0] for _, _, message in kept if message.name == [CHANNEL]]
+assert len(kept) == count and np.abs(np.array(kept) - WRONG).max() < 6e-4
