@@ -10,7 +10,7 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures docs clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
@@ -22,13 +22,14 @@ help:
 	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
 	@echo "make figures     make the pictures of the documentation anew"
+	@echo "make docs        the documentation as a site with the API reference, into out/site"
 
 setup: $(READY)
 
 $(READY): setup.py
 	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor]"
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs]"
 	@touch $@
 
 # Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
@@ -46,7 +47,7 @@ test: lint
 	$(BIN)/python -m pytest -m "not slow"
 
 lint: $(READY)
-	$(BIN)/ruff check boom_twin test setup.py
+	$(BIN)/ruff check boom_twin test setup.py docs/site_hooks.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
@@ -99,6 +100,10 @@ session: $(READY)
 
 figures: $(READY)
 	$(BIN)/python docs/figures.py
+
+# The notice that is turned off tells of the theme's end of life (May 2027), hence the upper bounds in setup.py.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 clean:
 	rm -rf $(VENV) $(COLCON) $(NODE) build *.egg-info
