@@ -171,6 +171,11 @@ class HypothesisTest:
             Of the parameters while all was well.
         span : float
             Time (s) that the evidence has taken: what changes within less than `SLOWEST` is no drift.
+
+        Returns
+        -------
+        Verdict
+            How well each fault explains the evidence, and how large it would be.
         """
         healthy = evidence.given(mean, covariance)
         matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
