@@ -1,5 +1,4 @@
-"""Parameters of the twin and thresholds of ``/diagnostics``: tables with type, unit, bounds and meaning, and the reader of
-ROS parameter files."""
+"""Parameters of the twin and thresholds of ``/diagnostics``: type, unit, bounds, meaning; the reader of ROS parameter files."""
 
 from __future__ import annotations
 
