@@ -56,10 +56,10 @@ setup(
         "peers": ["exudyn>=1.13,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
         "docs": [
-            "mkdocs>=1.6,<2",
-            "mkdocs-material>=9.7,<10",
-            "mkdocstrings>=1.0,<2",
-            "mkdocstrings-python>=2.0,<3",
+            "mkdocs>=1.6.1,<2",
+            "mkdocs-material>=9.8.1,<10",
+            "mkdocstrings>=1.0.8,<2",
+            "mkdocstrings-python>=2.0.11,<3",
             "ruff>=0.6,<1",  # breaks long signatures into lines
         ],
     },
