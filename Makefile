@@ -14,7 +14,7 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COM
 WORKERS ?= 3
 PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures docs clean
 
 help:
 	@echo "make demo        play a recorded session through the live node, show what it predicted"
@@ -26,13 +26,14 @@ help:
 	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
 	@echo "make figures     make the pictures of the documentation anew"
+	@echo "make docs        the documentation as a site with the API reference, into out/site"
 
 setup: $(READY)
 
 $(READY): setup.py
 	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor]"
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs]"
 	@touch $@
 
 # Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
@@ -50,7 +51,7 @@ test: lint warm
 	$(BIN)/python -m pytest $(PARALLEL) -m "not slow"
 
 lint: $(READY)
-	$(BIN)/ruff check boom_twin test setup.py
+	$(BIN)/ruff check boom_twin test setup.py docs/site_hooks.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
@@ -103,6 +104,10 @@ session: $(READY)
 
 figures: $(READY)
 	$(BIN)/python docs/figures.py
+
+# The notice that is turned off tells of the theme's end of life (May 2027), hence the upper bounds in setup.py.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 clean:
 	rm -rf $(VENV) $(COLCON) $(NODE) build *.egg-info

@@ -56,6 +56,13 @@ setup(
         ],
         "peers": ["exudyn>=1.13,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
+        "docs": [
+            "mkdocs>=1.6.1,<2",
+            "mkdocs-material>=9.8.1,<10",
+            "mkdocstrings>=1.0.8,<2",
+            "mkdocstrings-python>=2.0.11,<3",
+            "ruff>=0.6,<1",  # breaks long signatures into lines
+        ],
     },
     # where `ros2 run` looks; pip puts scripts into bin/ all the same
     options={"install": {"install_scripts": "$base/lib/boom_twin"}, "develop": {"script_dir": "$base/lib/boom_twin"}},

@@ -1,5 +1,4 @@
-"""Stroke histories as smooth drives: monotone interpolation of rows, and the course of a drive that is followed with any
-step.
+"""Stroke histories as smooth drives: monotone interpolation of rows, and a drive's course for steps of any length.
 
 The slopes are those of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5, 1984), at inner rows a weighted harmonic mean of the
 two neighbouring secants, zero where they differ in sign; at the ends a parabola through three rows, held back where it would

@@ -167,6 +167,22 @@ class Equilibrium:
 def statics(scene: Scene, strokes: Array | None = None, posture: str | None = None, modes: int = 6) -> Equilibrium:
     """Equilibrium under gravity at absolute `strokes` (m), shape (n,), or at a named `posture` of the scene.
 
+    Parameters
+    ----------
+    scene : Scene
+        The boom.
+    strokes : ndarray, shape (n,), optional
+        Absolute strokes, m.
+    posture : str, optional
+        A posture of the scene; just one of strokes and posture is given.
+    modes : int
+        How many natural frequencies are looked for, the lowest first.
+
+    Returns
+    -------
+    Equilibrium
+        Tip, joint angles, cylinder forces and natural frequencies of the boom at rest.
+
     Raises
     ------
     UsageError

@@ -133,6 +133,11 @@ def march(
     repeats : int
         How often the motion is stepped, for the time.
 
+    Returns
+    -------
+    March
+        Rows of the motion, the status of its steps, and the time that they took.
+
     Raises
     ------
     UsageError

@@ -1,5 +1,4 @@
-"""Natural frequencies and modes about an equilibrium by Wittrick-Williams counting, and stroke noise propagated through the
-model.
+"""Natural frequencies and modes about an equilibrium by Wittrick-Williams counting; stroke noise through the model.
 
 The sweep at A = -omega^2 condenses the dynamic stiffness K - omega^2 M with its full tangent. By Sylvester's law the number
 of negative pivots of all that is condensed, less the number of forces among the unknowns, is the number of natural
@@ -11,7 +10,7 @@ by dphi/ds. And what the strokes did before, white noise of density r T (varianc
 lets it through, has shaken the natural modes. Mode j with modal load N_ij by the drive of cylinder i (the increment of that
 cylinder's force, unit modal mass) collects, after a time t,
 
-var eta_j = sum_i N_ij^2 / omega_j^4 . r T omega_j / (4 zeta_j) . G(omega_j)^2 (1 - exp(-2 zeta_j omega_j t)),
+    var eta_j = sum_i N_ij^2 / omega_j^4 . r T omega_j / (4 zeta_j) . G(omega_j)^2 (1 - exp(-2 zeta_j omega_j t)),
     G(omega) = 1 / (1 + (omega/omega_c)^6),   omega_c = (q / (r T))^(1/6),
 
 G being the gain of the smoother for strokes that are integrated white jerk of density q. White noise through a resonance:

@@ -75,6 +75,11 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     duration : float
         s.
 
+    Returns
+    -------
+    Motion
+        Where it starts, and the strokes of all cylinders as functions of time.
+
     Raises
     ------
     UsageError

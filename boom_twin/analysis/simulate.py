@@ -102,6 +102,8 @@ def simulate(
 
     Parameters
     ----------
+    scene : Scene
+        The boom, of n sections.
     times : ndarray, shape (m,)
         s, increasing, any spacing.
     strokes : ndarray, shape (m, n)
@@ -115,6 +117,11 @@ def simulate(
     estimate_errors : bool
         Step the motion again with half the step and by every second row, to tell how far it can be trusted; takes four to
         seven times as long as stepping once.
+
+    Returns
+    -------
+    Simulation
+        Tip, joints and cylinder forces at the rows of `times`, and what gives reason to doubt them.
 
     Raises
     ------

@@ -139,6 +139,11 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     joints : int, optional
         As for `boom_twin.messages.mapping.load_mapping`.
 
+    Returns
+    -------
+    Mapped
+        The mapping, and where it is from.
+
     Raises
     ------
     UsageError

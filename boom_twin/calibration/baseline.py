@@ -85,6 +85,11 @@ def baseline_of(
     progress : callable, optional
         Told the share done and what comes next.
 
+    Returns
+    -------
+    Baseline
+        Mean and covariance of the parameters, and the errors that stay; see `boom_twin.health.baseline`.
+
     Raises
     ------
     UsageError

@@ -3,7 +3,7 @@
 The noise of block means is not white: the sensors' own is, but noise of the strokes shakes the boom's natural modes, which
 ring for seconds and move all channels together. Its realisations, made by the very model, are fitted by
 
-e_t = sum_k A_k e_(t-k) + L w_t,    k = 1 .. p,
+    e_t = sum_k A_k e_(t-k) + L w_t,    k = 1 .. p,
 
 with w of unit variance and white (Luetkepohl, New Introduction to Multiple Time Series Analysis, 2005, ch. 3, least squares).
 """

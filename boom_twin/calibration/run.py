@@ -118,6 +118,11 @@ def calibrate(
     progress : callable, optional
         Told the share done and what comes next.
 
+    Returns
+    -------
+    Calibration
+        Estimates with their intervals, what the sessions do not tell, and the residuals on what was held out.
+
     Raises
     ------
     UsageError

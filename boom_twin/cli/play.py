@@ -73,7 +73,6 @@ def run(args: Namespace) -> int:
 
 def _play(player: Player, args: Namespace, length: float) -> None:
     """Once or for ever; the space bar of a terminal pauses."""
-
     is_paused = False
 
     def is_held() -> bool:

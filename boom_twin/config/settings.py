@@ -1,5 +1,4 @@
-"""Parameters of the twin and thresholds of ``/diagnostics``: tables with type, unit, bounds and meaning, and the reader of
-ROS parameter files."""
+"""Parameters of the twin and thresholds of ``/diagnostics``: type, unit, bounds, meaning; the reader of ROS parameter files."""
 
 from __future__ import annotations
 
@@ -169,6 +168,21 @@ def load_settings(path: Path | None = None) -> Settings:
     """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
 
     Parameters of the node alone (`NODE_ONLY`) and of ``/diagnostics`` are passed over.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The file; by default ``msg_config/twin.yaml`` of the package.
+
+    Returns
+    -------
+    Settings
+        Complete: what the file does not name has its default.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or a parameter is unknown or out of bounds.
     """
     source = DEFAULT_FILE if path is None else Path(path)
     others = {*NODE_ONLY, *Thresholds.model_fields}

@@ -4,7 +4,7 @@ Each stroke is an integrated white jerk of density q (m^2/s^5), measured with va
 window; for each stroke it holds the estimate x = (position, velocity, acceleration) given everything up to now, and the
 covariance C of that estimate's error with the newest one's:
 
-predict:   x- = F x,  P- = F P F^T + q Q,  C_j <- C_j F^T           (newest node, then every older node j)
+    predict:   x- = F x,  P- = F P F^T + q Q,  C_j <- C_j F^T           (newest node, then every older node j)
     measure:   nu = y - x-_0,  s = P-_00 + r,  x_j += C_j[:, 0] nu / s,  C_j <- C_j (I - k h^T)^T
 
 Node 0 is the newest, with C_0 = P. (Rauch-Tung-Striebel smoothing in its fixed-lag form; Anderson and Moore, Optimal

@@ -1,5 +1,4 @@
-"""Tables of a compiled boom: operations along the chain, records of each kind of element, work arrays, and status codes of
-kernels.
+"""Tables of a compiled boom: operations along the chain, records of each kind of element, work arrays, status codes.
 
 The operations stand in the order from the base to the tip. Positions are placed in that order, forces are swept in against
 it, increments are swept out along it. A kind of element that a scene does not have is a table of length 0.

@@ -48,6 +48,11 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
     joints : int, optional
         Of the scene, if that is known: then channels that it does not have are faults too.
 
+    Returns
+    -------
+    Topics
+        Every topic and sensor; what the file does not name is the package's own.
+
     Raises
     ------
     UsageError

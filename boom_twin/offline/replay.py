@@ -121,7 +121,19 @@ class Recording:
 
 @dataclass(frozen=True)
 class Replay:
-    """Result of a replay: the numbers of ``summary.json``, and all that was predicted."""
+    """Result of a replay: the numbers of ``summary.json``, and all that was predicted.
+
+    Attributes
+    ----------
+    summary : dict
+        As in ``summary.json``.
+    recording : Recording
+        Predictions, residuals, gaps and health, in the order of the session.
+    session : Session
+        What was replayed.
+    truth : TipTruth or None
+        The tip's true motion, where the session has one (synthetic sessions of the virtual rig).
+    """
 
     summary: dict[str, Any]
     recording: Recording
@@ -164,6 +176,11 @@ def replay(
     baseline : path, optional
         What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
         one that the session was recorded with, else the package's own.
+
+    Returns
+    -------
+    Replay
+        The numbers of ``summary.json``, and all that was predicted.
 
     Raises
     ------

@@ -13,7 +13,7 @@ Transfer in Newton form
     An element has coordinates z of its own (bending, joint angle, pin forces). Its equations stay nonlinear; what is
     transferred are increments about the present iterate. With the outboard side condensed to
 
-        f_O = S de_O + p                                                             (Riccati transformation)
+        f_O = S de_O + p                      (Riccati transformation)
 
     the equations of an element, written as the gradient of its work, are
 
@@ -33,9 +33,12 @@ Time
     A = C = 0 the same equations are statics; with A = -omega^2 and x_hat = x they are harmonic vibration.
 
 Symbols
-    S, p     condensed tangent and force of all that lies outboard     A, C, D   coefficients of the integrator
-    c, s     cos and sin of an orientation                              h         step, s
-    N        force between barrel and rod, tension positive             l, l_ref  pin-to-pin length, length of the drive
+    S, p      condensed tangent and force of all that lies outboard
+    A, C, D   coefficients of the integrator
+    c, s      cos and sin of an orientation
+    h         step, s
+    N         force between barrel and rod, tension positive
+    l, l_ref  pin-to-pin length, length of the drive
 
 Sources
     [Z] Z.W. Zhang, Y.X. Wu, J.G. Liu, W. Ren, M.H. Cao: Research on the rigid-flexible multibody dynamics of concrete placing

@@ -1,1 +1,1 @@
-"""TODO room."""
+"""Files, folders, child processes and terminal text, whatever they hold."""

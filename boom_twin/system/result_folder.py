@@ -1,5 +1,4 @@
-"""Result folders: built beside their place, renamed when they are whole, replaced only by their own command; marks of
-incomplete ones.
+"""Result folders: built beside their place, renamed when whole, replaced only by their own command; marks of incomplete ones.
 
 Beside ``OUT`` a command builds ``OUT.unfinished``. In it ``unfinished.json`` names the command; as long as one of the
 command's processes lives, that file is locked, so a second command is refused and what a killed one left is told from work

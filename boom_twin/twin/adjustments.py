@@ -1,5 +1,4 @@
-"""Adjustments of a running twin: sensor zeros, recent residuals from which they are found, and requests of load, limits and
-restarts."""
+"""Adjustments of a running twin: sensor zeros, the residuals they are found from, requests of load, limits and restarts."""
 
 from __future__ import annotations
 

@@ -169,6 +169,11 @@ def explain(
         Of the first sample after the step, and of a later one, m.
     apart, usual : float
         Time between these two, and usually from one sample to the next, s.
+
+    Returns
+    -------
+    TimeStep
+        A clock that was set, a pause, either, or neither.
     """
     first, later = strokes
     after = ((first, usual), (later, usual + apart))

@@ -161,6 +161,11 @@ class Twin:
             its zero becomes the one that explains the residual of ``joint_i``, which must read right for that; and the
             model, which the strokes drive, starts again from rest.
 
+        Returns
+        -------
+        dict of str to float
+            What its channels read too much, rad, m or m/s^2; it holds from the next full stroke sample on.
+
         Raises
         ------
         UsageError
@@ -222,6 +227,16 @@ class Twin:
 
     def update(self, sample: Sample) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
+
+        Parameters
+        ----------
+        sample : Sample
+            Values of one stream at one stamp, in the scene's order.
+
+        Returns
+        -------
+        Report
+            The prediction at a stroke sample that was followed, residuals that became known, what was out of the ordinary.
 
         Raises
         ------

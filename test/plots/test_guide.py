@@ -14,7 +14,8 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.load import examine
 
 DOCS = Path(__file__).parents[2] / "docs"
-GUIDE = (DOCS / "your_boom.md").read_text(encoding="utf-8")
+PARTS = ("your_boom.md", "your_boom_check.md", "your_boom_faults.md")
+GUIDE = "\n".join((DOCS / part).read_text(encoding="utf-8") for part in PARTS)
 *STEPS, WHOLE = re.findall(r"```yaml\n(.*?)```", GUIDE, re.DOTALL)
 MISTAKES = re.findall(r"```diff\n- (.*?)\n\+ ?(.*?)\n```\n```text\n(.*?)\n```", GUIDE, re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")

@@ -73,6 +73,11 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
     unverified : bool
         Save also the whole messages at the start of chunks that were cut off or whose checksum does not fit.
 
+    Returns
+    -------
+    Recovery
+        What was saved, and a count of what was not.
+
     Raises
     ------
     BagError

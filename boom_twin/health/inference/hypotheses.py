@@ -1,14 +1,13 @@
-"""Hypothesis test of faults: how well each explains what was measured, how large it is, and Bayesian regression of what is
-healthy.
+"""Hypothesis test of faults: how well each explains what was measured, how large it is; Bayesian regression of the healthy.
 
 Innovations are linear in the parameters, so all that they say is an information matrix L and a vector l. With the healthy
 deviations of all parameters (mean m, covariance P) integrated out,
 
-L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
+    L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
 
 a fault with prior N(0, F) in one parameter f is more probable than none by the factor
 
-ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
+    ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
 
 and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay,
 Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with
@@ -171,6 +170,11 @@ class HypothesisTest:
             Of the parameters while all was well.
         span : float
             Time (s) that the evidence has taken: what changes within less than `SLOWEST` is no drift.
+
+        Returns
+        -------
+        Verdict
+            How well each fault explains the evidence, and how large it would be.
         """
         healthy = evidence.given(mean, covariance)
         matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]

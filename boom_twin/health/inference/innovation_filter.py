@@ -177,6 +177,11 @@ class InnovationFilter:
             Mean square of the predicted tip acceleration lately, (m/s^2)^2.
         travel : float
             Of the strokes since the block before, m.
+
+        Returns
+        -------
+        Innovations
+            Of the channels that were measured, and the probability of the residuals among them.
         """
         self._go_on(errors2, shaking, travel)
         rows = np.isfinite(table[:, 0])

@@ -3,15 +3,15 @@
 All points in the frame of the carrier (the base for A; the section before for B) with its origin in the pivot and the
 carrier's axes; `phi` is the angle of the turned section against the carrier.
 
-A:  R = Rot(phi) (rx, ry), the rod pin on the turned section.
-B:  E = Rot(phi) (ex, ey); Q = intersection, left of D->E, of the circles (D, lL) and (E, lR); the rod pin sits on a link:
-    R = base + along u + left n, with base = D, u = (Q - D)/lL on link L, and base = E, u = (Q - E)/lR on link R.
-    B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
-    B3's R from Q towards E.
+    A:  R = Rot(phi) (rx, ry), the rod pin on the turned section.
+    B:  E = Rot(phi) (ex, ey); Q = intersection, left of D->E, of the circles (D, lL) and (E, lR); the rod pin sits on a link:
+        R = base + along u + left n, with base = D, u = (Q - D)/lL on link L, and base = E, u = (Q - E)/lR on link R.
+        B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
+        B3's R from Q towards E.
 
 Plain Python calls these with arrays of angles too, under np.errstate(invalid="ignore") where links may not close.
 
-length = |R - C|.  Derivatives follow from (Q-D).dQ = 0 and (Q-E).(dQ-dE) = 0.
+    length = |R - C|.  Derivatives follow from (Q-D).dQ = 0 and (Q-E).(dQ-dE) = 0.
 """
 
 from __future__ import annotations

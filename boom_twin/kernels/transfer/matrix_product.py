@@ -3,7 +3,7 @@
 A unit is what lies between two cuts with nothing carried: one element, or a whole six-bar from its pin C on. Sweeping in
 through one unit from a cut whose force f_O = f_0 + df is left open, as three more slots that multiply its displacement, gives
 
-f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f,
+    f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f,
 
 and solved for the output the unit's transfer matrix, [de_O, f_O, 1] = U [de_I, f_I, 1]. The elements are those of the Riccati
 sweep; only the way they are combined differs. Their product maps the cut behind substructure A to the free tip, whose force

@@ -94,6 +94,11 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     ----------
     values : ndarray, shape (n, c)
         At `rate` (Hz).
+
+    Returns
+    -------
+    float
+        Damping ratio, 1 is critical; NaN where the vibration does not decay.
     """
     count = len(values)
     power = np.square(np.abs(np.fft.rfft(values - values.mean(axis=0), 2 * count, axis=0))).sum(axis=1)

@@ -1,5 +1,4 @@
-"""Services of the node: start again from rest, set the zero of a sensor, acknowledge alarms; and the log lines of their
-effect."""
+"""Services of the node: start again from rest, set the zero of a sensor, acknowledge alarms; log lines of their effect."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Findings of the scene checks: faults and warnings, the partly validated scene they look at, and the words of a refused
-value."""
+"""Findings of the scene checks: faults, warnings, the partly validated scene they look at, the words of a refused value."""
 
 from __future__ import annotations
 

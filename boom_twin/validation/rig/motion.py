@@ -125,6 +125,11 @@ def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> 
         Where it starts.
     duration : float
         Seconds; no move ends later than a hold before it.
+
+    Returns
+    -------
+    Programme
+        Strokes of all cylinders over time, from rest.
     """
     rng = np.random.default_rng(seed)
     first = strokes_of_posture(scene, posture)

@@ -95,6 +95,11 @@ def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors:
     ----------
     rows : dict of ndarray
         What `simulate` gave for this programme.
+
+    Returns
+    -------
+    RigSession
+        Samples of all sensors, and the truth beside them.
     """
     clock, stroke_noise, angle_noise, imu_noise = np.random.default_rng(seed).spawn(4)
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)

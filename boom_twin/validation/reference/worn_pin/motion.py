@@ -7,7 +7,7 @@ passes suffice.
 phi, the part's heading; l and psi, length and heading of the cylinder from its barrel pin B to its rod's pin r. The rod's
 pin lies at offset = r - P(phi) from the bush, and is pushed by F (contact). With u = e^(i psi), <a, b> = Re(conj(a) b):
 
-J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
+    J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
     m_r l''   - m_r (l - a_r) psi'^2        =  <F, u>  + m_r <g, u> - k (l - l_ref) - d (l' - l_ref')
     I psi''   + 2 m_r (l - a_r) l' psi'     =  <F, i l u> + (m_b a_b + m_r (l - a_r)) <g, i u> .
 

@@ -3,7 +3,7 @@
 Kinematics are written here from the tables of a plan alone, increment by increment, in extended precision; nothing is
 condensed. With all forces zero there is no geometric stiffness, so that
 
-[ J' M A J + (1 + beta C) K_el   G' ] [ dz ]   [ J' w ]
+    [ J' M A J + (1 + beta C) K_el   G' ] [ dz ]   [ J' w ]
     [ G                              -c ] [ df ] = [ 0    ]
 
 holds exactly: J moves all mass points, G all closures and cylinder lengths, c are compliances, w weights.
