@@ -27,6 +27,18 @@ def on_stop_signal(act: Callable[[], None]) -> None:
         signal.signal(each, stop)
 
 
+class InterruptedWorkError(KeyboardInterrupt):
+    """A piece of work took too long to end by itself.
+
+    A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets Python
+    end the process as killed by SIGINT even where it was caught.
+    """
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise InterruptedWorkError
+
+
 class StopSignal:
     """A stop by SIGINT or SIGTERM: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
 
@@ -55,7 +67,7 @@ class StopSignal:
 
     def _ask(self) -> None:
         self.asked = True
-        signal.signal(signal.SIGALRM, signal.default_int_handler)
+        signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
 
     def _end(self, reading: int) -> None:

@@ -145,7 +145,7 @@ FULL = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_io_storage import BagError, BagWriter, Split, Storage, message, recorded, TOPIC
+from test_storage import BagError, BagWriter, Split, Storage, message, recorded, TOPIC
 import resource, time
 storage = Storage(BagWriter(Path({bag!r})), Split(), print)
 key = storage.add(recorded(TOPIC))
@@ -239,7 +239,7 @@ KILLED = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_io_storage import BagWriter, Split, Storage, message, recorded, TOPIC
+from test_storage import BagWriter, Split, Storage, message, recorded, TOPIC
 storage = Storage(BagWriter(Path({bag!r})), Split({size}, None), print)
 key = storage.add(recorded(TOPIC))
 began = time.monotonic()

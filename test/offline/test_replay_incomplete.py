@@ -153,7 +153,7 @@ def test_compare_replays_over_none_of_what_it_compares(
     assert before == {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("which", ["ahead", "behind"])
+@pytest.mark.parametrize("which", ["reader_process", "writer_process"])
 def test_a_process_of_a_replay_that_dies_is_an_error(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
 ) -> None:

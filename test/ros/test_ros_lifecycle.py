@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -122,6 +124,26 @@ def test_signals_end_the_node_in_order_at_any_time(
     assert node.stop(number) == 0, node.said()
     assert time.monotonic() - began < 4.0  # 2 on a machine that is free
     assert "Traceback" not in node.said() and "FATAL" not in node.said()
+
+
+IN_EXEC = """
+import sys
+from boom_twin.ros.startup import StopSignal
+stop = StopSignal()
+print("begun", flush=True)
+try:
+    exec("while True: pass")
+except KeyboardInterrupt:
+    sys.exit(0)
+"""
+
+
+def test_a_piece_of_work_in_exec_is_interrupted_in_order() -> None:
+    """Dataclasses are made in one while modules are imported; Python would end the process as killed by SIGINT."""
+    child = subprocess.Popen([sys.executable, "-c", IN_EXEC], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None and child.stdout.readline() == "begun\n"
+    child.send_signal(signal.SIGTERM)
+    assert child.wait(60.0) == 0
 
 
 STUCK = """
