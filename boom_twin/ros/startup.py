@@ -30,8 +30,8 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 class InterruptedWorkError(KeyboardInterrupt):
     """A piece of work took too long to end by itself.
 
-    A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets Python
-    end the process as killed by SIGINT even where it was caught.
+    A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets
+    Python end the process as killed by SIGINT even where it was caught.
     """
 
 
