@@ -6,7 +6,7 @@ Reads attributes only, so that messages of rclpy and of rosbags give the same nu
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import inf, isnan, nan
 from typing import Any
 
@@ -106,6 +106,10 @@ class SampleDecoder:
         self._beside = pair if topics.is_shared else {}
         self.oddities: Counter[str] = Counter()
         self.strangers: dict[Stream, list[str]] = {}
+
+    def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> Iterator[Sample]:
+        """Those that `msg` holds of `streams`, the roles of the topic that it came by; see `put`."""
+        return (sample for stream in streams if (sample := self.put(stream, stamp_ns, msg)) is not None)
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
         """The sample that `msg` holds.
