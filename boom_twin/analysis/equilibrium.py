@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
-from ..kernels.transfer.time_step import advance, observe
+from ..kernels.transfer.time_step import advance
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
@@ -185,16 +185,14 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes, angles)
-    row = np.empty(2 * plan.joints + 9)
-    observe(plan.tables, state, row)
-    n = plan.joints
+    found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = rigid_tip(scene, angles), state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
         tip_rigid=undeformed,
         tip=tip,
-        joints=row[:n],
-        cylinder_forces=row[n : 2 * n],
+        joints=found.joints,
+        cylinder_forces=found.cylinder_forces,
         modes=natural_modes(plan, state, work, modes),
         outline=outline(plan, state, work.position),
         doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),

@@ -27,13 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import spherical_jn
 
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
 from ..kernels.tables import OK, SENTENCES, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ..kernels.transfer.time_step import observe
 from ..types import Array
 
 HIGHEST = 1e7  # rad/s; no mode is looked for above
@@ -186,13 +185,7 @@ def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
 
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
     """Change of the joint angles, shape (n,), rad per unit of the modal coordinate."""
-    row = np.empty(2 * plan.joints + 9)
-
-    def angles() -> Array:
-        observe(plan.tables, state, row)
-        return row[: plan.joints].copy()
-
-    return along(plan, state, work, mode.increments, angles)
+    return along(plan, state, work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:

@@ -13,6 +13,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..kernels.elements.linkage import cylinder_length
+from ..kernels.result_row import estimates_in, prediction_width, results_in
 from ..kernels.tables import State
 from ..kernels.transfer.forward_kinematics import place
 from ..scene.kinematics import joint_angles_of_strokes
@@ -83,9 +84,9 @@ class BoomPredictor:
         )
         self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
         self._newest, self._paused = 0.0, -math.inf
-        n = self.plan.joints
-        self._row = np.zeros(4 * n + 11 + 4 * len(self.plan.pins))
-        self.variances: Array = self._row[3 * n + 9 : 4 * n + 9]
+        self._size = self.plan.joints, len(self.plan.pins)
+        self._row = np.zeros(prediction_width(*self._size))
+        self.variances: Array = estimates_in(self._row, *self._size).variances
 
     @property
     def angles(self) -> Array:
@@ -147,23 +148,24 @@ class BoomPredictor:
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
-        n, row = self.plan.joints, self._row.copy()
-        tip = row[2 * n : 2 * n + 9]
+        row = self._row.copy()
+        found, estimated = results_in(row, *self._size), estimates_in(row, *self._size)
+        position, velocity, acceleration = found.tip
         return Prediction(
             stamp=stamp,
-            tip_position=tip[0:2],
-            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
-            tip_velocity=tip[3:5],
-            tip_acceleration=tip[6:8],
-            tip_angle=float(tip[2]),
-            tip_angular_velocity=float(tip[5]),
-            tip_angular_acceleration=float(tip[8]),
-            joints=row[:n],
-            strokes=row[2 * n + 9 : 3 * n + 9],
-            cylinder_forces=row[n : 2 * n],
+            tip_position=position[:2],
+            tip_displacement=position[:2] - estimated.rigid_tip,
+            tip_velocity=velocity[:2],
+            tip_acceleration=acceleration[:2],
+            tip_angle=float(position[2]),
+            tip_angular_velocity=float(velocity[2]),
+            tip_angular_acceleration=float(acceleration[2]),
+            joints=found.joints,
+            strokes=estimated.strokes,
+            cylinder_forces=found.cylinder_forces,
             shape=outline(self.plan, self.live, self._work.position) if shaped else None,
             undeflected=self._undeflected.at(self.angles) if shaped else None,
             pins=self.live.pins.copy() if shaped else None,
-            clearances=row[4 * n + 11 :].reshape(-1, 4),
+            clearances=found.pins,
             moments=self._bending @ self.live.z,
         )

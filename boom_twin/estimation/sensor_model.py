@@ -7,10 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import UsageError
 from ..kernels.tables import JOINT_A, JOINT_B, State
-from ..kernels.transfer.time_step import observe
 from ..types import Array, Mount
 
 TURN = 2.0 * np.pi
@@ -87,20 +86,16 @@ class Reading:
 
     def __init__(self, plan: Plan, mounting: Mounting) -> None:
         self._plan, self._mounting = plan, mounting
-        self._row = np.empty(2 * plan.joints + 9)
 
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
-        n, row = self._plan.joints, self._row
-        observe(self._plan.tables, state, row)
+        joints = taken_apart(self._plan, first_row(self._plan, state)).joints
         x, y, angle = state.frames[-1, 0], state.frames[-1, 1], state.frames[-1, 2]
         c, s = math.cos(angle), math.sin(angle)
         gx, gy = self._plan.tables.gravity
-        angles = self._mounting.expected(row[:n], state)
+        angles = self._mounting.expected(joints, state)
         return np.concatenate([angles, [-c * gx - s * gy, s * gx - c * gy, x, y]])
 
     def forces(self, state: State) -> Array:
         """Of the cylinders, N, positive in tension, shape (n,)."""
-        n = self._plan.joints
-        observe(self._plan.tables, state, self._row)
-        return self._row[n : 2 * n].copy()
+        return taken_apart(self._plan, first_row(self._plan, state)).cylinder_forces
