@@ -14,7 +14,7 @@ from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
-from ..kernels.tables import OK, State, Work
+from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import advance
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
@@ -78,9 +78,9 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
         z = plan.tables.joints[i].z
         if plan.tables.linkages[i].length_l > 0.0:
             left, right = link_angles(plan.tables.linkages[i], angle)
-            state.z[z + 1], state.z[z + 2] = heading + left, heading + right
+            state.z[z + Z_LINK_L], state.z[z + Z_LINK_R] = heading + left, heading + right
         heading += angle
-        state.z[z] = heading
+        state.z[z + Z_SECTION] = heading
     state.history[X, : len(state.z)] = state.z
 
 

@@ -133,7 +133,7 @@ class Plan:
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
             gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),
             block=np.zeros((shapes, shapes)), blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
-            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, 9)),
+            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
             drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),

@@ -84,9 +84,10 @@ class BoomPredictor:
         )
         self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
         self._newest, self._paused = 0.0, -math.inf
-        self._size = self.plan.joints, len(self.plan.pins)
-        self._row = np.zeros(prediction_width(*self._size))
-        self.variances: Array = estimates_in(self._row, *self._size).variances
+        size = self.plan.joints, len(self.plan.pins)
+        self._row = np.zeros(prediction_width(*size))
+        self._results, self._estimates = results_in(self._row, *size), estimates_in(self._row, *size)
+        self.variances: Array = self._estimates.variances
 
     @property
     def angles(self) -> Array:
@@ -148,24 +149,24 @@ class BoomPredictor:
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
-        row = self._row.copy()
-        found, estimated = results_in(row, *self._size), estimates_in(row, *self._size)
-        position, velocity, acceleration = found.tip
+        found, estimated, tip = self._results, self._estimates, self._results.tip.copy()
+        angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
+        position = tip[0, :2]
         return Prediction(
             stamp=stamp,
-            tip_position=position[:2],
-            tip_displacement=position[:2] - estimated.rigid_tip,
-            tip_velocity=velocity[:2],
-            tip_acceleration=acceleration[:2],
-            tip_angle=float(position[2]),
-            tip_angular_velocity=float(velocity[2]),
-            tip_angular_acceleration=float(acceleration[2]),
-            joints=found.joints,
-            strokes=estimated.strokes,
-            cylinder_forces=found.cylinder_forces,
+            tip_position=position,
+            tip_displacement=position - estimated.rigid_tip,
+            tip_velocity=tip[1, :2],
+            tip_acceleration=tip[2, :2],
+            tip_angle=angle,
+            tip_angular_velocity=angular_velocity,
+            tip_angular_acceleration=angular_acceleration,
+            joints=found.joints.copy(),
+            strokes=estimated.strokes.copy(),
+            cylinder_forces=found.cylinder_forces.copy(),
             shape=outline(self.plan, self.live, self._work.position) if shaped else None,
             undeflected=self._undeflected.at(self.angles) if shaped else None,
             pins=self.live.pins.copy() if shaped else None,
-            clearances=found.pins,
+            clearances=found.pins.copy(),
             moments=self._bending @ self.live.z,
         )

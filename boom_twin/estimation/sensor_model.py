@@ -9,7 +9,7 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import UsageError
-from ..kernels.tables import JOINT_A, JOINT_B, State
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
 from ..types import Array, Mount
 
 TURN = 2.0 * np.pi
@@ -53,7 +53,7 @@ class Mounting:
         """What the sensors should read, rad, shape (n,), while the joint angles are `joints` and the boom is as `live`."""
         if not self._has_any:
             return joints
-        return np.where(self._absolute, live.frames[self._frames, 2] + self._inclination, joints)
+        return np.where(self._absolute, live.frames[self._frames, FRAME_ANGLE] + self._inclination, joints)
 
     def deviations(self, joint_sigmas: Array, variance: float) -> Array:
         """Deviations expected of the readings, rad, shape (n,), from those of the joints' angles.
@@ -90,7 +90,7 @@ class Reading:
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
         joints = taken_apart(self._plan, first_row(self._plan, state)).joints
-        x, y, angle = state.frames[-1, 0], state.frames[-1, 1], state.frames[-1, 2]
+        x, y, angle = (state.frames[-1, place] for place in (FRAME_X, FRAME_Y, FRAME_ANGLE))
         c, s = math.cos(angle), math.sin(angle)
         gx, gy = self._plan.tables.gravity
         angles = self._mounting.expected(joints, state)

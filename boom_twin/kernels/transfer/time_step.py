@@ -10,7 +10,7 @@ from ..elements.pin_contact import CLOSED, bearing
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
-from ..tables import JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Motion, State, Tables, Work
+from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables, Work
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .matrix_product import plain_pass
@@ -174,7 +174,7 @@ def observe(t, state, out):
     for k in range(t.operations.shape[0]):
         row = t.operations[k].row
         if t.operations[k].kind == JOINT_A or t.operations[k].kind == JOINT_B:
-            found.joints[at] = state.z[t.joints[row].z] - state.frames[k, 2]
+            found.joints[at] = state.z[t.joints[row].z + Z_SECTION] - state.frames[k, FRAME_ANGLE]
             at += 1
     for i in range(n):
         found.cylinder_forces[i] = state.z[t.cylinders[i].z]
