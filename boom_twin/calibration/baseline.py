@@ -53,11 +53,8 @@ def _problems(
     scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]
 ) -> list[BlockProblem]:
     """The linear problems that a twin makes of one session."""
-    twin = Twin(scene, settings, mounts, Baseline())
-    assert twin.judge is not None
     found: list[BlockProblem] = []
-    twin.judge.residuals.listener = found.append
-    for _ in drive(twin, session):
+    for _ in drive(Twin(scene, settings, mounts, Baseline(), found.append), session):
         pass
     return found
 

@@ -128,7 +128,8 @@ class Plan:
         beams, operations, n, pins = len(t.beams), len(t.operations), self.joints, len(self.pins)
         inner = 6 + 2 * max((int(joint.clearances) for joint in t.joints), default=0)
         return Work(
-            position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
+            position=np.zeros(histories), velocity=np.zeros(histories), acceleration=np.zeros(histories),
+            hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
             finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
             gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),

@@ -150,12 +150,11 @@ def start_step(scheme, history, hat, offset):
 
 
 @inner
-def finish_step(scheme, position, hat, offset, history):
-    """Write the new history of all scalars from their `position`, shape (n,), at the instant solved for.
+def finish_step(scheme, position, hat, offset, v, a, history):
+    """Write velocities, accelerations and the new history of all scalars from their `position` at the instant solved for.
 
-    `hat` and `offset` hold the new accelerations and velocities afterwards.
+    `hat` and `offset` as `start_step` filled them; `v` and `a` are written; all of shape (n,).
     """
-    a, v = hat, offset
     for i in range(position.shape[0]):
         a[i] = scheme.gain * (position[i] - hat[i])
         v[i] = scheme.rate * position[i] + offset[i]

@@ -120,8 +120,10 @@ class State(NamedTuple):
 class Work(NamedTuple):
     """Scratch of one step; no meaning between steps."""
 
-    position: Array  # (histories,)
-    hat: Array
+    position: Array  # (histories,), as are those that follow
+    velocity: Array  # at the instant that a step solved for
+    acceleration: Array
+    hat: Array  # x_hat and D of the step
     offset: Array
     weights: Array  # of the scheme, see `kernels.integrators`
     finer: Array  # of a sub-step's
@@ -136,7 +138,7 @@ class Work(NamedTuple):
     gains: Array  # (operations, rows, SLOTS): decrements of the condensed unknowns by increments of the cut ..
     free: Array  # (operations, rows): .. and those that do not depend on it
     block: Array  # (rows, rows): H_qq of a beam part
-    blocks: Array  # (joints, inner, inner) what a joint condenses, kept for counting natural frequencies
+    blocks: Array  # (joints, inner, inner) what a joint condenses, as the last sweep in left it
     ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
     end_gains: Array  # (clearances, 2, 5), and its gains
     end_free: Array  # (clearances, 2)

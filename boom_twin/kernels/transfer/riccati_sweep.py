@@ -74,6 +74,9 @@ def clear_cut(work, m):
 def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
     """Carry the cut in `work`, m slots wide, from the end of operation `last - 1` inwards through operation `first`.
 
+    Besides the cut it writes what others read after it: gains and free parts for `sweep_out`; what joints and ends of cylinders
+    condensed (`Work.blocks`, `Work.ends`) for `clearance_pins.coarseness` and for counting natural frequencies.
+
     Returns
     -------
     status, negative, m : int

@@ -86,7 +86,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         if status != OK:
             return status, total, size
         note_contacts(t, state, work)
-        finish_step(now, work.position, work.hat, work.offset, history)
+        finish_step(now, work.position, work.hat, work.offset, work.velocity, work.acceleration, history)
         done += part
         if error < EASY and part < TICKS and done % (2 * part) == 0:
             part *= 2
@@ -265,7 +265,8 @@ def state_of(b, i):
 def work_of(b, i):
     """Work of boom `i` of a stack."""
     return Work(
-        b.position[i], b.hat[i], b.offset[i], b.weights[i], b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
+        b.position[i], b.velocity[i], b.acceleration[i], b.hat[i], b.offset[i], b.weights[i],
+        b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
         b.matrix[i], b.right[i], b.gains[i], b.free[i], b.block[i], b.blocks[i], b.ends[i], b.end_gains[i],
         b.end_free[i], b.hold[i], b.apart[i], b.rho[i], b.drho[i], b.angles[i], b.turn[i], b.local[i], b.drive[i],
         b.drive_rate[i], b.dz[i], b.cut[i],
