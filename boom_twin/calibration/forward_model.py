@@ -11,6 +11,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import taken_apart
 from ..config.settings import Settings
 from ..errors import BagError, SolverError
+from ..estimation.sensor_model import specific_force
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
 from ..scene.schema import Scene
@@ -78,13 +79,9 @@ class ForwardModel:
 
     def _readings(self, rows: Array) -> tuple[Array, Array]:
         found = taken_apart(self._batch.plans[0], rows)
-        return found.joints, _specific_force(found.tip[..., 2, :2] - self._gravity, found.tip[..., 0, 2])
-
-
-def _specific_force(felt: Array, angle: Array) -> Array:
-    """Acceleration less gravity (.., 2) in axes turned by `angle` (..,)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * felt[..., 0] + s * felt[..., 1], c * felt[..., 1] - s * felt[..., 0]], axis=-1)
+        felt, angle = found.tip[..., 2, :2] - self._gravity, found.tip[..., 0, 2]
+        force = specific_force(felt[..., 0], felt[..., 1], np.cos(angle), np.sin(angle))
+        return found.joints, np.stack(force, axis=-1)
 
 
 DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths

@@ -25,9 +25,8 @@ from ..errors import BagError
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..system.received_files import open_received
-from ..types import Array, Change, Sample, Stream, channels_of
+from ..types import NANO, Array, Change, Sample, Stream, channels_of
 
-NANO = 1e-9
 SHOWN = 12  # hex digits of a hash
 LOADS = ("payload", "line_fill")
 MISSING = 0.5  # largest share of values of a channel that may be missing

@@ -12,8 +12,8 @@ from ..errors import BagError
 from ..scene.schema import Scene
 from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import Array, Mount, Residuals, Stream
-from .sessions import NANO, MeasuredSession
+from ..types import NANO, Array, Mount, Residuals, Stream
+from .sessions import MeasuredSession
 
 
 @dataclass(frozen=True)

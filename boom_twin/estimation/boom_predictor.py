@@ -16,7 +16,7 @@ from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import estimates_in, prediction_width, results_in
 from ..kernels.tables import State
 from ..kernels.transfer.forward_kinematics import place
-from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
 from ..scene.schema import Scene
 from ..types import Array, Prediction
 from .look_ahead import Tuning, follow, new_track
@@ -33,9 +33,7 @@ class UndeflectedPredictor:
 
     def at(self, angles: Array) -> Array:
         """Points (k, 2), m, at relative joint `angles` (rad), shape (n,)."""
-        heading = np.cumsum(angles)
-        steps = self._lengths[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-        pivots = self._pivot + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        _, pivots = rigid_chain(self._pivot, self._lengths, angles)
         return np.stack([np.interp(self._along, self._reach, column) for column in pivots.T], axis=1)
 
     @cached_property

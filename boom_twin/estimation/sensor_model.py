@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,19 @@ from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, St
 from ..types import Array, Mount
 
 TURN = 2.0 * np.pi
+
+
+def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """What an accelerometer reads along two axes, m/s^2; of numbers or of arrays of one shape.
+
+    Parameters
+    ----------
+    x, y : float or ndarray
+        Acceleration less gravity, m/s^2, in the axes of the model.
+    c, s : float or ndarray
+        Cosine and sine of the angle by which its axes are turned against them.
+    """
+    return c * x + s * y, c * y - s * x
 
 
 class Mounting:
@@ -94,7 +108,7 @@ class Reading:
         c, s = math.cos(angle), math.sin(angle)
         gx, gy = self._plan.tables.gravity
         angles = self._mounting.expected(joints, state)
-        return np.concatenate([angles, [-c * gx - s * gy, s * gx - c * gy, x, y]])
+        return np.concatenate([angles, [*specific_force(-gx, -gy, c, s), x, y]])
 
     def forces(self, state: State) -> Array:
         """Of the cylinders, N, positive in tension, shape (n,)."""

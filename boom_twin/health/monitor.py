@@ -9,9 +9,9 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
+from ..types import NANO, Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
 from .baseline import Baseline
-from .inference.block_problem import BLOCK, NANO, Block, BlockBuilder, BlockMeans, BlockProblem, means, stacked
+from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, means, stacked
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import SensorCheck, SensorMonitor
 

@@ -11,11 +11,11 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Mount
+from ..types import NANO, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
 from .detection import Detector
-from .inference.block_problem import BLOCK, CALM, NANO, BlockMeans, BlockProblem, LinearModel
+from .inference.block_problem import BLOCK, CALM, BlockMeans, BlockProblem, LinearModel
 from .inference.fault_catalogue import Form, Parameter, parameters
 from .inference.hypotheses import Evidence, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter

@@ -37,7 +37,7 @@ from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..twin.driver import drive
-from ..types import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..types import HELD, NANO, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .ground_truth import TipTruth, load_truth
 from .reader_process import SampleReader
 from .writer_process import ReportWriter
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
-NANO = 1e-9
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..errors import UsageError
-from ..types import Array, Change, Stream
+from ..types import SECOND, Array, Change, Stream
 
 KEPT = 16  # sets of zeros that late samples may still need
 
@@ -60,7 +60,7 @@ class SensorZeros:
         return None
 
 
-SPAN = 1_000_000_000  # ns
+SPAN = SECOND  # ns
 FEWEST = 5  # readings that make a mean
 
 

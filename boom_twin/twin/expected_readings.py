@@ -12,9 +12,10 @@ from ..analysis.modal import StrokeNoise, stroke_noise
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.look_ahead import copy_state
+from ..estimation.sensor_model import specific_force
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import State
-from ..types import Array, Prediction
+from ..types import NANO, Array, Prediction
 
 SPAN = 2_000_000_000  # ns
 
@@ -63,7 +64,6 @@ def _between(old: Expected, new: Expected, stamp: int) -> Expected:
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 INTERVAL_STEP = 0.2  # of the time between samples, likewise
-NANO = 1e-9
 INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
 
 
@@ -172,8 +172,8 @@ class Deviations:
         return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
 
 
-def specific_force(prediction: Prediction, gravity: Array) -> Array:
+def tip_specific_force(prediction: Prediction, gravity: Array) -> Array:
     """What an IMU at the tip feels along its x and z, shape (2,), m/s^2."""
     c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
-    ax, ay = (prediction.tip_acceleration - gravity).tolist()
-    return np.array([c * ax + s * ay, c * ay - s * ax])
+    x, y = (prediction.tip_acceleration - gravity).tolist()
+    return np.array(specific_force(x, y, c, s))

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
-from ..types import Array
+from ..types import NANO, Array
 
 MOST = 5  # readings in a row that are not believed; the next one is
 FAR = 8.0  # deviations of the noise
 SILENT = 100_000_000  # ns after which a missing stroke is taken to stay where it was
-NANO = 1e-9
 Flags = NDArray[np.bool_]
 
 

@@ -22,9 +22,9 @@ from ..kernels.tables import OK, SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .expected_readings import Deviations, Expected, PredictionBuffer, specific_force
+from .expected_readings import Deviations, Expected, PredictionBuffer, tip_specific_force
 from .sample_check import SHORTEST, SampleCheck
 from .stamp_check import LASTING, StampCheck, TimeStep, explain, goes_on, is_close, jerk_densities, surprise
 from .stroke_check import FAR, StrokeCheck
@@ -56,7 +56,6 @@ EVENTS = {
 TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""
 
-NANO = 1e-9
 SMOOTHING = 0.05  # weight of the newest interval in the running mean
 PENDING = 4096  # most samples that wait for a stroke
 SHAPE_PERIOD = 100_000_000  # ns of one slot; one shape is given in each, 10 a second
@@ -437,7 +436,7 @@ class Twin:
         joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, boom.variances, boom.live, boom.angles)
         angles = self._mounting.expected(prediction.joints, boom.live)
         angle_sigmas = self._mounting.deviations(joint_sigmas, self.settings.angle_variance)
-        force = specific_force(prediction, self.plan.tables.gravity)
+        force = tip_specific_force(prediction, self.plan.tables.gravity)
         run.memory.add(Expected(prediction.stamp, angles, force, angle_sigmas, force_sigmas, run.strokes))
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------

@@ -28,7 +28,7 @@ import numpy as np
 
 from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
-from ...estimation.sensor_model import Reading
+from ...estimation.sensor_model import Reading, specific_force
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
 
@@ -108,7 +108,7 @@ def _shown(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -
     shown = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
     ax, ay = -omega * omega * mode.motion[plan.tables.tip : plan.tables.tip + 2]
     c, s = math.cos(angle), math.sin(angle)
-    shown[n:] += np.array([c * ax + s * ay, c * ay - s * ax])
+    shown[n:] += np.array(specific_force(ax, ay, c, s))
     return shown
 
 

@@ -27,11 +27,10 @@ from ...offline.replay import scene_for
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
 from ...twin.twin import Twin
-from ...types import Stream
+from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
-NANO = 1e-9
 LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION

@@ -22,7 +22,7 @@ from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...twin.twin import EVENTS, TOLD_AT_ONCE, Twin
-from ...types import Report, Sample, Stream
+from ...types import NANO, Report, Sample, Stream
 from ..runtime import qos_profile
 from .receive_queue import ReceiveQueue
 
@@ -141,7 +141,6 @@ def node_name(endpoint: Any) -> str:
 
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
-NANO = 1e-9
 
 
 class Diagnostics:
