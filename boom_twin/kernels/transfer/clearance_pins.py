@@ -137,7 +137,17 @@ def end_of(row):
 
 @inner
 def condense_ends(t, state, work, cylinder, g, h):
-    """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h)."""
+    """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h).
+
+    (g, h) is written for the ends y = (C, R, N), and an end is its pin plus delta. So what `g` and `h` say of that end e holds
+    for delta too, to which the pin adds its force f and tangent K:
+
+        (H_ee + K) ddelta + H_ey dy + g_e + f = 0,    y now with the pin in place of the end.
+
+    Hence ddelta = -free - gains dy, free = (H_ee + K)^-1 (g_e + f), gains = (H_ee + K)^-1 H_ey, and what is left for y is
+    g - H_ye free and H - H_ye gains, as in `six_bar`. A second end is condensed from what the first one left, where the first
+    is a pin and the second still an end; `move_ends` therefore goes back from the last to the first.
+    """
     torque = 0.0
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         torque += work.hold[k, TORQUE]
@@ -162,7 +172,12 @@ def condense_ends(t, state, work, cylinder, g, h):
 
 @inner
 def _turn_back(g, h, force):
-    """Friction's torque on a cylinder, as a couple of forces (N) on its ends; the derivative of its law by R has its axis."""
+    """Friction's torque on a cylinder, as a couple of forces (N) on its ends, `force` = torque over length.
+
+    The torque M works on the cylinder's angle gamma. With e the axis, n = (-e_y, e_x) and d = R - C of length l,
+    dgamma = n.(dR - dC)/l, so the gradient by R is M/l n, and by C its opposite. The axis is read from the row of the
+    cylinder's law: its derivative by R is e over a positive number, which the norm takes out. Its tangent is left out.
+    """
     share = force / math.hypot(h[AXIAL, END_R], h[AXIAL, END_R + 1])
     ex, ey = share * h[AXIAL, END_R], share * h[AXIAL, END_R + 1]
     g[END_C] += ey

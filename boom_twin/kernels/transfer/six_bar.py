@@ -200,7 +200,20 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
 
 @inner
 def _condense_loop(work, index, operation, count, size):
-    """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten."""
+    """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten.
+
+    A Newton pass wants H d + g = 0. With the inner unknowns q and all others x,
+
+        H_qq dq + H_qx dx + g_q = 0,    H_xq dq + H_xx dx + g_x = 0.
+
+    The first gives dq = -free - gains dx, free = H_qq^-1 g_q, gains = H_qq^-1 H_qx; put into the second,
+
+        (H_xx - H_xq gains) dx + (g_x - H_xq free) = 0,
+
+    the new cut (S, p): S is the Schur complement of H_qq. H has as many negative eigenvalues as H_qq and S together
+    (Haynsworth 1968), so the blocks H_qq are kept for counting natural frequencies. Only the lower triangle of `h` is filled:
+    the five others before SECTION meet q in its rows, those behind it in its columns.
+    """
     s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
     block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - count
     for i in range(count):
