@@ -13,7 +13,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..kernels.elements.linkage import cylinder_length
-from ..kernels.result_row import estimates_in, prediction_width, results_in
+from ..kernels.result_row import PIN, places_in, prediction_width
 from ..kernels.tables import State
 from ..kernels.transfer.forward_kinematics import place
 from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
@@ -67,8 +67,6 @@ class BoomPredictor:
     plan : Plan
     live : State
         The boom as predicted by the newest sample.
-    variances : ndarray, shape (n,)
-        Of the newest strokes' estimates, m^2.
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
@@ -84,8 +82,12 @@ class BoomPredictor:
         self._newest, self._paused = 0.0, -math.inf
         size = self.plan.joints, len(self.plan.pins)
         self._row = np.zeros(prediction_width(*size))
-        self._results, self._estimates = results_in(self._row, *size), estimates_in(self._row, *size)
-        self.variances: Array = self._estimates.variances
+        self._at = places_in(*size)
+
+    @property
+    def variances(self) -> Array:
+        """Of the newest strokes' estimates, m^2, shape (n,)."""
+        return self._row[self._at.variances]
 
     @property
     def angles(self) -> Array:
@@ -147,24 +149,25 @@ class BoomPredictor:
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
-        found, estimated, tip = self._results, self._estimates, self._results.tip.copy()
+        row, at = self._row.copy(), self._at
+        tip = row[at.tip].reshape(3, 3)
         angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
         position = tip[0, :2]
         return Prediction(
             stamp=stamp,
             tip_position=position,
-            tip_displacement=position - estimated.rigid_tip,
+            tip_displacement=position - row[at.rigid_tip],
             tip_velocity=tip[1, :2],
             tip_acceleration=tip[2, :2],
             tip_angle=angle,
             tip_angular_velocity=angular_velocity,
             tip_angular_acceleration=angular_acceleration,
-            joints=found.joints.copy(),
-            strokes=estimated.strokes.copy(),
-            cylinder_forces=found.cylinder_forces.copy(),
+            joints=row[at.joints],
+            strokes=row[at.strokes],
+            cylinder_forces=row[at.cylinder_forces],
             shape=outline(self.plan, self.live, self._work.position) if shaped else None,
             undeflected=self._undeflected.at(self.angles) if shaped else None,
             pins=self.live.pins.copy() if shaped else None,
-            clearances=found.pins.copy(),
+            clearances=row[at.pins].reshape(-1, PIN),
             moments=self._bending @ self.live.z,
         )

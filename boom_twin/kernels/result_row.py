@@ -5,6 +5,7 @@ A row is flat, so that many of them are one array; nobody but this module knows 
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +78,24 @@ def estimates_in(row, joints, pins):
 def prediction_width(joints: int, pins: int) -> int:
     """Numbers of one instant with the estimates behind it."""
     return int(row_width(joints, pins)) + 2 * joints + 2
+
+
+class Places(NamedTuple):
+    """Where all of this stands in a row with estimates."""
+
+    joints: slice
+    cylinder_forces: slice
+    tip: slice
+    pins: slice
+    strokes: slice
+    variances: slice
+    rigid_tip: slice
+
+
+def places_in(joints: int, pins: int) -> Places:
+    """The `Places` of a boom."""
+    sizes = (joints, joints, TIP, PIN * pins, joints, joints, 2)
+    return Places(*(slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)))
 
 
 def results_of(rows: Array, joints: int, pins: int) -> Results:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.kernels.result_row import estimates_in, prediction_width, results_in, results_of, row_width
+from boom_twin.kernels.result_row import estimates_in, places_in, prediction_width, results_in, results_of, row_width
 
 
 @pytest.mark.parametrize(("joints", "pins"), [(1, 0), (4, 0), (4, 3), (12, 1)])
@@ -14,6 +14,8 @@ def test_every_place_has_one_name(joints: int, pins: int) -> None:
     found, estimated = results_in(row, joints, pins), estimates_in(row, joints, pins)
     named = np.concatenate([part.ravel() for part in (*found, *estimated)])
     assert sorted(named) == list(row)
+    for name, place in places_in(joints, pins)._asdict().items():
+        assert np.array_equal(row[place], getattr(found if hasattr(found, name) else estimated, name).ravel()), name
     assert found.tip.shape == (3, 3) and found.pins.shape == (pins, 4) and estimated.rigid_tip.shape == (2,)
     assert all(np.shares_memory(part, row) for part in (*found, *estimated) if part.size)
 
