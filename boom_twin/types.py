@@ -16,6 +16,12 @@ else:
     Array = Any
 
 
+NANO = 1e-9
+"""Seconds in a nanosecond: stamps are whole nanoseconds, spans of time are seconds."""
+
+SECOND = 1_000_000_000
+"""Nanoseconds in a second."""
+
 HELD = frozenset({"leap", "late", "second source"})
 """Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.plan import Plan, first_row, row_width
+from ..compiler.plan import Plan, first_row, width_of
 from ..errors import UsageError
 from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.tables import OK, SENTENCES
@@ -50,7 +50,7 @@ class Batch:
     def settle(self, strokes: Array, angles: Array) -> Array:
         """Bring every boom to rest at `strokes` (m) next to joint `angles` (rad), both (n,) or (booms, n).
 
-        Returns their first rows, shape (booms, row_width), see `compiler.plan`.
+        Returns their first rows, shape (booms, width_of(plan)), see `compiler.plan`.
 
         Raises
         ------
@@ -58,7 +58,7 @@ class Batch:
             A boom has no equilibrium there.
         """
         n = self.plans[0].joints
-        rows = np.empty((len(self.plans), row_width(self.plans[0])))
+        rows = np.empty((len(self.plans), width_of(self.plans[0])))
         every = (len(self.plans), n)
         for i, (at, near) in enumerate(zip(np.broadcast_to(strokes, every), np.broadcast_to(angles, every), strict=True)):
             plan, state = self.plans[i], _part(self._states, i)
@@ -80,7 +80,7 @@ class Batch:
 
         Returns
         -------
-        ndarray, shape (booms, steps/every, row_width)
+        ndarray, shape (booms, steps/every, width_of(plan))
             See `compiler.plan`. NaN from where a boom's step failed; see `failures`.
         """
         count, n = len(self.plans), self.plans[0].joints
@@ -92,7 +92,7 @@ class Batch:
         speeds = np.ascontiguousarray(np.broadcast_to(rates, (count, total, n)))
         rows = total // every
         steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
-        out, self._ends = np.full((count, rows, row_width(self.plans[0])), np.nan), np.zeros((count, 3), np.int64)
+        out, self._ends = np.full((count, rows, width_of(self.plans[0])), np.nan), np.zeros((count, 3), np.int64)
 
         def share(bounds: tuple[int, int]) -> None:
             run_each(

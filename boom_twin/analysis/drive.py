@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.plan import Plan, Rows, first_row, row_width, taken_apart
+from ..compiler.plan import Plan, first_row, taken_apart, width_of
 from ..kernels.elements.pin_contact import LOST
 from ..kernels.integrators import GENERALISED_ALPHA
+from ..kernels.result_row import Results
 from ..kernels.tables import State, Work
 from ..kernels.transfer.time_step import run
 from ..types import Array
@@ -80,7 +81,7 @@ class Run(NamedTuple):
 
     status: int
     row: int
-    rows: Rows
+    rows: Results
     passes: float
     jolt: float
     shake: float
@@ -116,7 +117,7 @@ class Course:
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
         """Follow the curve through some of the rows in steps of at most `dt` (s) that end on them, each divided by `finer`."""
         plan, state = self.plan, State(*(array.copy() for array in self.start))
-        out = np.empty((len(rows), row_width(plan)))
+        out = np.empty((len(rows), width_of(plan)))
         out[0] = first_row(plan, state)
         steps, counts, drives, rates = self._drive(self.times[rows], self.strokes[rows], dt, finer)
         status, row, passes, jolt, shake = run(

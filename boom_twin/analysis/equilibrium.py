@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
-from ..kernels.tables import OK, State, Work
+from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
-from ..kernels.transfer.time_step import advance, observe
+from ..kernels.transfer.time_step import advance
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
@@ -78,9 +78,9 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
         z = plan.tables.joints[i].z
         if plan.tables.linkages[i].length_l > 0.0:
             left, right = link_angles(plan.tables.linkages[i], angle)
-            state.z[z + 1], state.z[z + 2] = heading + left, heading + right
+            state.z[z + Z_LINK_L], state.z[z + Z_LINK_R] = heading + left, heading + right
         heading += angle
-        state.z[z] = heading
+        state.z[z + Z_SECTION] = heading
     state.history[X, : len(state.z)] = state.z
 
 
@@ -201,16 +201,14 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes, angles)
-    row = np.empty(2 * plan.joints + 9)
-    observe(plan.tables, state, row)
-    n = plan.joints
+    found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = rigid_tip(scene, angles), state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
         tip_rigid=undeformed,
         tip=tip,
-        joints=row[:n],
-        cylinder_forces=row[n : 2 * n],
+        joints=found.joints,
+        cylinder_forces=found.cylinder_forces,
         modes=natural_modes(plan, state, work, modes),
         outline=outline(plan, state, work.position),
         doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),

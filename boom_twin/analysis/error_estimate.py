@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiler.plan import Rows
 from ..config.settings import STROKE_RATE
+from ..kernels.result_row import Results
 from ..kernels.tables import OK
 from ..types import Array
 from .drive import Course, Run
@@ -131,7 +131,7 @@ def row_errors(course: Course, own: Run) -> tuple[EstimatedError, ...]:
     return tuple(max(pair, key=lambda deviation: deviation.share) for pair in zip(*found, strict=True))
 
 
-def _compared(times: Array, found: Rows, other: Run, factor: float) -> tuple[EstimatedError, ...]:
+def _compared(times: Array, found: Results, other: Run, factor: float) -> tuple[EstimatedError, ...]:
     """Errors of `found`; without bound where the other run failed."""
     if other.status == OK:
         return differences(times, found, other.rows, factor)
@@ -145,7 +145,7 @@ TIP = ("the tip", "its path", COARSE)
 TIP_ACCELERATION = ("the tip's acceleration", "its largest", ACCELERATION)
 
 
-def differences(times: Array, found: Rows, other: Rows, factor: float) -> tuple[EstimatedError, ...]:
+def differences(times: Array, found: Results, other: Results, factor: float) -> tuple[EstimatedError, ...]:
     """Errors of the tip's place, its acceleration and the worst cylinder's force: `factor` times what `other` differs by.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compile import BasisName, compile_scene
-from ..compiler.plan import Plan, first_row, row_width, taken_apart
+from ..compiler.plan import Plan, first_row, taken_apart, width_of
 from ..errors import UsageError
 from ..kernels import integrators
 from ..kernels.tables import OK, SENTENCES, State, Work
@@ -192,7 +192,7 @@ def _stepped(
 ) -> _Run:
     """Step a copy of `start` along its strokes (m) and their rates (m/s), shape (steps, n)."""
     rows, state = len(strokes) // every, State(*(array.copy() for array in start))
-    out = np.full((rows + 1, row_width(plan)), np.nan)
+    out = np.full((rows + 1, width_of(plan)), np.nan)
     out[0] = first_row(plan, state)
     product = new_product(plan.tables) if method.product == "plain" else None
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)

@@ -26,13 +26,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import spherical_jn
 
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
 from ..kernels.tables import OK, SENTENCES, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ..kernels.transfer.time_step import observe
 from ..types import Array
 
 HIGHEST = 1e7  # rad/s; no mode is looked for above
@@ -74,20 +73,20 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     position, still = work.position.copy(), np.zeros_like(work.position)
     drive = _drive(plan, state, work)
     for _ in range(TRIES):
-        status, negative = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
+        status, negative, blocks, ends = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
         if status == OK:
-            return int(negative) + _negative_eigenvalues(work.blocks) + _negative_eigenvalues(work.ends)
+            return negative + _negative_eigenvalues(blocks) + _negative_eigenvalues(ends)
         omega = omega * (1.0 + 1e-12) + 1e-12
     raise SolverError(f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed: {SENTENCES[status]}. {ABSURD}")
 
 
-def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int]:
-    """Sweep the whole boom in; status and negative pivots."""
+def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Array, Array]:
+    """Sweep the whole boom in; status, negative pivots of beams, and what joints and ends of cylinders condensed."""
     clear_cut(work, FREE)
     load_pins(plan.tables, state, work, motion)
     operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
     status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE)
-    return int(status), int(negative)
+    return int(status), int(negative), work.blocks, work.ends
 
 
 def _drive(plan: Plan, state: State, work: Work) -> Array:
@@ -185,13 +184,7 @@ def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
 
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
     """Change of the joint angles, shape (n,), rad per unit of the modal coordinate."""
-    row = np.empty(2 * plan.joints + 9)
-
-    def angles() -> Array:
-        observe(plan.tables, state, row)
-        return row[: plan.joints].copy()
-
-    return along(plan, state, work, mode.increments, angles)
+    return along(plan, state, work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:

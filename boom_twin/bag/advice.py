@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import BagError
 from ..messages.topic_table import Qos, Topics
-from ..types import SENSORS, Stream
-from .inspect import NANO, BagInfo, Tally
+from ..types import NANO, SENSORS, Stream
+from .inspect import BagInfo, Tally
 from .joint_names import other_names
 from .metadata import profiles
 from .reader import Session, TopicInfo, check_encoding, check_topic

@@ -13,7 +13,7 @@ from mcap.reader import NonSeekingReader
 from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
 from ..system.received_files import open_received
-from ..types import Stream
+from ..types import NANO, Stream
 from .integrity import blame, compare_counts
 from .mcap_records import LARGEST, chunk_at, heads
 from .mcap_summary import McapFile
@@ -21,8 +21,6 @@ from .reader import Session, scan
 
 VARIANTS = 100
 """Different lists of names that are told apart in one topic."""
-
-NANO = 1e-9
 
 
 @dataclass(slots=True)

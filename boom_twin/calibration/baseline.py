@@ -17,10 +17,11 @@ from ..health.learning import learn
 from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
+from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import Mount, Sample, Stream
+from ..types import Mount, Sample
 from .run import common_mapping
-from .sessions import MeasuredSession, read_sessions
+from .sessions import read_sessions
 
 
 def learn_baseline(
@@ -52,17 +53,13 @@ def _problems(
     scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]
 ) -> list[BlockProblem]:
     """The linear problems that a twin makes of one session."""
-    twin = Twin(scene, settings, mounts, Baseline())
-    assert twin.judge is not None
     found: list[BlockProblem] = []
-    twin.judge.residuals.listener = found.append
-    for sample in session:
-        twin.update(sample)
+    for _ in drive(Twin(scene, settings, mounts, Baseline(), found.append), session):
+        pass
     return found
 
 
 WIDTH = 120
-ORDER = tuple(Stream)
 
 
 def baseline_of(
@@ -103,17 +100,7 @@ def baseline_of(
     sessions = read_sessions(paths, topics, joints)
     mounts = topics.mounts(joints)
     names = [f"{session.name} {session.digest}" for session in sessions]
-    return learn_baseline(scene, settings or Settings(), map(_samples, sessions), names, mounts, progress)
-
-
-def _samples(session: MeasuredSession) -> list[Sample]:
-    """All samples in the order of stamps, those of strokes first."""
-    found = [
-        Sample(stream, int(stamp), values)
-        for stream, series in session.series.items()
-        for stamp, values in zip(series.stamps, series.values, strict=True)
-    ]
-    return sorted(found, key=lambda sample: (sample.stamp, ORDER.index(sample.stream)))
+    return learn_baseline(scene, settings or Settings(), (session.samples() for session in sessions), names, mounts, progress)
 
 
 def write_baseline(baseline: Baseline, path: Path, credit: str, force: bool) -> None:

@@ -11,6 +11,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import taken_apart
 from ..config.settings import Settings
 from ..errors import BagError, SolverError
+from ..estimation.sensor_model import specific_force
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
 from ..scene.schema import Scene
@@ -77,15 +78,10 @@ class ForwardModel:
         return self._batch.settle(strokes, joint_angles_of_strokes(self._scene, near))
 
     def _readings(self, rows: Array) -> tuple[Array, Array]:
-        found = taken_apart(self._batch.plans[0], rows.reshape(-1, rows.shape[-1]))
-        force = _specific_force(found.tip[:, 2, :2] - self._gravity, found.tip[:, 0, 2])
-        return found.joints.reshape(*rows.shape[:2], -1), force.reshape(*rows.shape[:2], 2)
-
-
-def _specific_force(felt: Array, angle: Array) -> Array:
-    """Acceleration less gravity (k, 2) in axes turned by `angle` (k,)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.column_stack([c * felt[:, 0] + s * felt[:, 1], c * felt[:, 1] - s * felt[:, 0]])
+        found = taken_apart(self._batch.plans[0], rows)
+        felt, angle = found.tip[..., 2, :2] - self._gravity, found.tip[..., 0, 2]
+        force = specific_force(felt[..., 0], felt[..., 1], np.cos(angle), np.sin(angle))
+        return found.joints, np.stack(force, axis=-1)
 
 
 DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths

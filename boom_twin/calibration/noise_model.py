@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..types import Array, Mount, Stream, channels_of
-from .sessions import NANO, MeasuredSession, Series, SessionCourse, filled
+from ..types import NANO, Array, Mount, Stream, channels_of
+from .sessions import MeasuredSession, Series, SessionCourse, filled
 
 SHORTEST = 0.05  # s
 END = 0.25  # s before the end of a course that are not used, for smoothing ends there

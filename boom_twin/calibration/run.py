@@ -13,11 +13,11 @@ from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import Stream
+from ..types import NANO, Stream
 from .forward_model import CalibrationProblem
 from .least_squares import Fit, Group, fitted, groups_of
 from .noise_model import block_length, blocks_of, channel_names, has_imu
-from .sessions import NANO, MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
+from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
 from .unknowns import Unknown, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
 

@@ -7,9 +7,10 @@ lag: that of the twin's smoother for strokes that are integrated white jerk, wit
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from heapq import merge
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,9 +25,8 @@ from ..errors import BagError
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..system.received_files import open_received
-from ..types import Array, Change, Sample, Stream
+from ..types import NANO, Array, Change, Sample, Stream, channels_of
 
-NANO = 1e-9
 SHOWN = 12  # hex digits of a hash
 LOADS = ("payload", "line_fill")
 MISSING = 0.5  # largest share of values of a channel that may be missing
@@ -64,6 +64,17 @@ class MeasuredSession:
     digest: str
     series: dict[Stream, Series]
     changed: bool = False
+
+    def samples(self, zeros: Mapping[str, float] | None = None) -> list[Sample]:
+        """All samples in the order of their stamps, strokes first, less what sensors read too much (by channel)."""
+        joints, streams = self.series[Stream.STROKES].values.shape[1], []
+        for order, (stream, names) in enumerate(channels_of(joints).items()):
+            if stream not in self.series:
+                continue
+            series, shift = self.series[stream], np.array([(zeros or {}).get(name, 0.0) for name in names])
+            pairs = zip(series.stamps.tolist(), series.values - shift, strict=True)
+            streams.append([(stamp, order, Sample(stream, stamp, row)) for stamp, row in pairs])
+        return [sample for _, _, sample in merge(*streams, key=lambda item: item[:2])]
 
 
 def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[MeasuredSession]:

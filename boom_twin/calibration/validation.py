@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from heapq import merge
 
 import numpy as np
 
 from ..config.settings import Settings
 from ..errors import BagError
 from ..scene.schema import Scene
+from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import Array, Mount, Residuals, Sample, Stream, channels_of
-from .sessions import NANO, MeasuredSession
+from ..types import NANO, Array, Mount, Residuals, Stream
+from .sessions import MeasuredSession
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ def judged(
     """
     twin = Twin(scene, settings, mounts)
     found: dict[Stream, list[Residuals]] = {Stream.ANGLES: [], Stream.IMU: []}
-    for sample in _samples(session, zeros, len(scene.joints)):
-        for residuals in (each for report in twin.update(sample).all for each in report.residuals):
+    for step in drive(twin, session.samples(zeros)):
+        for residuals in (each for report in step.report.all for each in report.residuals):
             if residuals.stamp >= start:
                 found[residuals.stream].append(residuals)
     every = [residuals for group in found.values() for residuals in group]
@@ -78,17 +78,6 @@ def judged(
         values[row, at : at + len(residuals.names)] = residuals.values
         sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
     return HeldOutResult(names, times, values, sigmas)
-
-
-def _samples(session: MeasuredSession, zeros: Mapping[str, float], joints: int) -> list[Sample]:
-    """All samples of a session in the order of their stamps, strokes first."""
-    streams = []
-    for order, (stream, names) in enumerate(channels_of(joints).items()):
-        if stream in session.series:
-            series, shift = session.series[stream], np.array([zeros.get(name, 0.0) for name in names])
-            pairs = zip(series.stamps.tolist(), series.values - shift, strict=True)
-            streams.append([(stamp, order, Sample(stream, stamp, row)) for stamp, row in pairs])
-    return [sample for _, _, sample in merge(*streams, key=lambda item: item[:2])]
 
 
 def _rms(values: Array) -> float:

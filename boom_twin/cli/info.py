@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
+from ..types import NANO
 from .main import add_json, add_session_scene, open_session_scene, print_json
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
         "files": [file.path.name for file in session.files],
         "bytes": info.size,
         "start_ns": session.start,
-        "duration_s": (session.end - session.start) * 1e-9,
+        "duration_s": (session.end - session.start) * NANO,
         "messages": sum(tally.count for tally in tallies),
         "checksums": session.checked,
         "origin": session.notes.get("origin"),
@@ -62,7 +63,7 @@ def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
         "types": [tally.type for tally in tallies],
         "counts": [tally.count for tally in tallies],
         "rates_Hz": [tally.rate for tally in tallies],
-        "largest_gaps_s": [tally.gap * 1e-9 if tally.gap else None for tally in tallies],
+        "largest_gaps_s": [tally.gap * NANO if tally.gap else None for tally in tallies],
         "largest_gaps_at_s": [_gap_at(tally, session.start) for tally in tallies],
         "stamps_not_increasing": [tally.not_increasing for tally in tallies],
         "stamps_unset": [tally.unset for tally in tallies],
@@ -80,14 +81,14 @@ def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
 
 def _gap_at(tally: Tally, start: int) -> float | None:
     """Where the largest gap begins, seconds after the first log time of the session."""
-    return (tally.gap_after - start) * 1e-9 if tally.gap else None
+    return (tally.gap_after - start) * NANO if tally.gap else None
 
 
 def _skew(tally: Tally, which: int) -> float | None:
     """Log time minus stamp, s: least (0), most (1) or mean (2)."""
     if not tally.skewed:
         return None
-    return tally.skews[which] * 1e-9 / (tally.skewed if which == 2 else 1)
+    return tally.skews[which] * NANO / (tally.skewed if which == 2 else 1)
 
 
 def as_text(info: BagInfo, scene: SessionScene) -> list[str]:

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from ..bag.reader import scan
 from ..errors import BoomTwinError
 from ..ros.startup import require_rclpy
+from ..types import NANO
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
@@ -88,7 +89,7 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         while True:
             with tqdm(total=length, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):
-                    bar.update(elapsed * 1e-9 - bar.n)
+                    bar.update(elapsed * NANO - bar.n)
             if not args.loop:
                 return
 

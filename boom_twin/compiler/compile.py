@@ -30,7 +30,7 @@ BASES = {"end-shapes": modes.end_shapes_and_bubbles, "cantilever": modes.cantile
 MORE_POINTS = {"end-shapes": 1, "cantilever": 3}
 PLACES = {
     "pivot": contact.PIVOT, "link_L": contact.LINK_L_PIN, "link_R": contact.LINK_R_PIN, "Q": contact.Q_PIN,
-    "rod": contact.ROD, "barrel": contact.BARREL,
+    "rod": contact.ROD_END_PIN, "barrel": contact.BARREL_END_PIN,
 }  # fmt: skip
 FINE = 0.1  # increment of an offset, as a share of its clearance, that counts as one of 1 rad
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..kernels.elements import pin_contact as contact
 from ..kernels.integrators import DEPTH, new_weights
+from ..kernels.result_row import Results, results_of, row_width
 from ..kernels.tables import RECORDS, SLOTS, State, Tables, Work
-from ..kernels.transfer.time_step import observe, observe_pins
+from ..kernels.transfer.time_step import observe
 from ..types import Array
 
 
@@ -108,63 +109,31 @@ class Plan:
         beams, operations, n, pins = len(t.beams), len(t.operations), self.joints, len(self.pins)
         inner = 6 + 2 * max((int(joint.clearances) for joint in t.joints), default=0)
         return Work(
-            position=np.zeros(histories), hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
+            position=np.zeros(histories), velocity=np.zeros(histories), acceleration=np.zeros(histories),
+            hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
             finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
             gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),
             block=np.zeros((shapes, shapes)), blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
-            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, 9)),
+            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
             drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
         )  # fmt: skip
 
 
-TIP = 9  # x, v, a of tip x, y, angle
-PIN = 4  # x and y of the journal's offset, force, contact
-
-
-@dataclass(frozen=True)
-class Rows:
-    """m instants of a boom with n joints and k pins with clearance.
-
-    Attributes
-    ----------
-    joints, cylinder_forces : ndarray, shape (m, n)
-        rad, N.
-    tip : ndarray, shape (m, 3, 3)
-        Position, velocity, acceleration; of x, y (m) and orientation (rad).
-    pins : ndarray, shape (m, k, 4)
-        Offset x, y of the journal in its bush (m), contact force (N), 1 where they touch.
-    """
-
-    joints: Array
-    cylinder_forces: Array
-    tip: Array
-    pins: Array
-
-    def at(self, rows: Array) -> Rows:
-        """Some of the instants, by their numbers."""
-        return Rows(self.joints[rows], self.cylinder_forces[rows], self.tip[rows], self.pins[rows])
-
-
-def row_width(plan: Plan) -> int:
-    """Numbers of one instant."""
-    return 2 * plan.joints + TIP + PIN * len(plan.pins)
+def width_of(plan: Plan) -> int:
+    """Numbers of a row of results, see `boom_twin.kernels.result_row`."""
+    return int(row_width(plan.joints, len(plan.pins)))
 
 
 def first_row(plan: Plan, state: State) -> Array:
-    """The instant in `state`, shape (row_width,)."""
-    row = np.zeros(row_width(plan))
+    """The instant in `state` as a row of results."""
+    row = np.zeros(width_of(plan))
     observe(plan.tables, state, row)
-    observe_pins(plan.tables, state, row, 2 * plan.joints + TIP)
     return row
 
 
-def taken_apart(plan: Plan, rows: Array) -> Rows:
-    """Rows as the kernels wrote them, shape (m, row_width), by name."""
-    n = plan.joints
-    end = 2 * n + TIP
-    return Rows(
-        rows[:, :n], rows[:, n : 2 * n], rows[:, 2 * n : end].reshape(-1, 3, 3), rows[:, end:].reshape(len(rows), -1, PIN)
-    )
+def taken_apart(plan: Plan, rows: Array) -> Results:
+    """Rows as the kernels wrote them, shape (.., width_of(plan)), by name."""
+    return results_of(rows, plan.joints, len(plan.pins))

@@ -52,15 +52,26 @@ def plain(text: str) -> Any:
         It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST` values, or is
         nested deeper than `DEEPEST`.
     """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = BoundedComposer
     try:
-        root = yaml.compose(text)
-        return None if root is None else _Values(yaml.constructor).of(root, 0)
+        root, constructor = bounded_nodes(text)
+        return None if root is None else _Values(constructor).of(root, 0)
     except RecursionError:
         raise ValueError("nested too deeply") from None
     except YAMLError as error:
         raise ValueError(" ".join(str(error).split())) from None
+
+
+def bounded_nodes(text: str) -> tuple[Node | None, Any]:
+    """The root node of an untrusted YAML text, None if it is empty, and what constructs scalars of it.
+
+    Raises
+    ------
+    YAMLError, RecursionError, ValueError
+        It is not YAML, holds more than `MOST` values, or is nested too deeply.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = BoundedComposer
+    return yaml.compose(text), yaml.constructor
 
 
 class BoundedComposer(Composer):

@@ -10,12 +10,10 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import Array, Sample
+from ..types import NANO, Array, Sample
 
 LONGEST = 10.0
 """Longest step between two stamps (s) that is taken for a pause of the sensor, and not for a jump of its clock."""
-
-NANO = 1e-9
 
 
 @dataclass(frozen=True, slots=True)

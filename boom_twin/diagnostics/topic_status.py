@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from math import nan
 
 from ..config.settings import Thresholds
+from ..types import NANO
 from .levels import Bounds, ComponentJudge, Level, Status
-from .stream_stats import NANO, StreamWatch
+from .stream_stats import StreamWatch
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,10 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..kernels.elements.linkage import cylinder_length
+from ..kernels.result_row import PIN, places_in, prediction_width
 from ..kernels.tables import State
 from ..kernels.transfer.forward_kinematics import place
-from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
 from ..scene.schema import Scene
 from ..types import Array, Prediction
 from .look_ahead import Tuning, follow, new_track
@@ -32,9 +33,7 @@ class UndeflectedPredictor:
 
     def at(self, angles: Array) -> Array:
         """Points (k, 2), m, at relative joint `angles` (rad), shape (n,)."""
-        heading = np.cumsum(angles)
-        steps = self._lengths[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-        pivots = self._pivot + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        _, pivots = rigid_chain(self._pivot, self._lengths, angles)
         return np.stack([np.interp(self._along, self._reach, column) for column in pivots.T], axis=1)
 
     @cached_property
@@ -68,8 +67,6 @@ class BoomPredictor:
     plan : Plan
     live : State
         The boom as predicted by the newest sample.
-    variances : ndarray, shape (n,)
-        Of the newest strokes' estimates, m^2.
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
@@ -83,9 +80,14 @@ class BoomPredictor:
         )
         self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
         self._newest, self._paused = 0.0, -math.inf
-        n = self.plan.joints
-        self._row = np.zeros(4 * n + 11 + 4 * len(self.plan.pins))
-        self.variances: Array = self._row[3 * n + 9 : 4 * n + 9]
+        size = self.plan.joints, len(self.plan.pins)
+        self._row = np.zeros(prediction_width(*size))
+        self._at = places_in(*size)
+
+    @property
+    def variances(self) -> Array:
+        """Of the newest strokes' estimates, m^2, shape (n,)."""
+        return self._row[self._at.variances]
 
     @property
     def angles(self) -> Array:
@@ -147,23 +149,25 @@ class BoomPredictor:
 
     def prediction(self, stamp: int, shaped: bool) -> Prediction:
         """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
-        n, row = self.plan.joints, self._row.copy()
-        tip = row[2 * n : 2 * n + 9]
+        row, at = self._row.copy(), self._at
+        tip = row[at.tip].reshape(3, 3)
+        angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
+        position = tip[0, :2]
         return Prediction(
             stamp=stamp,
-            tip_position=tip[0:2],
-            tip_displacement=tip[0:2] - row[4 * n + 9 : 4 * n + 11],
-            tip_velocity=tip[3:5],
-            tip_acceleration=tip[6:8],
-            tip_angle=float(tip[2]),
-            tip_angular_velocity=float(tip[5]),
-            tip_angular_acceleration=float(tip[8]),
-            joints=row[:n],
-            strokes=row[2 * n + 9 : 3 * n + 9],
-            cylinder_forces=row[n : 2 * n],
+            tip_position=position,
+            tip_displacement=position - row[at.rigid_tip],
+            tip_velocity=tip[1, :2],
+            tip_acceleration=tip[2, :2],
+            tip_angle=angle,
+            tip_angular_velocity=angular_velocity,
+            tip_angular_acceleration=angular_acceleration,
+            joints=row[at.joints],
+            strokes=row[at.strokes],
+            cylinder_forces=row[at.cylinder_forces],
             shape=outline(self.plan, self.live, self._work.position) if shaped else None,
             undeflected=self._undeflected.at(self.angles) if shaped else None,
             pins=self.live.pins.copy() if shaped else None,
-            clearances=row[4 * n + 11 :].reshape(-1, 4),
+            clearances=row[at.pins].reshape(-1, PIN),
             moments=self._bending @ self.live.z,
         )

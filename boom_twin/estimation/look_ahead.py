@@ -18,8 +18,9 @@ from ..compiler.plan import Plan
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
 from ..kernels.jit import inner, kernel
+from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
-from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe, observe_pins
+from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe
 from ..types import Array
 from .stroke_filter import add_node, drive_between, measure, start_node
 
@@ -81,8 +82,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
 
     The first sample of a track without nodes is taken as rest, in equilibrium; `anchor` holds a first guess of it.
 
-    out : ndarray, shape (4 n + 11 + 4 pins,): joint angles, cylinder forces, x, v, a of the tip (9), estimated strokes, their
-    variances, tip of the rigid boom (2), pins with clearance (see `kernels.transfer.time_step.observe_pins`).
+    out : ndarray, shape (prediction_width,): results and estimates, see `kernels.result_row`.
 
     Returns a status of `kernels.tables`.
     """
@@ -180,11 +180,10 @@ def report(t, live, track, out):
     """Write what is predicted now; see `follow`."""
     n = t.joints.shape[0]
     observe(t, live, out)
-    at = 2 * n + 9
+    found = estimates_in(out, n, t.clearances.shape[0])
     for i in range(n):
-        out[at + i], out[at + n + i] = track.x[0, i, 0], track.c[0, i, 0, 0]
-    out[at + 2 * n], out[at + 2 * n + 1] = rigid_tip(t, track)
-    observe_pins(t, live, out, at + 2 * n + 2)
+        found.strokes[i], found.variances[i] = track.x[0, i, 0], track.c[0, i, 0, 0]
+    found.rigid_tip[0], found.rigid_tip[1] = rigid_tip(t, track)
 
 
 @inner

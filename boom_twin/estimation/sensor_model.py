@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import UsageError
-from ..kernels.tables import JOINT_A, JOINT_B, State
-from ..kernels.transfer.time_step import observe
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
 from ..types import Array, Mount
 
 TURN = 2.0 * np.pi
+
+
+def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """What an accelerometer reads along two axes, m/s^2; of numbers or of arrays of one shape.
+
+    Parameters
+    ----------
+    x, y : float or ndarray
+        Acceleration less gravity, m/s^2, in the axes of the model.
+    c, s : float or ndarray
+        Cosine and sine of the angle by which its axes are turned against them.
+    """
+    return c * x + s * y, c * y - s * x
 
 
 class Mounting:
@@ -54,7 +67,7 @@ class Mounting:
         """What the sensors should read, rad, shape (n,), while the joint angles are `joints` and the boom is as `live`."""
         if not self._has_any:
             return joints
-        return np.where(self._absolute, live.frames[self._frames, 2] + self._inclination, joints)
+        return np.where(self._absolute, live.frames[self._frames, FRAME_ANGLE] + self._inclination, joints)
 
     def deviations(self, joint_sigmas: Array, variance: float) -> Array:
         """Deviations expected of the readings, rad, shape (n,), from those of the joints' angles.
@@ -86,20 +99,16 @@ class Reading:
 
     def __init__(self, plan: Plan, mounting: Mounting) -> None:
         self._plan, self._mounting = plan, mounting
-        self._row = np.empty(2 * plan.joints + 9)
 
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
-        n, row = self._plan.joints, self._row
-        observe(self._plan.tables, state, row)
-        x, y, angle = state.frames[-1, 0], state.frames[-1, 1], state.frames[-1, 2]
+        joints = taken_apart(self._plan, first_row(self._plan, state)).joints
+        x, y, angle = (state.frames[-1, place] for place in (FRAME_X, FRAME_Y, FRAME_ANGLE))
         c, s = math.cos(angle), math.sin(angle)
         gx, gy = self._plan.tables.gravity
-        angles = self._mounting.expected(row[:n], state)
-        return np.concatenate([angles, [-c * gx - s * gy, s * gx - c * gy, x, y]])
+        angles = self._mounting.expected(joints, state)
+        return np.concatenate([angles, [*specific_force(-gx, -gy, c, s), x, y]])
 
     def forces(self, state: State) -> Array:
         """Of the cylinders, N, positive in tension, shape (n,)."""
-        n = self._plan.joints
-        observe(self._plan.tables, state, self._row)
-        return self._row[n : 2 * n].copy()
+        return taken_apart(self._plan, first_row(self._plan, state)).cylinder_forces

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import nan
 
-from ..types import Alarm, Health, Ranked
+from ..types import NANO, Alarm, Health, Ranked
 
-NANO = 1e-9
 PROBABILITY = ": probability"
 
 

@@ -13,9 +13,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..errors import UsageError
-from ..types import Array
+from ..types import NANO, Array
 from .baseline import Baseline
-from .inference.block_problem import BLOCK, NANO, BlockProblem
+from .inference.block_problem import BLOCK, BlockProblem
 from .inference.fault_catalogue import Parameter
 from .inference.hypotheses import GATE, Regression
 from .inference.innovation_filter import InnovationFilter

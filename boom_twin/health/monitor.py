@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
+from ..types import NANO, Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
 from .baseline import Baseline
-from .inference.block_problem import BLOCK, NANO, Block, BlockBuilder, BlockMeans, means, stacked
+from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, means, stacked
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import SensorCheck, SensorMonitor
 
@@ -28,9 +30,18 @@ class HealthMonitor:
         Of the angle sensors.
     baseline : Baseline
         What is known of this rig while all is well.
+    on_block : callable, optional
+        Is told every linear problem.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], baseline: Baseline) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        mounts: tuple[Mount | None, ...],
+        baseline: Baseline,
+        on_block: Callable[[BlockProblem], object] | None = None,
+    ) -> None:
         n = len(scene.joints)
         self._n, self._settings = n, settings
         channels = channels_of(n)
@@ -40,7 +51,7 @@ class HealthMonitor:
         absolute = np.array([mount is not None for mount in mounts])
         self._low[absolute], self._high[absolute] = -np.inf, np.inf
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
-        self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names)
+        self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._angle_watch = SensorMonitor(channels[Stream.ANGLES], "rad")
         self._stroke_watch = SensorMonitor(channels[Stream.STROKES], "m")
         self._ended: list[Alarm] = []

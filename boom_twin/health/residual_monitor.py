@@ -11,11 +11,11 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Mount
+from ..types import NANO, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
 from .detection import Detector
-from .inference.block_problem import BLOCK, CALM, NANO, BlockMeans, BlockProblem, LinearModel
+from .inference.block_problem import BLOCK, CALM, BlockMeans, BlockProblem, LinearModel
 from .inference.fault_catalogue import Form, Parameter, parameters
 from .inference.hypotheses import Evidence, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
@@ -122,6 +122,8 @@ class ResidualMonitor:
     baseline : Baseline
     names : tuple of str
         Of the channels.
+    on_block : callable, optional
+        Is told every linear problem; what a baseline is learnt from.
 
     Attributes
     ----------
@@ -131,12 +133,16 @@ class ResidualMonitor:
         What the newest block leaves that healthy deviations do not explain; of unit variance, NaN where nothing was measured.
     covariance : ndarray, shape (parameters, parameters)
         Of the parameters while all is well, as the baseline has it.
-    listener : callable or None
-        Is told every linear problem; what a baseline is learnt from.
     """
 
     def __init__(
-        self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], baseline: Baseline, names: tuple[str, ...]
+        self,
+        scene: Scene,
+        settings: Settings,
+        mounts: tuple[Mount | None, ...],
+        baseline: Baseline,
+        names: tuple[str, ...],
+        on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
         known, n = parameters(scene), len(scene.joints)
         self._names, self._count = names, len(known)
@@ -148,7 +154,7 @@ class ResidualMonitor:
         self._regression = Regression(mean, self.covariance)
         self._detector = Detector(len(names), BLOCK * NANO, settings.false_alarms / 86400.0)
         self.surprise = np.full(len(names), np.nan)
-        self.listener: Callable[[BlockProblem], object] | None = None
+        self._on_block = on_block
         self.begin()
 
     def begin(self) -> None:
@@ -176,8 +182,8 @@ class ResidualMonitor:
         problem = self._linear.take(block, noise)
         if problem is None or not np.isfinite(block.left).any():
             return None
-        if self.listener is not None:
-            self.listener(problem)
+        if self._on_block is not None:
+            self._on_block(problem)
         self._watch(problem)
         if self._case is not None and problem.start >= self._case.start:
             self._case.take(problem)

@@ -106,7 +106,16 @@ def one_step(family, parameter, am, af, gamma, h, weights):
 
 @inner
 def wilson(family, theta, h, weights):
-    """Wilson-theta, theta >= 1.37 for unconditional stability on an oscillator."""
+    """Wilson-theta, theta >= 1.37 for unconditional stability on an oscillator.
+
+    The acceleration is linear from a to a' over r = theta h. Two integrations give
+
+        v' = v + r/2 (a + a'),    x' = x + r v + r^2/6 (2 a + a').
+
+    The second, solved for a', is a' = 6/r^2 (x' - x_hat) with x_hat = x + r v + r^2/3 a; in the first it leaves
+    v' = 3/r x' + D with D = -3/r x - 2 v - r/2 a. The step itself ends at h, the share 1/theta of the way: the same integrals
+    over h with the acceleration a + (a' - a)/theta at its end, which are the weights of the new X, V, A.
+    """
     reach, part = theta * h, 1.0 / theta
     weights[HAT, X], weights[HAT, V], weights[HAT, A] = 1.0, reach, reach * reach / 3.0
     weights[OFFSET, X], weights[OFFSET, V], weights[OFFSET, A] = -3.0 / reach, -2.0, -0.5 * reach
@@ -128,7 +137,17 @@ def houbolt(family, parameter, h, weights):
 
 @inner
 def park(family, parameter, h, weights):
-    """Park's stiffly stable backward differences."""
+    """Park's stiffly stable backward differences.
+
+    With x1, x2 one and two steps before x, the differences over two and over three steps are
+
+        h v' = 3/2 x' - 2 x + 1/2 x1,    h v' = 11/6 x' - 3 x + 3/2 x1 - 1/3 x2,    their mean
+
+        v' = C x' + D,    C = 10/(6 h),    D = (-5/2 x + x1 - 1/6 x2)/h.
+
+    The same formula for v gives a' = C v' + D_v, D_v made of v, v1, v2 as D of x, x1, x2. With v' from above that is
+    a' = C^2 (x' - x_hat), x_hat = -D/C - D_v/C^2 = 3/2 x - 3/5 x1 + 1/10 x2 + h (0.9 v - 0.36 v1 + 0.06 v2).
+    """
     weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 1.5, -0.6, 0.1
     weights[HAT, V], weights[HAT, OLD + 3], weights[HAT, OLD + 1] = 0.9 * h, -0.36 * h, 0.06 * h
     weights[OFFSET, X], weights[OFFSET, OLD + 2], weights[OFFSET, OLD] = -2.5 / h, 1.0 / h, -1.0 / (6.0 * h)
@@ -150,12 +169,11 @@ def start_step(scheme, history, hat, offset):
 
 
 @inner
-def finish_step(scheme, position, hat, offset, history):
-    """Write the new history of all scalars from their `position`, shape (n,), at the instant solved for.
+def finish_step(scheme, position, hat, offset, v, a, history):
+    """Write velocities, accelerations and the new history of all scalars from their `position` at the instant solved for.
 
-    `hat` and `offset` hold the new accelerations and velocities afterwards.
+    `hat` and `offset` as `start_step` filled them; `v` and `a` are written; all of shape (n,).
     """
-    a, v = hat, offset
     for i in range(position.shape[0]):
         a[i] = scheme.gain * (position[i] - hat[i])
         v[i] = scheme.rate * position[i] + offset[i]

@@ -20,12 +20,19 @@ SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, a
 
 JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN, TIP = range(8)
 
+# Places of a joint's unknowns from `z` of its row on. Both: angle of the section. A: N. B: angles of the links, force in pin Q
+# (2), N. Behind them in both: offsets (2) of the pins with clearance.
+Z_SECTION, Z_FORCE_A, Z_LINK_L, Z_LINK_R, Z_LAMBDA, Z_FORCE_B, Z_OFFSETS_B = 0, 1, 1, 2, 3, 5, 6
+
+# Columns of `State.frames`, and of `State.turns`, where the sine stands behind its cosine.
+FRAME_X, FRAME_Y, FRAME_ANGLE, FRAME_COS, FRAME_SIN = range(5)
+HEAD_TURN, SECTION_TURN, LINK_L_TURN, LINK_R_TURN = 0, 2, 4, 6
+
 OPERATION = np.dtype([("kind", np.int64), ("row", np.int64)])
 
 JOINT = np.dtype(
     [
-        # A: theta, N.  B: theta, alpha_L, alpha_R, lambda_x, lambda_y, N.  Both: offsets (2) of the pins with clearance
-        ("z", np.int64),
+        ("z", np.int64),  # place of the joint's first unknown
         ("x", float), ("y", float),  # pivot of joint A in the base, m
         ("first_link", np.int64), ("links", np.int64),  # rows of LINK: those that have mass
         ("first_clearance", np.int64), ("clearances", np.int64),  # rows of CLEARANCE: pivot and link pins
@@ -132,8 +139,10 @@ class State(NamedTuple):
 class Work(NamedTuple):
     """Scratch of one step; no meaning between steps."""
 
-    position: Array  # (histories,)
-    hat: Array
+    position: Array  # (histories,), as are those that follow
+    velocity: Array  # at the instant that a step solved for
+    acceleration: Array
+    hat: Array  # x_hat and D of the step
     offset: Array
     weights: Array  # of the scheme, see `kernels.integrators`
     finer: Array  # of a sub-step's
@@ -148,11 +157,11 @@ class Work(NamedTuple):
     gains: Array  # (operations, rows, SLOTS): decrements of the condensed unknowns by increments of the cut ..
     free: Array  # (operations, rows): .. and those that do not depend on it
     block: Array  # (rows, rows): H_qq of a beam part
-    blocks: Array  # (joints, inner, inner) what a joint condenses, kept for counting natural frequencies
+    blocks: Array  # (joints, inner, inner) what a joint condenses, as the last sweep in left it
     ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
     end_gains: Array  # (clearances, 2, 5), and its gains
     end_free: Array  # (clearances, 2)
-    hold: Array  # (clearances, 9) force, tangent and torque of a pin, see `kernels.elements.pin_contact.bearing`
+    hold: Array  # (clearances, 9) what a pin gives, columns as named in `kernels.elements.pin_contact`
     apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)

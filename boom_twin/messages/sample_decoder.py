@@ -6,7 +6,7 @@ Reads attributes only, so that messages of rclpy and of rosbags give the same nu
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import inf, isnan, nan
 from typing import Any
 
@@ -107,6 +107,10 @@ class SampleDecoder:
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
         self.strangers: dict[Stream, list[str]] = {}
+
+    def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> Iterator[Sample]:
+        """Those that `msg` holds of `streams`, the roles of the topic that it came by; see `put`."""
+        return (sample for stream in streams if (sample := self.put(stream, stamp_ns, msg)) is not None)
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
         """The sample that `msg` holds.

@@ -11,12 +11,10 @@ from ..plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
 from ..plots.history import Orbits
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
-from ..twin.expected_readings import specific_force
-from ..types import Array, Residuals, Stream
+from ..twin.expected_readings import tip_specific_force
+from ..types import NANO, Array, Residuals, Stream
 from .ground_truth import TipTruth
 from .replay import Recording, Replay
-
-NANO = 1e-9
 
 
 def draw(result: Replay, history: History, out: Path) -> list[Path]:
@@ -36,7 +34,7 @@ def history_of(recording: Recording, scene: Scene) -> History:
     stamps = _seconds([prediction.stamp for prediction in predictions], first)
     acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
     gravity = gravity_in_base(scene)
-    felt = np.array([specific_force(prediction, gravity) for prediction in predictions])
+    felt = np.array([tip_specific_force(prediction, gravity) for prediction in predictions])
     names, times, values, sigmas = _channels([angles, force], first)
     return History(
         stamps_s=stamps,

@@ -134,7 +134,7 @@ def main() -> int:
             stamp = stamp_of(message)
             if Stream.STROKES in heard[name]:
                 batch += changes.due(log, stamp)
-            found = [sample for stream in heard[name] if (sample := intake.put(stream, stamp, message)) is not None]
+            found = intake.samples(heard[name], stamp, message)
             batch += [(sample.stream.value, stamp, sample.values.tobytes()) for sample in found] or [None]
             if len(batch) >= BATCH:
                 post([batch])

@@ -36,7 +36,8 @@ from ..scene.edit import anew
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
-from ..types import HELD, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..twin.driver import drive
+from ..types import HELD, NANO, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .ground_truth import TipTruth, load_truth
 from .reader_process import SampleReader
 from .writer_process import ReportWriter
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
-NANO = 1e-9
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
@@ -222,15 +222,13 @@ def replay_into(
         if progress is not None:
             samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
         began = time.perf_counter()
-        for sample in samples:
-            if sample is None:
+        if not changes:
+            samples = (sample for sample in samples if not isinstance(sample, Change))
+        for step in drive(twin, samples):
+            if step is None:
                 recording.refused += 1
                 continue
-            if isinstance(sample, Change):
-                if changes:
-                    twin.requests.repeat(sample)
-                continue
-            report = twin.update(sample)
+            sample, report, _ = step
             recording.add(report)
             if not recording.predictions and sample.stream is Stream.STROKES:
                 read |= np.isfinite(sample.values)

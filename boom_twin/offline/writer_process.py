@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,24 @@ from ..errors import BoomTwinError
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
-from ..types import Array, Change, Health, Prediction, Report, Residuals, Stream
+from ..types import Change, Health, Prediction, Report, Residuals, Stream
 from .process_pipe import END, Pipe, received, say_ready
 
 BATCH = 200  # reports in one pickle
 Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
 Rare = tuple[Change | None, Health | None]
-Packed = tuple[int, bytes | None, tuple[bytes, bytes, bytes] | None, Rows, Rare]
+Numbers = tuple[float, ...]
+Arrays = list[bytes | None]
+Packed = tuple[int, Numbers | None, Arrays, Rows, Rare]
+
+NUMBERS = ("tip_angle", "tip_angular_velocity", "tip_angular_acceleration")
+ARRAYS = (
+    "tip_position", "tip_displacement", "tip_velocity", "tip_acceleration", "joints", "strokes", "cylinder_forces", "shape",
+    "undeflected", "pins", "clearances", "moments",
+)  # fmt: skip
+COLUMNS = {"shape": 2, "undeflected": 2, "pins": 4, "clearances": 4}
+"""Of the arrays of a prediction that are tables."""
+_numbers_of, _arrays_of = attrgetter(*NUMBERS), attrgetter(*ARRAYS)
 
 
 def pack(report: Report) -> Packed:
@@ -28,51 +40,28 @@ def pack(report: Report) -> Packed:
     residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
     p, rare = report.prediction, (report.change, report.health)
     if p is None:
-        return report.stamp, None, None, residuals, rare
-    turn = np.array([p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration])
-    tip = (p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, turn)
-    numbers = b"".join(part.tobytes() for part in (*tip, p.joints, p.strokes, p.cylinder_forces))
-    if p.shape is None or p.undeflected is None or p.pins is None:
-        return report.stamp, numbers, None, residuals, rare
-    return report.stamp, numbers, (p.shape.tobytes(), p.undeflected.tobytes(), p.pins.tobytes()), residuals, rare
+        return report.stamp, None, [], residuals, rare
+    arrays = [None if array is None else array.tobytes() for array in _arrays_of(p)]
+    return report.stamp, _numbers_of(p), arrays, residuals, rare
 
 
 def unpack(packed: Packed) -> Report:
     """What `pack` was given, less what it leaves out."""
-    stamp, numbers, lines, rows, (change, health) = packed
+    stamp, numbers, arrays, rows, (change, health) = packed
     residuals = tuple(
         Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
         for stream, at, names, values, sigmas in rows
     )
-    prediction = None if numbers is None else _prediction(stamp, np.frombuffer(numbers), lines)
+    prediction = None if numbers is None else _prediction(stamp, numbers, arrays)
     return Report(stamp, True, prediction, residuals, change=change, health=health)
 
 
-def _prediction(stamp: int, row: Array, lines: tuple[bytes, bytes, bytes] | None) -> Prediction:
-    n = (len(row) - 11) // 3
-    line, undeflected, pins = (None, None, None) if lines is None else map(_table, lines, (2, 2, 4))
-    turn, velocity, acceleration = row[8:11].tolist()
-    joints, strokes, forces = row[11:].reshape(3, n)
-    return Prediction(
-        stamp=stamp,
-        tip_position=row[0:2],
-        tip_displacement=row[2:4],
-        tip_velocity=row[4:6],
-        tip_acceleration=row[6:8],
-        tip_angle=turn,
-        tip_angular_velocity=velocity,
-        tip_angular_acceleration=acceleration,
-        joints=joints,
-        strokes=strokes,
-        cylinder_forces=forces,
-        shape=line,
-        undeflected=undeflected,
-        pins=pins,
-    )
-
-
-def _table(data: bytes, columns: int) -> Array:
-    return np.frombuffer(data).reshape(-1, columns)
+def _prediction(stamp: int, numbers: Numbers, arrays: Arrays) -> Prediction:
+    found = {name: None if data is None else np.frombuffer(data) for name, data in zip(ARRAYS, arrays, strict=True)}
+    for name, columns in COLUMNS.items():
+        if (flat := found[name]) is not None:
+            found[name] = flat.reshape(-1, columns)
+    return Prediction(stamp=stamp, **dict(zip(NUMBERS, numbers, strict=True)), **found)  # type: ignore[arg-type]
 
 
 class ReportWriter:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..offline.replay import NANO, Recording, Replay
+from ..offline.replay import Recording, Replay
 from ..plots import AlarmSpan, History
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..twin.twin import EVENTS
-from ..types import Alarm, Array
+from ..types import NANO, SECOND, Alarm, Array
 from .html import heading, image, page, paragraph, table
 from .quantities import BOX, Load, loads
 from .vibration import LEAST, NEAR, HoldInterval, Vibration, course
@@ -84,7 +84,7 @@ def write_report(subject: Subject, folder: Path) -> Path:
 
 def _head(subject: Subject) -> list[str]:
     summary, recording = subject.result.summary, subject.result.recording
-    begin = datetime.fromtimestamp(recording.predictions[0].stamp // 1_000_000_000, UTC)
+    begin = datetime.fromtimestamp(recording.predictions[0].stamp // SECOND, UTC)
     rows: list[tuple[str, object]] = [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
         ("duration, s", summary["duration_s"]),

@@ -17,7 +17,7 @@ from ..messages.topic_table import NODE, Output, Topics
 from ..monitor.data.feed import Feed
 from ..monitor.data.store import Store
 from ..scene.schema import Scene
-from ..types import Stream
+from ..types import SECOND, Stream
 from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
@@ -27,7 +27,6 @@ CAPACITY = 150_000
 """Rows kept of every table: twelve minutes at 200 Hz."""
 MOST = 400
 """Messages of one topic taken in one look, so that a flood of them leaves time for the pages."""
-NANO = 1_000_000_000
 RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)
 """Outputs of which none may be missed."""
 MOST_BYTES = 4_000_000
@@ -85,8 +84,8 @@ class TopicFeed(Feed):
         """Publish an event with the stamp of the newest sample."""
         store = self.store
         message = Log(level=Log.INFO, name=NAME, msg=words)
-        stamp = store.epoch + round(store.newest * NANO)
-        message.stamp.sec, message.stamp.nanosec = divmod(stamp, NANO)
+        stamp = store.epoch + round(store.newest * SECOND)
+        message.stamp.sec, message.stamp.nanosec = divmod(stamp, SECOND)
         self._events.publish(message)
 
     def let_go(self) -> str:

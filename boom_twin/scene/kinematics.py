@@ -208,12 +208,19 @@ def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
     return np.asarray(origin + np.array(turned(heading, point[0], point[1])))
 
 
+def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Array]:
+    """Headings (n,) in rad, and pivots and tip (n + 1, 2) in m, of rigid sections at relative joint `angles` (rad), shape (n,).
+
+    The first `pivot` (2,) in m; `lengths` (n,) of the sections, m.
+    """
+    headings = np.cumsum(angles)
+    steps = lengths[:, None] * np.stack([np.cos(headings), np.sin(headings)], axis=1)
+    return headings, pivot + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+
 def skeleton(scene: Scene, angles: Array) -> Skeleton:
     """Pins of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
-    headings = np.cumsum(angles)
-    lengths = np.array([section.length for section in scene.sections])
-    steps = np.stack([lengths * np.cos(headings), lengths * np.sin(headings)], axis=1)
-    pivots = np.array(scene.base.pivot) + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+    headings, pivots = rigid_chain(np.array(scene.base.pivot), np.array([s.length for s in scene.sections]), angles)
     joints = tuple(_pins(scene, i, pivots[i], headings) for i in range(len(headings)))
     return Skeleton(headings, pivots, joints)
 

@@ -14,11 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
-from ..config.yaml_text import TAG, TYPED, BoundedComposer, typed_value
+from ..config.yaml_text import TAG, TYPED, bounded_nodes, typed_value
 from ..errors import Fault, SceneError
 from ..system.terminal_text import printable
 
@@ -89,16 +88,14 @@ def parse(text: str, source: str) -> Document:
     SceneError
         If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
     """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = BoundedComposer
     try:
-        root = yaml.compose(text)
+        root, constructor = bounded_nodes(text)
     except (YAMLError, RecursionError, ValueError) as error:
         raise SceneError(source, (_syntax_fault(text, error),)) from None
     document = Document()
     if root is None:
         raise _refusal(source, "the file is empty", "Start from the one that `boom_twin scene` prints.")
-    document.values = _Reader(document, yaml.constructor).value(root, ())
+    document.values = _Reader(document, constructor).value(root, ())
     return document
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..errors import UsageError
-from ..types import SENSORS, Array, Change, Stream
+from ..types import SECOND, SENSORS, Array, Change, Stream
 
 KEPT = 16  # sets of zeros that late samples may still need
 
@@ -59,7 +59,7 @@ class SensorZeros:
         return None
 
 
-SPAN = 1_000_000_000  # ns
+SPAN = SECOND  # ns
 FEWEST = 5  # readings that make a mean
 WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
 """Sensors with a zero for each of their channels; all others have one for each joint."""

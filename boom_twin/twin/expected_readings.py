@@ -13,10 +13,10 @@ from ..analysis.modal import StrokeNoise, stroke_noise
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.look_ahead import copy_state
-from ..estimation.sensor_model import Mounting
+from ..estimation.sensor_model import Mounting, specific_force
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import State
-from ..types import Array, Prediction, Stream
+from ..types import NANO, Array, Prediction, Stream
 
 SPAN = 2_000_000_000  # ns
 
@@ -62,7 +62,6 @@ def _between(old: Expected, new: Expected, stamp: int) -> Expected:
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 INTERVAL_STEP = 0.2  # of the time between samples, likewise
-NANO = 1e-9
 INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
 
 
@@ -204,7 +203,7 @@ def _angles(boom: PredictedBoom) -> tuple[Array, Array]:
 
 
 def _force(boom: PredictedBoom) -> tuple[Array, Array]:
-    return specific_force(boom.prediction, boom.gravity), boom.force_sigmas
+    return tip_specific_force(boom.prediction, boom.gravity), boom.force_sigmas
 
 
 READINGS: dict[Stream, Callable[[PredictedBoom], tuple[Array, Array]]] = {
@@ -223,8 +222,8 @@ def expected_readings(boom: PredictedBoom, strokes: Array) -> Expected:
     return Expected(boom.prediction.stamp, values, sigmas, strokes)
 
 
-def specific_force(prediction: Prediction, gravity: Array) -> Array:
+def tip_specific_force(prediction: Prediction, gravity: Array) -> Array:
     """What an IMU at the tip feels along its x and z, shape (2,), m/s^2."""
     c, s = math.cos(prediction.tip_angle), math.sin(prediction.tip_angle)
-    ax, ay = (prediction.tip_acceleration - gravity).tolist()
-    return np.array([c * ax + s * ay, c * ay - s * ax])
+    x, y = (prediction.tip_acceleration - gravity).tolist()
+    return np.array(specific_force(x, y, c, s))

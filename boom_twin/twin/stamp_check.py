@@ -8,10 +8,9 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..estimation.boom_predictor import BoomPredictor
-from ..types import Array, Sample
+from ..types import SECOND, Array, Sample
 from .stroke_check import FAR
 
-NANO = 1_000_000_000
 STEP = 1.75  # usual intervals; a longer one is looked at
 FEW = 8.0  # usual intervals; where strokes are as expected after a step up to that, it need not be confirmed
 SMOOTHING = 0.05  # weight of the newest interval in the usual one
@@ -50,7 +49,7 @@ class StampCheck:
 
     def tune(self, settings: Settings) -> None:
         """Judge by these limits from now on."""
-        self._gap = round(settings.gap * NANO)
+        self._gap = round(settings.gap * SECOND)
 
     @property
     def longest(self) -> float:

@@ -6,69 +6,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
-from ..types import Array
+from ..types import NANO, Array
 
 MOST = 5  # readings in a row that are not believed; the next one is
 FAR = 8.0  # deviations of the noise
 SILENT = 100_000_000  # ns after which a missing stroke is taken to stay where it was
-NANO = 1e-9
 Flags = NDArray[np.bool_]
 
 
 class StrokeCheck:
-    """Looks at the strokes of one run, sample by sample.
-
-    Attributes
-    ----------
-    estimate : ndarray, shape (n,), or None
-        Strokes (m) as estimated at the sample before; None at the first one.
-    """
+    """Looks at the strokes of one run, sample by sample; each beside what was estimated (m, shape (n,)) at the one before."""
 
     def __init__(self) -> None:
-        self.estimate: Array | None = None
         self._stamp = self._trusted = self._before = 0
         self._others = 0
         self._looked_at: tuple[Array, float, bool] | None = None
 
-    def is_of_others(self, stamp: int, values: Array, settings: Settings) -> bool:
+    def is_of_others(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> bool:
         """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
-        limit, is_near = self._look(stamp, values, settings)
-        if is_near or np.count_nonzero(self._are_far(values, limit)) < 2:
+        limit, is_near = self._look(stamp, values, estimate, settings)
+        if is_near or np.count_nonzero(_are_far(values, estimate, limit)) < 2:
             self._others = 0
             return False
         self._others += 1
         return self._others <= MOST
 
-    def _look(self, stamp: int, values: Array, settings: Settings) -> tuple[float, bool]:
+    def _look(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> tuple[float, bool]:
         """How far strokes may be from their estimates, m, and whether none is further or missing; once for a sample."""
-        assert self.estimate is not None
         if self._looked_at is None or self._looked_at[0] is not values:
             span = (stamp - self._stamp) * NANO
             limit = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-            pairs = zip(values.tolist(), self.estimate.tolist(), strict=True)  # few: faster one by one than as arrays
+            pairs = zip(values.tolist(), estimate.tolist(), strict=True)  # few: faster one by one than as arrays
             self._looked_at = values, limit, all(abs(value - expected) <= limit for value, expected in pairs)
         return self._looked_at[1:]
 
-    def _are_far(self, values: Array, limit: float) -> Flags:
-        """Which strokes are further than `limit` (m) from their estimates; shape (n,)."""
-        assert self.estimate is not None
-        return np.asarray(np.abs(values - self.estimate) > limit)
+    def of(self, stamp: int, values: Array, estimate: Array | None, settings: Settings) -> tuple[Array, list[str]]:
+        """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events.
 
-    def of(self, stamp: int, values: Array, settings: Settings) -> tuple[Array, list[str]]:
-        """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events."""
-        if self.estimate is None:
+        There is no estimate for the first sample of a run.
+        """
+        if estimate is None:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
             self._stamp = self._trusted = stamp
             return values, []
-        limit, is_near = self._look(stamp, values, settings)
+        limit, is_near = self._look(stamp, values, estimate, settings)
         self._stamp, self._looked_at = stamp, None
         if is_near:
             self._trusted = stamp
             return values, []
-        return self._doubted(stamp, values, self._are_far(values, limit))
+        return self._doubted(stamp, values, estimate, _are_far(values, estimate, limit))
 
-    def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
-        assert self.estimate is not None
+    def _doubted(self, stamp: int, values: Array, estimate: Array, far: Flags) -> tuple[Array, list[str]]:
         if self._trusted > self._before:  # all were well since the last doubt
             self._strange[:], self._seen[:] = 0, self._trusted
         self._before = stamp
@@ -80,6 +68,11 @@ class StrokeCheck:
         silent = np.isnan(taken) & (stamp - self._seen > SILENT)
         events = ["implausible"] if implausible.any() else []
         if silent.any():
-            taken = np.where(silent, self.estimate, taken)
+            taken = np.where(silent, estimate, taken)
             events.append("held")
         return taken, events
+
+
+def _are_far(values: Array, estimate: Array, limit: float) -> Flags:
+    """Which strokes are further than `limit` (m) from their estimates; shape (n,)."""
+    return np.asarray(np.abs(values - estimate) > limit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from operator import gt, lt
 
@@ -16,12 +16,13 @@ from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.sensor_model import Mounting
 from ..health.baseline import Baseline
+from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
 from ..kernels.tables import OK, SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import LIMIT, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .expected_readings import Deviations, PredictedBoom, PredictionBuffer, expected_readings
 from .sample_check import SHORTEST, SampleCheck
@@ -55,7 +56,6 @@ EVENTS = {
 TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""
 
-NANO = 1e-9
 SMOOTHING = 0.05  # weight of the newest interval in the running mean
 PENDING = 4096  # most samples that wait for a stroke
 SHAPE_PERIOD = 100_000_000  # ns of one slot; one shape is given in each, 10 a second
@@ -75,6 +75,11 @@ class _Run:
     memory: PredictionBuffer = field(default_factory=PredictionBuffer)
     plausible: StrokeCheck = field(default_factory=StrokeCheck)
     prediction: Prediction | None = None
+
+    @property
+    def estimate(self) -> Array | None:
+        """Strokes (m) as estimated at the newest sample, shape (n,); None before the first one."""
+        return None if self.prediction is None else self.prediction.strokes
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
@@ -98,6 +103,8 @@ class Twin:
         `boom_twin.estimation.sensor_model.Mounting`.
     baseline : Baseline, optional
         What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
+    on_block : callable, optional
+        Is told every linear problem that health is judged by; a baseline is learnt from them.
 
     Attributes
     ----------
@@ -123,7 +130,9 @@ class Twin:
         settings: Settings | None = None,
         mounts: Sequence[Mount | None] = (),
         baseline: Baseline | None = None,
+        on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
+        self._on_block = on_block
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
@@ -186,7 +195,9 @@ class Twin:
         scene = loaded(self.scene, *self.settings.load)
         self._boom, self._valid = BoomPredictor(scene, self.settings), SHARE * scene.reach
         self.plan = self._boom.plan
-        self.judge = None if self.baseline is None else HealthMonitor(scene, self.settings, self.mounts, self.baseline)
+        self.judge = None
+        if self.baseline is not None:
+            self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
         self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -263,7 +274,8 @@ class Twin:
             return self._follow(sample, values, complete, [])
         span = sample.stamp - run.newest
         if line.is_next(sample.stamp) and span >= SHORTEST:
-            if run.plausible.is_of_others(sample.stamp - run.epoch, values, self.settings):
+            estimate = run.estimate
+            if estimate is not None and run.plausible.is_of_others(sample.stamp - run.epoch, values, estimate, self.settings):
                 self.counts["implausible"] += 1
                 return Report(sample.stamp, True, events=("implausible",))
             return self._follow(sample, values, complete, [])
@@ -410,7 +422,7 @@ class Twin:
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
         self._lines[Stream.STROKES].take(sample.stamp)
-        values, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, self.settings)
+        values, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, run.estimate, self.settings)
         events += oddities
         status = self._boom.step((sample.stamp - run.epoch) * NANO, values)
         if status != OK:
@@ -421,7 +433,7 @@ class Twin:
         run.interval += SMOOTHING * (span - run.interval) if run.interval else span
         before, run.newest, run.slot, run.strokes = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD, sample.values
         prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
-        run.plausible.estimate, run.prediction = prediction.strokes, prediction
+        run.prediction = prediction
         self._remember(run, prediction)
         if math.hypot(*prediction.tip_displacement.tolist()) > self._valid:
             events.append("deflected")

@@ -28,9 +28,7 @@ def resting(scene, posture, longer=0.0):
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
-    found = taken_apart(plan, first_row(plan, state)[None])
-    offsets = found.pins[0, :, 0] + 1j * found.pins[0, :, 1]
-    sizes = found.pins[0, :, 2]
-    return Resting(
-        complex(*found.tip[0, 0, :2]), found.joints[0], found.cylinder_forces[0], offsets, sizes * offsets / np.abs(offsets)
-    )
+    found = taken_apart(plan, first_row(plan, state))
+    offsets = found.pins[:, 0] + 1j * found.pins[:, 1]
+    sizes = found.pins[:, 2]
+    return Resting(complex(*found.tip[0, :2]), found.joints, found.cylinder_forces, offsets, sizes * offsets / np.abs(offsets))

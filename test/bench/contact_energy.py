@@ -21,7 +21,7 @@ from boom_twin.analysis.drive import PASSES, TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.compiler.plan import row_width
+from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.elements.pin_contact import LOST
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.transfer.time_step import run
@@ -81,7 +81,7 @@ class Closed:
         return worst / self.first, self.energy() / self.first, int(self.state.contacts[:, LOST].sum())
 
     def _run(self, drives, rates):
-        out, count = np.zeros((1, row_width(self.plan))), np.array([len(drives)])
+        out, count = np.zeros((1, width_of(self.plan))), np.array([len(drives)])
         status, *_ = run(
             self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, GENERALISED_ALPHA, RHO,
             TOLERANCE, PASSES, None, out,

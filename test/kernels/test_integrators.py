@@ -64,9 +64,9 @@ def test_a_step_satisfies_the_defining_equations(rho):
 
 def stepped(scheme, history, new):
     """Take positions `new`; returns them."""
-    hat, offset = np.zeros(len(new)), np.zeros(len(new))
+    hat, offset, v, a = np.zeros((4, len(new)))
     start_step(scheme, history, hat, offset)
-    finish_step(scheme, new, hat, offset, history)
+    finish_step(scheme, new, hat, offset, v, a, history)
     return new
 
 
@@ -112,11 +112,11 @@ def oscillator(family, parameter, step, omega=6.0, zeta=0.05, duration=1.0):
     s = scheme_of(family, parameter, step)
     exact = np.array([solution(-2 * step), solution(-step), solution(0.0)])
     history = np.append(exact[:, :2].ravel(), [exact[-1, 2], exact[-1, 2]])[-depth_of(family) :, None]
-    hat, offset = np.zeros(1), np.zeros(1)
+    hat, offset, v, a = np.zeros((4, 1))
     for _ in range(round(duration / step)):
         start_step(s, history, hat, offset)
         right = s.gain * hat - 2 * zeta * omega * offset
-        finish_step(s, right / (s.gain + 2 * zeta * omega * s.rate + omega**2), hat, offset, history)
+        finish_step(s, right / (s.gain + 2 * zeta * omega * s.rate + omega**2), hat, offset, v, a, history)
     return history[[X, V, A], 0]
 
 
@@ -142,11 +142,11 @@ def test_newmark_with_numerical_damping_is_of_first_order():
 @pytest.mark.parametrize("rho", [0.3, 0.8])
 def test_spectral_radius_at_high_frequency(rho):
     s = scheme_of(GENERALISED_ALPHA, rho, 1.0)
-    hat, offset, omega, norms = np.zeros(1), np.zeros(1), 1e6, []
+    (hat, offset, v, a), omega, norms = np.zeros((4, 1)), 1e6, []
     history = np.array([[1.0], [0.0], [-(omega**2)], [-(omega**2)]])
     for _ in range(60):
         start_step(s, history, hat, offset)
-        finish_step(s, s.gain * hat / (s.gain + omega**2), hat, offset, history)
+        finish_step(s, s.gain * hat / (s.gain + omega**2), hat, offset, v, a, history)
         norms.append(abs(history[P, 0]))
     assert (norms[-1] / norms[-21]) ** (1 / 20) == pytest.approx(rho, rel=0.2)
     assert norms[-1] < norms[-21]

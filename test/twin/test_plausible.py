@@ -16,13 +16,13 @@ class Run:
     """Readings every 5 ms; the estimate is the last that was taken, as the model's own nearly is."""
 
     def __init__(self) -> None:
-        self.plausible, self.stamp = StrokeCheck(), 0
+        self.plausible, self.stamp, self.estimate = StrokeCheck(), 0, None
         self.take(0.3, 0.4)
 
     def take(self, *values: float):
-        taken, events = self.plausible.of(self.stamp, np.array(values), SETTINGS)
-        estimate = taken if self.plausible.estimate is None else np.where(np.isnan(taken), self.plausible.estimate, taken)
-        self.plausible.estimate, self.stamp = estimate, self.stamp + 5 * MS
+        taken, events = self.plausible.of(self.stamp, np.array(values), self.estimate, SETTINGS)
+        self.estimate = taken if self.estimate is None else np.where(np.isnan(taken), self.estimate, taken)
+        self.stamp += 5 * MS
         return taken.tolist(), events
 
 

@@ -11,14 +11,13 @@ import numpy as np
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...scene.schema import Scene
-from ...types import Array, Mount, Prediction, Residuals, Stream
+from ...types import NANO, Array, Mount, Prediction, Residuals, Stream
 from .fault_catalogue import Form, Parameter
 from .innovation_filter import ModalStates, modes_of
 from .sensitivities import Signature, Signatures
 
 BLOCK = 100_000_000  # ns
 GRACE = 100_000_000  # ns that a block waits for late samples
-NANO = 1e-9
 
 
 @dataclass(slots=True)

@@ -28,8 +28,8 @@ import numpy as np
 
 from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
-from ...estimation.sensor_model import Reading
-from ...kernels.tables import State, Work
+from ...estimation.sensor_model import Reading, specific_force
+from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
 
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
@@ -104,11 +104,11 @@ def oscillation(omega: float, decay: float, h: float) -> Array:
 def _shown(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> Array:
     """How the sensors read a unit of a mode's coordinate, shape (n + 2,): angles, and the IMU's axes with the acceleration."""
     n, omega = plan.joints, 2.0 * math.pi * mode.frequency
-    angle = float(state.frames[-1, 2])
+    angle = float(state.frames[-1, FRAME_ANGLE])
     shown = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
     ax, ay = -omega * omega * mode.motion[plan.tables.tip : plan.tables.tip + 2]
     c, s = math.cos(angle), math.sin(angle)
-    shown[n:] += np.array([c * ax + s * ay, c * ay - s * ax])
+    shown[n:] += np.array(specific_force(ax, ay, c, s))
     return shown
 
 

@@ -17,7 +17,10 @@ import numpy as np
 
 from ..jit import inner
 
-BARREL, ROD = 0, 1
+BARREL, ROD = 0, 1  # what a part belongs to
+
+# Places of the ends' x in the cylinder's own system (x_C, y_C, x_R, y_R, N) and among `State.pins`; that of N.
+END_C, END_R, AXIAL = 0, 2, 4
 
 CYLINDER = np.dtype(
     [
@@ -108,16 +111,17 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
         d_nn += (part.inertia * motion.gain - f_e) / (length * length)
         d_en -= (f_n + torque) / (length * length)
     gx, gy = force * ex + d_n * nx, force * ey + d_n * ny
-    g[0], g[1], g[2], g[3] = gcx - gx, gcy - gy, grx + gx, gry + gy
-    _fill(h, 0, 0, ex, ey, cc_ee, d_en, cc_nn + d_nn)
-    _fill(h, 2, 2, ex, ey, rr_ee, d_en, rr_nn + d_nn)
-    _fill(h, 0, 2, ex, ey, 0.0, -d_en, cr_nn - d_nn)
-    _fill(h, 2, 0, ex, ey, 0.0, -d_en, cr_nn - d_nn)
+    g[END_C], g[END_C + 1], g[END_R], g[END_R + 1] = gcx - gx, gcy - gy, grx + gx, gry + gy
+    _fill(h, END_C, END_C, ex, ey, cc_ee, d_en, cc_nn + d_nn)
+    _fill(h, END_R, END_R, ex, ey, rr_ee, d_en, rr_nn + d_nn)
+    _fill(h, END_C, END_R, ex, ey, 0.0, -d_en, cr_nn - d_nn)
+    _fill(h, END_R, END_C, ex, ey, 0.0, -d_en, cr_nn - d_nn)
     lead = 1.0 + row.lag * motion.rate
     speed = motion.rate * length + motion.offset[row.history] - drive_rate
-    g[4] = (length - drive + row.lag * speed - row.compliance * force) / lead
-    h[4, 0], h[4, 1], h[4, 2], h[4, 3], h[4, 4] = -ex, -ey, ex, ey, -row.compliance / lead
-    h[0, 4], h[1, 4], h[2, 4], h[3, 4] = -ex, -ey, ex, ey
+    g[AXIAL] = (length - drive + row.lag * speed - row.compliance * force) / lead
+    h[AXIAL, END_C], h[AXIAL, END_C + 1], h[AXIAL, END_R], h[AXIAL, END_R + 1] = -ex, -ey, ex, ey
+    h[END_C, AXIAL], h[END_C + 1, AXIAL], h[END_R, AXIAL], h[END_R + 1, AXIAL] = -ex, -ey, ex, ey
+    h[AXIAL, AXIAL] = -row.compliance / lead
 
 
 @inner

@@ -38,7 +38,11 @@ LEAST_SHARE = 0.01  # of the elastic force, however fast the journal leaves
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
 # Places of pins; typed, because numba compiles once more for every literal.
-PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD, BARREL = map(np.int64, range(6))
+PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64, range(6))
+
+# Columns of `Work.hold`, as `bearing` gives them: force, its tangent by the offset (K_XX, K_XY, K_YY), torque of friction, its
+# derivatives by the offset and by the turning.
+HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, TORQUE, TORQUE_X, TORQUE_Y, TORQUE_TURN, HOLD_COLUMNS = range(10)
 
 CLEARANCE = np.dtype(
     [

@@ -14,23 +14,42 @@ import math
 
 import numpy as np
 
+from ..elements.cylinder import AXIAL, END_C, END_R
 from ..elements.pin_contact import (
-    BARREL,
+    BARREL_END_PIN,
     CLOSED,
+    HOLD_X,
+    HOLD_Y,
+    K_XX,
+    K_XY,
+    K_YY,
     LEAST_GAP,
     LINK_L_PIN,
     LINK_R_PIN,
     NEAR,
     PIVOT,
     Q_PIN,
-    ROD,
+    ROD_END_PIN,
     SPRING,
+    TORQUE,
+    TORQUE_TURN,
+    TORQUE_X,
     bearing,
     limited,
     remember,
 )
 from ..integrators import A, V
 from ..jit import inner
+from ..tables import (
+    HEAD_TURN,
+    LINK_L_TURN,
+    SECTION_TURN,
+    Z_FORCE_B,
+    Z_LAMBDA,
+    Z_LINK_L,
+    Z_LINK_R,
+    Z_OFFSETS_B,
+)
 
 ALLOWED = 1e-3  # of the clearance, or of the least one in K: error of a sub-step in an offset
 SIXTH = 1.0 / 6.0
@@ -75,30 +94,30 @@ def load_pins(t, state, work, motion):
 def axis_of(t, state, row):
     """First axis of what a linearised pin is fixed to: the cylinder, or the body with the bush."""
     turns = state.turns[row.owner]
-    if row.place >= ROD:
+    if row.place >= ROD_END_PIN:
         pins = state.pins[row.owner]
-        dx, dy = pins[2] - pins[0], pins[3] - pins[1]
+        dx, dy = pins[END_R] - pins[END_C], pins[END_R + 1] - pins[END_C + 1]
         length = math.hypot(dx, dy)
         return dx / length, dy / length
     if row.place == LINK_R_PIN:
-        return turns[2], turns[3]
+        return turns[SECTION_TURN], turns[SECTION_TURN + 1]
     if row.place == Q_PIN:
-        return turns[4], turns[5]
+        return turns[LINK_L_TURN], turns[LINK_L_TURN + 1]
     if row.owner == 0:
         return 1.0, 0.0
-    return turns[0], turns[1]
+    return turns[HEAD_TURN], turns[HEAD_TURN + 1]
 
 
 @inner
 def add_turning(hold, h, at, journal, bush):
     """Tangent of friction's torque between two bodies, whose angles stand at `journal` and `bush`, the offset at `at`."""
     low, high = min(journal, bush), max(journal, bush)
-    h[journal, journal] += hold[8]
-    h[bush, bush] += hold[8]
-    h[high, low] -= hold[8]
+    h[journal, journal] += hold[TORQUE_TURN]
+    h[bush, bush] += hold[TORQUE_TURN]
+    h[high, low] -= hold[TORQUE_TURN]
     for i in range(2):
-        h[at + i, journal] += hold[6 + i]
-        h[at + i, bush] -= hold[6 + i]
+        h[at + i, journal] += hold[TORQUE_X + i]
+        h[at + i, bush] -= hold[TORQUE_X + i]
 
 
 @inner
@@ -106,31 +125,41 @@ def torque_of(t, work, owner, place):
     """Torque (N m) with which friction holds the journal of the pin `place`; zero without."""
     for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
         if t.clearances[k].place == place:
-            return work.hold[k, 5]
+            return work.hold[k, TORQUE]
     return 0.0
 
 
 @inner
 def end_of(row):
     """First place of an end's coordinates among (C, R, N)."""
-    return 0 if row.place == BARREL else 2
+    return END_C if row.place == BARREL_END_PIN else END_R
 
 
 @inner
 def condense_ends(t, state, work, cylinder, g, h):
-    """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h)."""
+    """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h).
+
+    (g, h) is written for the ends y = (C, R, N), and an end is its pin plus delta. So what `g` and `h` say of that end e holds
+    for delta too, to which the pin adds its force f and tangent K:
+
+        (H_ee + K) ddelta + H_ey dy + g_e + f = 0,    y now with the pin in place of the end.
+
+    Hence ddelta = -free - gains dy, free = (H_ee + K)^-1 (g_e + f), gains = (H_ee + K)^-1 H_ey, and what is left for y is
+    g - H_ye free and H - H_ye gains, as in `six_bar`. A second end is condensed from what the first one left, where the first
+    is a pin and the second still an end; `move_ends` therefore goes back from the last to the first.
+    """
     torque = 0.0
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
-        torque += work.hold[k, 5]
+        torque += work.hold[k, TORQUE]
     if torque != 0.0:
         _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         at, hold, block, gains, free = end_of(t.clearances[k]), work.hold[k], work.ends[k], work.end_gains[k], work.end_free[k]
-        block[0, 0], block[0, 1] = h[at, at] + hold[2], h[at, at + 1] + hold[3]
-        block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[4]
+        block[0, 0], block[0, 1] = h[at, at] + hold[K_XX], h[at, at + 1] + hold[K_XY]
+        block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[K_YY]
         share = 1.0 / (block[0, 0] * block[1, 1] - block[0, 1] * block[0, 1])
         xx, xy, yy = share * block[1, 1], -share * block[0, 1], share * block[0, 0]
-        gx, gy = g[at] + hold[0], g[at + 1] + hold[1]
+        gx, gy = g[at] + hold[HOLD_X], g[at + 1] + hold[HOLD_Y]
         free[0], free[1] = xx * gx + xy * gy, xy * gx + yy * gy
         for j in range(5):
             gains[0, j], gains[1, j] = xx * h[at, j] + xy * h[at + 1, j], xy * h[at, j] + yy * h[at + 1, j]
@@ -143,13 +172,18 @@ def condense_ends(t, state, work, cylinder, g, h):
 
 @inner
 def _turn_back(g, h, force):
-    """Friction's torque on a cylinder, as a couple of forces (N) on its ends; the derivative of its law by R has its axis."""
-    share = force / math.hypot(h[4, 2], h[4, 3])
-    ex, ey = share * h[4, 2], share * h[4, 3]
-    g[0] += ey
-    g[1] -= ex
-    g[2] -= ey
-    g[3] += ex
+    """Friction's torque on a cylinder, as a couple of forces (N) on its ends, `force` = torque over length.
+
+    The torque M works on the cylinder's angle gamma. With e the axis, n = (-e_y, e_x) and d = R - C of length l,
+    dgamma = n.(dR - dC)/l, so the gradient by R is M/l n, and by C its opposite. The axis is read from the row of the
+    cylinder's law: its derivative by R is e over a positive number, which the norm takes out. Its tangent is left out.
+    """
+    share = force / math.hypot(h[AXIAL, END_R], h[AXIAL, END_R + 1])
+    ex, ey = share * h[AXIAL, END_R], share * h[AXIAL, END_R + 1]
+    g[END_C] += ey
+    g[END_C + 1] -= ex
+    g[END_R] -= ey
+    g[END_R + 1] += ex
 
 
 @inner
@@ -160,7 +194,7 @@ def move_ends(t, work, cylinder, cx, cy, rx, ry, force):
         dx = -free[0] - gains[0, 0] * cx - gains[0, 1] * cy - gains[0, 2] * rx - gains[0, 3] * ry - gains[0, 4] * force
         dy = -free[1] - gains[1, 0] * cx - gains[1, 1] * cy - gains[1, 2] * rx - gains[1, 3] * ry - gains[1, 4] * force
         work.dz[row.z], work.dz[row.z + 1] = dx, dy
-        if row.place == BARREL:
+        if row.place == BARREL_END_PIN:
             cx, cy = cx + dx, cy + dy
         else:
             rx, ry = rx + dx, ry + dy
@@ -183,7 +217,7 @@ def note_contacts(t, state, work):
     for k in range(t.clearances.shape[0]):
         row, hold = t.clearances[k], work.hold[k]
         x, y = state.z[row.z], state.z[row.z + 1]
-        remember(row, state.contacts[k], x, y, before[row.z], before[row.z + 1], hold[0], hold[1])
+        remember(row, state.contacts[k], x, y, before[row.z], before[row.z + 1], hold[HOLD_X], hold[HOLD_Y])
 
 
 @inner
@@ -216,20 +250,22 @@ def coarseness(t, state, work, scheme):
 def unstiffened(t, work, k, ax, ay):
     """(M A + K)^-1 M A times (ax, ay), with the tangents of the last pass for pin `k`."""
     row, hold = t.clearances[k], work.hold[k]
-    if row.place >= ROD:
+    if row.place >= ROD_END_PIN:
         xx, xy, yy = work.ends[k, 0, 0], work.ends[k, 0, 1], work.ends[k, 1, 1]
     else:
         block, at = work.blocks[row.owner], row.z - t.joints[row.owner].z
         xx, xy, yy = block[at, at], block[at + 1, at], block[at + 1, at + 1]
-    fx = (xx - hold[2]) * ax + (xy - hold[3]) * ay
-    fy = (xy - hold[3]) * ax + (yy - hold[4]) * ay
+    fx = (xx - hold[K_XX]) * ax + (xy - hold[K_XY]) * ay
+    fy = (xy - hold[K_XY]) * ax + (yy - hold[K_YY]) * ay
     share = 1.0 / (xx * yy - xy * xy)
     return share * (yy * fx - xy * fy), share * (xx * fy - xy * fx)
 
 
 # places in the loop's system: pivot x, y; turn of the head; pin C x, y | section, links, lambda, N
-HEAD, PIN_C, SECTION, ALPHA_L, ALPHA_R, LAMBDA, FORCE, SIZE = 2, 3, 5, 6, 7, 8, 10, 11
-INNER = np.int64(6)  # typed, because numba compiles once more for every literal
+HEAD, PIN_C, SECTION = 2, 3, 5  # from SECTION on in the order of the joint's unknowns
+ALPHA_L, ALPHA_R, LAMBDA = SECTION + Z_LINK_L, SECTION + Z_LINK_R, SECTION + Z_LAMBDA
+FORCE, SIZE = SECTION + Z_FORCE_B, SECTION + Z_OFFSETS_B
+INNER = np.int64(Z_OFFSETS_B)  # typed, because numba compiles once more for every literal
 
 
 @inner
@@ -251,7 +287,7 @@ def take_rows(t, work, joint, place, size, g, h):
             continue
         at, hold = SIZE + 2 * k, work.hold[row]
         for i in range(2):
-            g[at + i] += g[i] - apart[i, size] + hold[i]
+            g[at + i] += g[i] - apart[i, size] + hold[HOLD_X + i]
             for j in range(size):
                 value = h[max(i, j), min(i, j)] - apart[i, j]
                 if j < at:
@@ -259,13 +295,13 @@ def take_rows(t, work, joint, place, size, g, h):
                 elif j > at + 1:
                     h[j, at + i] += value
             for j in range(i + 1):
-                h[at + i, at + j] += h[i, j] - apart[i, j] + hold[2 + i + j]
+                h[at + i, at + j] += h[i, j] - apart[i, j] + hold[K_XX + i + j]
 
 
 @inner
 def free_pins(t, state, work, joint, g, h):
     """Closure of pin Q with all offsets, the force of pin Q's own, and friction in all four pins."""
-    lx, ly = state.z[joint.z + 3], state.z[joint.z + 4]
+    lx, ly = state.z[joint.z + Z_LAMBDA], state.z[joint.z + Z_LAMBDA + 1]
     for k in range(joint.clearances):
         row = joint.first_clearance + k
         place, hold, at = t.clearances[row].place, work.hold[row], SIZE + 2 * k
@@ -279,11 +315,11 @@ def free_pins(t, state, work, joint, g, h):
         h[at + 1, LAMBDA + 1] += sign
         if place == Q_PIN:
             for i in range(2):
-                g[at + i] += hold[i]
+                g[at + i] += hold[HOLD_X + i]
                 for j in range(i + 1):
-                    h[at + i, at + j] += hold[2 + i + j]
+                    h[at + i, at + j] += hold[K_XX + i + j]
         journal = SECTION if place == PIVOT else ALPHA_L if place == LINK_L_PIN else ALPHA_R
         bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
-        g[journal] += hold[5]
-        g[bush] -= hold[5]
+        g[journal] += hold[TORQUE]
+        g[bush] -= hold[TORQUE]
         add_turning(hold, h, at, journal, bush)

@@ -5,13 +5,33 @@ from __future__ import annotations
 import math
 
 from ..elements.beam import USUAL, Sizes, beam_shape, is_usual, place_beam
-from ..elements.cylinder import near, place_cylinder
+from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
-from ..elements.pin_contact import BARREL, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
+from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..integrators import X
 from ..jit import inner, kernel
 from ..plane_algebra import rotated
-from ..tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from ..tables import (
+    BEAM,
+    BODY,
+    FRAME_ANGLE,
+    FRAME_COS,
+    FRAME_SIN,
+    FRAME_X,
+    FRAME_Y,
+    HEAD_TURN,
+    JOINT_A,
+    JOINT_B,
+    LINK_L_TURN,
+    LINK_R_TURN,
+    OFFSET,
+    ROD_PIN,
+    SECTION_TURN,
+    STATION,
+    Z_LINK_L,
+    Z_LINK_R,
+    Z_SECTION,
+)
 from .clearance_pins import offset_of, set_turn
 
 
@@ -19,10 +39,10 @@ from .clearance_pins import offset_of, set_turn
 def link_frame(side, linkage, turns):
     """Pin on the body (from the pivot), and cosine and sine, of link L (pin D on the head) or R (pin E on the section)."""
     if side == LINK_L:
-        x, y = rotated(turns[0], turns[1], linkage.dx, linkage.dy)
-        return x, y, turns[4], turns[5]
-    x, y = rotated(turns[2], turns[3], linkage.ex, linkage.ey)
-    return x, y, turns[6], turns[7]
+        x, y = rotated(turns[HEAD_TURN], turns[HEAD_TURN + 1], linkage.dx, linkage.dy)
+        return x, y, turns[LINK_L_TURN], turns[LINK_L_TURN + 1]
+    x, y = rotated(turns[SECTION_TURN], turns[SECTION_TURN + 1], linkage.ex, linkage.ey)
+    return x, y, turns[LINK_R_TURN], turns[LINK_R_TURN + 1]
 
 
 @inner
@@ -40,48 +60,56 @@ def origin_of(t, z, joint, side, x, y):
 def place_linkage(t, state, work, index, x, y, theta, c, s):
     """Links and cylinder of joint B `index` (row of all joint tables); its pivot on the head is (x, y), turned by theta."""
     joint, linkage, z, turns = t.joints[index], t.linkages[index], state.z, state.turns[index]
-    turns[0], turns[1] = c, s
-    for k in range(3):
-        turns[2 + 2 * k], turns[3 + 2 * k] = math.cos(z[joint.z + k]), math.sin(z[joint.z + k])
+    section, left, right = z[joint.z + Z_SECTION], z[joint.z + Z_LINK_L], z[joint.z + Z_LINK_R]
+    turns[HEAD_TURN], turns[HEAD_TURN + 1] = c, s
+    turns[SECTION_TURN], turns[SECTION_TURN + 1] = math.cos(section), math.sin(section)
+    turns[LINK_L_TURN], turns[LINK_L_TURN + 1] = math.cos(left), math.sin(left)
+    turns[LINK_R_TURN], turns[LINK_R_TURN + 1] = math.cos(right), math.sin(right)
     for k in range(joint.first_link, joint.first_link + joint.links):
         link = t.links[k]
         bx, by, cl, sl = link_frame(link.side, linkage, turns)
         ox, oy = origin_of(t, z, joint, link.side, x, y)
         work.position[link.history] = ox + bx + link.middle * cl
         work.position[link.history + 1] = oy + by + link.middle * sl
-        work.position[link.history + 2] = z[joint.z + 1 + (link.side != LINK_L)]
+        work.position[link.history + 2] = left if link.side == LINK_L else right
     bx, by, cl, sl = link_frame(linkage.mount, linkage, turns)
     wx, wy = rotated(cl, sl, linkage.along, linkage.left)
     ox, oy = origin_of(t, z, joint, linkage.mount, x, y)
-    place_rod(t, state, work, index, ox + bx + wx, oy + by + wy, z[joint.z + 1 + (linkage.mount != LINK_L)])
-    set_turn(t, work, joint, PIVOT, z[joint.z] - theta)
-    set_turn(t, work, joint, LINK_L_PIN, z[joint.z + 1] - theta)
-    set_turn(t, work, joint, LINK_R_PIN, z[joint.z + 2] - z[joint.z])
-    set_turn(t, work, joint, Q_PIN, z[joint.z + 2] - z[joint.z + 1])
+    place_rod(t, state, work, index, ox + bx + wx, oy + by + wy, left if linkage.mount == LINK_L else right)
+    set_turn(t, work, joint, PIVOT, section - theta)
+    set_turn(t, work, joint, LINK_L_PIN, left - theta)
+    set_turn(t, work, joint, LINK_R_PIN, right - section)
+    set_turn(t, work, joint, Q_PIN, right - left)
 
 
 @inner
 def place_barrel(t, state, work, index, x, y, theta):
     """End C of cylinder `index`, whose pin is (x, y) on a body turned by theta."""
     cylinder, pins = t.cylinders[index], state.pins[index]
-    dx, dy = offset_of(t, state.z, cylinder, BARREL)
-    pins[0], pins[1] = x + dx, y + dy
-    set_turn(t, work, cylinder, BARREL, -theta)
+    dx, dy = offset_of(t, state.z, cylinder, BARREL_END_PIN)
+    pins[END_C], pins[END_C + 1] = x + dx, y + dy
+    set_turn(t, work, cylinder, BARREL_END_PIN, -theta)
 
 
 @inner
 def place_rod(t, state, work, index, x, y, theta):
     """End R of cylinder `index`, whose pin is (x, y) on a body turned by theta, and with it the whole cylinder."""
     cylinder, pins = t.cylinders[index], state.pins[index]
-    dx, dy = offset_of(t, state.z, cylinder, ROD)
-    pins[2], pins[3] = x + dx, y + dy
-    place_cylinder(cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], work.position)
+    dx, dy = offset_of(t, state.z, cylinder, ROD_END_PIN)
+    pins[END_R], pins[END_R + 1] = x + dx, y + dy
+    place_cylinder(cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], work.position)
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         row = t.clearances[k]
         if row.friction > 0.0:
-            bush = theta if row.place == ROD else -work.position[row.turn]
-            angle = math.atan2(pins[3] - pins[1], pins[2] - pins[0])
+            bush = theta if row.place == ROD_END_PIN else -work.position[row.turn]
+            angle = math.atan2(pins[END_R + 1] - pins[END_C + 1], pins[END_R] - pins[END_C])
             work.position[row.turn] = near(angle - bush, state.history[X, row.turn])
+
+
+@inner
+def put_frame(frame, x, y, theta, c, s):
+    """Write a row of `State.frames`."""
+    frame[FRAME_X], frame[FRAME_Y], frame[FRAME_ANGLE], frame[FRAME_COS], frame[FRAME_SIN] = x, y, theta, c, s
 
 
 @kernel
@@ -93,7 +121,7 @@ def place(t, state, work):
     x, y, theta, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
     for k in range(t.operations.shape[0]):
         kind, row = t.operations[k].kind, t.operations[k].row
-        frames[k, 0], frames[k, 1], frames[k, 2], frames[k, 3], frames[k, 4] = x, y, theta, c, s
+        put_frame(frames[k], x, y, theta, c, s)
         if kind == BEAM:
             beam, rho = t.beams[row], work.rho[row]
             if is_usual(beam):
@@ -125,14 +153,15 @@ def place(t, state, work):
         elif kind == JOINT_B:
             place_linkage(t, state, work, row, x, y, theta, c, s)
             dx, dy = offset_of(t, z, t.joints[row], PIVOT)
-            x, y, theta, c, s = x + dx, y + dy, z[t.joints[row].z], state.turns[row, 2], state.turns[row, 3]
+            x, y, theta = x + dx, y + dy, z[t.joints[row].z + Z_SECTION]
+            c, s = state.turns[row, SECTION_TURN], state.turns[row, SECTION_TURN + 1]
         elif kind == JOINT_A:
             joint = t.joints[row]
             dx, dy = offset_of(t, z, joint, PIVOT)
-            x, y, theta = joint.x + dx, joint.y + dy, z[joint.z]
+            x, y, theta = joint.x + dx, joint.y + dy, z[joint.z + Z_SECTION]
             c, s = math.cos(theta), math.sin(theta)
             set_turn(t, work, joint, PIVOT, theta)
             place_barrel(t, state, work, row, joint.x + t.linkages[row].cx, joint.y + t.linkages[row].cy, 0.0)
     last = t.operations.shape[0]
-    frames[last, 0], frames[last, 1], frames[last, 2], frames[last, 3], frames[last, 4] = x, y, theta, c, s
+    put_frame(frames[last], x, y, theta, c, s)
     position[t.tip], position[t.tip + 1], position[t.tip + 2] = x, y, theta

@@ -19,7 +19,7 @@ import numpy as np
 from ...types import Array
 from ..jit import inner
 from ..plane_algebra import solve
-from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Tables
+from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Z_FORCE_A, Tables
 from .riccati_sweep import clear_cut, sweep_in, sweep_out
 
 LOST = 1e-6  # force left at the free tip over the largest in the boom, at which a pass counts as lost
@@ -177,7 +177,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
 def multiply_out(t, state, work, product):
     """Every cut from the one before it, and the increments inside the units."""
     bounds, force, z, cut = product.bounds, product.force, product.z, work.cut
-    largest = abs(state.z[t.joints[0].z + 1])
+    largest = abs(state.z[t.joints[0].z + Z_FORCE_A])
     for k in range(1, force.shape[0]):
         u, new = product.u[k], product.other[0]
         for i in range(6):

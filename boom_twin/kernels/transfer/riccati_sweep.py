@@ -5,10 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from ..elements.beam import USUAL, Sizes, is_usual, transfer_beam
-from ..elements.pin_contact import BARREL
+from ..elements.pin_contact import BARREL_END_PIN
 from ..elements.rigid_body import add_body, merge_outlet, pull_back
 from ..jit import inner, kernel
-from ..tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, OK, ROD_PIN, SINGULAR, STATION
+from ..tables import (
+    BEAM,
+    BODY,
+    FRAME_COS,
+    FRAME_SIN,
+    JOINT_A,
+    JOINT_B,
+    OFFSET,
+    OK,
+    ROD_PIN,
+    SINGULAR,
+    STATION,
+    Z_FORCE_A,
+    Z_SECTION,
+)
 from .clearance_pins import move_ends, torque_of
 from .six_bar import close_loop, open_loop
 from .slider_crank import close_base, join_rod
@@ -60,6 +74,9 @@ def clear_cut(work, m):
 def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
     """Carry the cut in `work`, m slots wide, from the end of operation `last - 1` inwards through operation `first`.
 
+    Besides the cut it writes what others read after it: gains and free parts for `sweep_out`; what joints and ends of cylinders
+    condensed (`Work.blocks`, `Work.ends`) for `clearance_pins.coarseness` and for counting natural frequencies.
+
     Returns
     -------
     status, negative, m : int
@@ -67,7 +84,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
-        kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, 3], state.frames[k, 4]
+        kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
         if kind == BEAM:
             count = beam_operation(t, state, work, motion, row, k, c, sn, m)
             if count < 0:
@@ -81,7 +98,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
             m = merge_outlet(s, p, m, c * bx - sn * by, sn * bx + c * by)
-            p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL)
+            p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:
             m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:
@@ -101,7 +118,7 @@ def sweep_out(t, state, work, first, last, m):
     """
     cut, dz = work.cut, work.dz
     for k in range(first, last):
-        kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, 3], state.frames[k, 4]
+        kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
         gains, free = work.gains[k], work.free[k]
         if kind == BEAM:
             out_beam(t.beams[row], t.psi[row], work.rho[row], work.drho[row], gains, free, c, sn, m, cut, dz)
@@ -124,10 +141,12 @@ def sweep_out(t, state, work, first, last, m):
             m = open_loop(t, state, work, row, gains, free, m)
         elif kind == JOINT_A:
             at = t.joints[row].z
-            dz[at], dz[at + 1], cut[0], cut[1] = -free[0], -free[1], 0.0, 0.0
+            for i in range(2 + 2 * t.joints[row].clearances):
+                dz[at + i] = -free[i]
+            cut[0], cut[1] = 0.0, 0.0
             if t.joints[row].clearances:
-                dz[at + 2], dz[at + 3], cut[0], cut[1] = -free[2], -free[3], -free[2], -free[3]
-            cut[2], cut[3] = dz[at], dz[at + 1]
+                cut[0], cut[1] = -free[2], -free[3]
+            cut[2], cut[3] = dz[at + Z_SECTION], dz[at + Z_FORCE_A]
             m = FREE + 1
 
 

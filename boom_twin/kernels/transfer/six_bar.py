@@ -14,11 +14,12 @@ Pivots and link pins with clearance: `kernels.transfer.clearance_pins`.
 
 from __future__ import annotations
 
-from ..elements.cylinder import cylinder_terms
+from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.linkage import LINK_L, LINK_R
-from ..elements.pin_contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD
+from ..elements.pin_contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..jit import inner
 from ..plane_algebra import rotated, solve
+from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_SECTION
 from .clearance_pins import (
     ALPHA_L,
     ALPHA_R,
@@ -63,7 +64,7 @@ def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
 @inner
 def _add_closure(joint, linkage, z, turns, g, h):
     """Closure of pin Q and the forces its multiplier puts on the four bodies."""
-    lx, ly = z[joint.z + 3], z[joint.z + 4]
+    lx, ly = z[joint.z + Z_LAMBDA], z[joint.z + Z_LAMBDA + 1]
     for side in range(2):
         sign = 1.0 - 2.0 * side
         bx, by, c, s = link_frame(LINK_L + side, linkage, turns)
@@ -110,8 +111,8 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     linkage, cylinder, pins = t.linkages[index], t.cylinders[index], state.pins[index]
     own_g, own_h = work.own_g, work.own_h
     cylinder_terms(
-        cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[index], drive_rate[index],
-        motion, t.gravity, work.position, own_g, own_h,
+        cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
+        drive[index], drive_rate[index], motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
     condense_ends(t, state, work, cylinder, own_g, own_h)
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
@@ -119,28 +120,31 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     base, link = SECTION, ALPHA_R
     if linkage.mount == LINK_L:
         base, link = HEAD, ALPHA_L
-    add_link_point(g, h, base, link, bx, by, wx, wy, own_g[2], own_g[3], own_h[2, 2], own_h[3, 2], own_h[3, 3])
+    add_link_point(
+        g, h, base, link, bx, by, wx, wy, own_g[END_R], own_g[END_R + 1],
+        own_h[END_R, END_R], own_h[END_R + 1, END_R], own_h[END_R + 1, END_R + 1],
+    )  # fmt: skip
     for j in range(2):  # pin C against the rod pin, and itself
-        g[PIN_C + j] += own_g[j]
-        h[PIN_C + j, 0] += own_h[2, j]
-        h[PIN_C + j, 1] += own_h[3, j]
-        turn = bx * own_h[3, j] - by * own_h[2, j]
+        g[PIN_C + j] += own_g[END_C + j]
+        h[PIN_C + j, 0] += own_h[END_R, END_C + j]
+        h[PIN_C + j, 1] += own_h[END_R + 1, END_C + j]
+        turn = bx * own_h[END_R + 1, END_C + j] - by * own_h[END_R, END_C + j]
         if base > PIN_C:
             h[base, PIN_C + j] += turn
         else:
             h[PIN_C + j, base] += turn
-        h[link, PIN_C + j] += wx * own_h[3, j] - wy * own_h[2, j]
+        h[link, PIN_C + j] += wx * own_h[END_R + 1, END_C + j] - wy * own_h[END_R, END_C + j]
         for i in range(j, 2):
-            h[PIN_C + i, PIN_C + j] += own_h[i, j]
-        h[FORCE, PIN_C + j] += own_h[4, j]
-    g[FORCE] += own_g[4]
-    h[FORCE, FORCE] += own_h[4, 4]
-    ex, ey = own_h[4, 2], own_h[4, 3]
+            h[PIN_C + i, PIN_C + j] += own_h[END_C + i, END_C + j]
+        h[FORCE, PIN_C + j] += own_h[AXIAL, END_C + j]
+    g[FORCE] += own_g[AXIAL]
+    h[FORCE, FORCE] += own_h[AXIAL, AXIAL]
+    ex, ey = own_h[AXIAL, END_R], own_h[AXIAL, END_R + 1]
     h[FORCE, 0] += ex
     h[FORCE, 1] += ey
     h[FORCE, base] += bx * ey - by * ex
     h[FORCE, link] += wx * ey - wy * ex
-    g[link] -= torque_of(t, work, cylinder, ROD)
+    g[link] -= torque_of(t, work, cylinder, ROD_END_PIN)
 
 
 @inner
@@ -191,23 +195,36 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
     take_rows(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, g, h)
     free_pins(t, state, work, joint, g, h)
-    return _condense_loop(work, index, operation, behind - 5, size)
+    return _condense_loop(work, index, operation, behind - SECTION, size)
 
 
 @inner
 def _condense_loop(work, index, operation, count, size):
-    """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten."""
+    """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten.
+
+    A Newton pass wants H d + g = 0. With the inner unknowns q and all others x,
+
+        H_qq dq + H_qx dx + g_q = 0,    H_xq dq + H_xx dx + g_x = 0.
+
+    The first gives dq = -free - gains dx, free = H_qq^-1 g_q, gains = H_qq^-1 H_qx; put into the second,
+
+        (H_xx - H_xq gains) dx + (g_x - H_xq free) = 0,
+
+    the new cut (S, p): S is the Schur complement of H_qq. H has as many negative eigenvalues as H_qq and S together
+    (Haynsworth 1968), so the blocks H_qq are kept for counting natural frequencies. Only the lower triangle of `h` is filled:
+    the five others before SECTION meet q in its rows, those behind it in its columns.
+    """
     s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
     block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - count
     for i in range(count):
-        for j in range(5):
-            right[i, j] = h[5 + i, j]
-        for j in range(5, others):
-            right[i, j] = h[j + count, 5 + i]
-        right[i, others] = g[5 + i]
+        for j in range(SECTION):
+            right[i, j] = h[SECTION + i, j]
+        for j in range(SECTION, others):
+            right[i, j] = h[j + count, SECTION + i]
+        right[i, others] = g[SECTION + i]
         for j in range(i + 1):
-            block[i, j], matrix[i, j] = h[5 + i, 5 + j], h[5 + i, 5 + j]
-            block[j, i], matrix[j, i] = h[5 + i, 5 + j], h[5 + i, 5 + j]
+            block[i, j] = matrix[i, j] = h[SECTION + i, SECTION + j]
+            block[j, i] = matrix[j, i] = h[SECTION + i, SECTION + j]
     if not solve(matrix, right, count, others + 1):
         return False
     for i in range(count):
@@ -215,12 +232,12 @@ def _condense_loop(work, index, operation, count, size):
             gains[i, j] = right[i, j]
         free[i] = right[i, others]
     for i in range(others):
-        a = i if i < 5 else i + count
+        a = i if i < SECTION else i + count
         p[i] = g[a]
         for j in range(i + 1):
-            s[i, j] = h[a, j if j < 5 else j + count]
+            s[i, j] = h[a, j if j < SECTION else j + count]
         for k in range(count):
-            coupling = h[5 + k, a] if a < 5 else h[a, 5 + k]
+            coupling = h[SECTION + k, a] if a < SECTION else h[a, SECTION + k]
             p[i] -= coupling * free[k]
             for j in range(i + 1):
                 s[i, j] -= coupling * gains[k, j]
@@ -244,8 +261,8 @@ def open_loop(t, state, work, index, gains, free, m):
         if t.clearances[joint.first_clearance + k].place == PIVOT:
             cut[0] += dz[joint.z + INNER + 2 * k]
             cut[1] += dz[joint.z + INNER + 2 * k + 1]
-    cut[2] = dz[joint.z]
-    for i in range(5, m):
+    cut[HEAD] = dz[joint.z + Z_SECTION]
+    for i in range(SECTION, m):
         cut[i - 2] = cut[i]
     return m - 2
 
@@ -256,13 +273,13 @@ def _move_cylinder(t, state, work, index):
     joint, linkage, cut, dz = t.joints[index], t.linkages[index], work.cut, work.dz
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
     wx, wy = rotated(c, s, linkage.along, linkage.left)
-    base, link = cut[2], dz[joint.z + 1]
+    base, link = cut[HEAD], dz[joint.z + Z_LINK_L]
     rx, ry = cut[0], cut[1]
     if linkage.mount != LINK_L:
-        base, link = dz[joint.z], dz[joint.z + 2]
+        base, link = dz[joint.z + Z_SECTION], dz[joint.z + Z_LINK_R]
     for k in range(joint.clearances):
         place, at = t.clearances[joint.first_clearance + k].place, joint.z + INNER + 2 * k
         if (place == LINK_L_PIN) == (linkage.mount == LINK_L) and place != Q_PIN:
             rx, ry = rx + dz[at], ry + dz[at + 1]
     rx, ry = rx - by * base - wy * link, ry + bx * base + wx * link
-    move_ends(t, work, t.cylinders[index], cut[3], cut[4], rx, ry, dz[joint.z + 5])
+    move_ends(t, work, t.cylinders[index], cut[PIN_C], cut[PIN_C + 1], rx, ry, dz[joint.z + Z_FORCE_B])

@@ -6,8 +6,8 @@ N are what is left to solve. The pivot does not move, or by the offset of its jo
 
 from __future__ import annotations
 
-from ..elements.cylinder import cylinder_terms
-from ..elements.pin_contact import ROD
+from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
+from ..elements.pin_contact import HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, ROD_END_PIN, TORQUE, TORQUE_TURN, TORQUE_X
 from ..jit import inner
 from ..plane_algebra import solve
 from .clearance_pins import condense_ends, torque_of
@@ -20,8 +20,8 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
     g, h = work.own_g, work.own_h
     cylinder_terms(
-        cylinder, t.parts, pins[0], pins[1], pins[2], pins[3], state.z[cylinder.z], drive[0], drive_rate[0],
-        motion, t.gravity, work.position, g, h,
+        cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
+        drive[0], drive_rate[0], motion, t.gravity, work.position, g, h,
     )  # fmt: skip
     condense_ends(t, state, work, cylinder, g, h)
     bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
@@ -29,22 +29,22 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
         s[m, i] = 0.0
         s[i, m] = 0.0
     for i in range(2):
-        p[i] += g[2 + i]
-        s[m, i] = h[4, 2 + i]
-        s[i, m] = h[4, 2 + i]
-    s[m, m], p[m] = h[4, 4], g[4]
-    turn_x = -by * h[2, 2] + bx * h[2, 3]  # row of the turning against x, y of the rod pin
-    turn_y = -by * h[3, 2] + bx * h[3, 3]
-    p[2] += bx * g[3] - by * g[2] - torque_of(t, work, cylinder, ROD)
+        p[i] += g[END_R + i]
+        s[m, i] = h[AXIAL, END_R + i]
+        s[i, m] = h[AXIAL, END_R + i]
+    s[m, m], p[m] = h[AXIAL, AXIAL], g[AXIAL]
+    turn_x = -by * h[END_R, END_R] + bx * h[END_R, END_R + 1]  # row of the turning against x, y of the rod pin
+    turn_y = -by * h[END_R + 1, END_R] + bx * h[END_R + 1, END_R + 1]
+    p[2] += bx * g[END_R + 1] - by * g[END_R] - torque_of(t, work, cylinder, ROD_END_PIN)
     for i in range(2):
         for j in range(2):
-            s[i, j] += h[2 + i, 2 + j]
+            s[i, j] += h[END_R + i, END_R + j]
     s[0, 2] += turn_x
     s[2, 0] += turn_x
     s[1, 2] += turn_y
     s[2, 1] += turn_y
-    s[2, 2] += bx * turn_y - by * turn_x - (bx * g[2] + by * g[3])
-    s[m, 2] = bx * h[4, 3] - by * h[4, 2]
+    s[2, 2] += bx * turn_y - by * turn_x - (bx * g[END_R] + by * g[END_R + 1])
+    s[m, 2] = bx * h[AXIAL, END_R + 1] - by * h[AXIAL, END_R]
     s[2, m] = s[m, 2]
     return m + 1
 
@@ -64,17 +64,17 @@ def close_base(t, work, operation):
             a[i, j] = s[of, 2 + j if j < 2 else j - 2]
     if joint.clearances:
         hold = work.hold[joint.first_clearance]
-        b[0, 0] += hold[5]
-        b[2, 0] += hold[0]
-        b[3, 0] += hold[1]
-        a[2, 2] += hold[2]
-        a[2, 3] += hold[3]
-        a[3, 2] += hold[3]
-        a[3, 3] += hold[4]
-        a[0, 0] += hold[8]
+        b[0, 0] += hold[TORQUE]
+        b[2, 0] += hold[HOLD_X]
+        b[3, 0] += hold[HOLD_Y]
+        a[2, 2] += hold[K_XX]
+        a[2, 3] += hold[K_XY]
+        a[3, 2] += hold[K_XY]
+        a[3, 3] += hold[K_YY]
+        a[0, 0] += hold[TORQUE_TURN]
         for i in range(2):
-            a[0, 2 + i] += hold[6 + i]
-            a[2 + i, 0] += hold[6 + i]
+            a[0, 2 + i] += hold[TORQUE_X + i]
+            a[2 + i, 0] += hold[TORQUE_X + i]
     for i in range(size):
         for j in range(size):
             work.blocks[0, i, j] = a[i, j]

@@ -9,7 +9,8 @@ import numpy as np
 from ..elements.pin_contact import CLOSED, bearing
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
-from ..tables import JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Motion, State, Tables, Work
+from ..result_row import results_in
+from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables, Work
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .matrix_product import plain_pass
@@ -85,7 +86,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         if status != OK:
             return status, total, size
         note_contacts(t, state, work)
-        finish_step(now, work.position, work.hat, work.offset, history)
+        finish_step(now, work.position, work.hat, work.offset, work.velocity, work.acceleration, history)
         done += part
         if error < EASY and part < TICKS and done % (2 * part) == 0:
             part *= 2
@@ -167,23 +168,25 @@ def add_increments(t, state, work, longest):
 
 @kernel
 def observe(t, state, out):
-    """Write one row of results: joint angles (n), cylinder forces (n), then x, v, a of tip x, y, theta (9)."""
+    """Write the instant in `state` into a row, shape (row_width or more,); see `kernels.result_row.Results`."""
     n, at = t.joints.shape[0], 0
+    found = results_in(out, n, t.clearances.shape[0])
     for k in range(t.operations.shape[0]):
         row = t.operations[k].row
         if t.operations[k].kind == JOINT_A or t.operations[k].kind == JOINT_B:
-            out[at] = state.z[t.joints[row].z] - state.frames[k, 2]
+            found.joints[at] = state.z[t.joints[row].z + Z_SECTION] - state.frames[k, FRAME_ANGLE]
             at += 1
     for i in range(n):
-        out[n + i] = state.z[t.cylinders[i].z]
+        found.cylinder_forces[i] = state.z[t.cylinders[i].z]
     for j in range(3):
-        out[2 * n + j], out[2 * n + 3 + j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
-        out[2 * n + 6 + j] = state.history[A, t.tip + j]
+        found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
+        found.tip[2, j] = state.history[A, t.tip + j]
+    observe_pins(t, state, found.pins)
 
 
 @inner
-def observe_pins(t, state, out, at):
-    """Write from place `at` on, for every pin with clearance: offset of its journal (2), force (N), 1 where it touches."""
+def observe_pins(t, state, out):
+    """Write for every pin with clearance, shape (pins, 4): offset of its journal (m), force (N), 1 where it touches."""
     v = state.history[V]
     for k in range(t.clearances.shape[0]):
         row, memory = t.clearances[k], state.contacts[k]
@@ -192,8 +195,7 @@ def observe_pins(t, state, out, at):
             turning = v[row.turn]
         ax, ay = axis_of(t, state, row)
         fx, fy, _, _, _, _, _, _, _ = bearing(row, memory, x, y, vx, vy, vx, vy, turning, ax, ay, 0.0)
-        out[at + 4 * k], out[at + 4 * k + 1] = x, y
-        out[at + 4 * k + 2], out[at + 4 * k + 3] = math.hypot(fx, fy), memory[CLOSED]
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(fx, fy), memory[CLOSED]
 
 
 @kernel
@@ -212,8 +214,8 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         See `kernels.integrators.prepare`.
     product : Product or None
         See `advance`.
-    out : ndarray, shape (rows, 2 n + 9 + 4 pins)
-        See `observe` and `observe_pins`.
+    out : ndarray, shape (rows, row_width)
+        See `observe`.
 
     Returns
     -------
@@ -240,7 +242,6 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             jolt += steps[row] * steps[row] * math.hypot(a[t.tip] - ax, a[t.tip + 1] - ay)
             shake += steps[row] * steps[row] * math.hypot(a[t.tip], a[t.tip + 1])
         observe(t, state, out[row])
-        observe_pins(t, state, out[row], 2 * t.joints.shape[0] + 9)
     return OK, steps.shape[0], total, jolt, shake
 
 
@@ -264,7 +265,8 @@ def state_of(b, i):
 def work_of(b, i):
     """Work of boom `i` of a stack."""
     return Work(
-        b.position[i], b.hat[i], b.offset[i], b.weights[i], b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
+        b.position[i], b.velocity[i], b.acceleration[i], b.hat[i], b.offset[i], b.weights[i],
+        b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
         b.matrix[i], b.right[i], b.gains[i], b.free[i], b.block[i], b.blocks[i], b.ends[i], b.end_gains[i],
         b.end_free[i], b.hold[i], b.apart[i], b.rho[i], b.drho[i], b.angles[i], b.turn[i], b.local[i], b.drive[i],
         b.drive_rate[i], b.dz[i], b.cut[i],
@@ -275,7 +277,7 @@ def work_of(b, i):
 def run_each(tables, states, works, first, last, steps, counts, drives, rates, family, parameter, tolerance, passes, out, ends):
     """`run` for booms `first` .. `last - 1` of a stack.
 
-    drives, rates : (booms, steps in all, n), m and m/s. out : (booms, rows, 2 n + 9 + 4 pins), see `run`.
+    drives, rates : (booms, steps in all, n), m and m/s. out : (booms, rows, row_width), see `run`.
     ends : ndarray of int, shape (booms, 3): status, row, passes of each, see `run`.
     """
     for i in range(first, last):

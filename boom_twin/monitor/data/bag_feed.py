@@ -25,12 +25,12 @@ from ...messages.topic_table import NODE, Output, Topic, Topics
 from ...offline.reader_process import SampleReader
 from ...offline.replay import scene_for
 from ...scene.schema import Scene
+from ...twin.driver import Step, drive
 from ...twin.twin import Twin
-from ...types import Change, Sample, Stream
+from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
-NANO = 1e-9
 LOOK = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
@@ -156,9 +156,9 @@ def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], jo
     ahead = SampleReader(session.path, topics, wanted, joints)
     try:
         ahead.wait_ready()
-        for sample in ahead:
-            if sample is not None:
-                twin.take(sample)
+        for step in drive(twin.twin, ahead):
+            if step is not None:
+                twin.took(step)
             yield
         twin.finish()
         if not twin.has_predicted:
@@ -173,7 +173,7 @@ class _Twin:
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self._twin, self._outlet = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
+        self.twin, self._outlet = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.catch.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
@@ -182,18 +182,16 @@ class _Twin:
         self._other_boom = OtherBoom()
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
-        self._twin.warm_up()
+        self.twin.warm_up()
 
     @property
     def has_predicted(self) -> bool:
         """Whether the model has moved at all."""
         return bool(self._feed.store.tables)
 
-    def take(self, sample: Sample | Change) -> None:
-        """Take what comes next in the session."""
-        if isinstance(sample, Change):
-            self._twin.requests.repeat(sample)
-            return
+    def took(self, step: Step) -> None:
+        """Show what a sample caused."""
+        sample, report, _ = step
         self._time = max(self._time, sample.stamp * NANO)
         if self._looked is None:
             self._watch.begin()
@@ -201,7 +199,6 @@ class _Twin:
         if sample.stream is Stream.IMU:
             self._feed.catch.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
-        report = self._twin.update(sample)
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))
         for key, encoded in chain.from_iterable(map(self._outlet.fill, report.all)):
@@ -219,7 +216,7 @@ class _Twin:
             raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
-        found = self._watch.look(self._twin.counts, True, self._peers, (), self._time)
+        found = self._watch.look(self.twin.counts, True, self._peers, (), self._time)
         store, now = self._feed.store, self._feed.now()
         store.light(now, store.board(now).told(now, map(_as_message, found), self._time))
         self._looked = self._time

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...types import NANO
 from .dropped_messages import MalformedError
 
-NANO = 1e-9
 BACK = 1_000_000_000
 """A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
 AHEAD = 60_000_000_000

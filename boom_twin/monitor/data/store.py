@@ -9,6 +9,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from ...types import NANO
 from .dropped_messages import MalformedError
 from .status import Alarms, StatusTable
 
@@ -76,7 +77,6 @@ class Table:
         return self._times[places], self._values[places]
 
 
-NANO = 1e-9
 MOST_BOARDS = 100_000
 """Earlier states of the lamps that are kept: a day of them."""
 

@@ -15,7 +15,7 @@ from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
 from ...messages.topic_table import Output, Topics, stream_of
 from ...messages.type_store import decode
-from ...types import Sample, Stream, channels_of
+from ...types import NANO, Sample, Stream, channels_of
 from . import message_checks as checks
 from .dropped_messages import DroppedMessages, MalformedError
 from .row_order import Row, RowOrder
@@ -220,7 +220,7 @@ class TopicRows:
     def _take_state(self, msg: Any, now: float) -> None:
         checks.count("statuses", len(msg.status), MOST_STATUSES)
         store = self._store
-        board = store.board(now).told(now, msg.status, stamp_of(msg) * 1e-9)
+        board = store.board(now).told(now, msg.status, stamp_of(msg) * NANO)
         checks.count("nodes on one topic", len(board.nodes), MOST_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):

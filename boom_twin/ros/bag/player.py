@@ -15,6 +15,7 @@ from ...bag.advice import publishable
 from ...bag.reader import Session, read_both
 from ...errors import BagError, BoomTwinError
 from ...messages.type_store import jazzy
+from ...types import NANO, SECOND
 from ..node.diagnostics import node_name
 from ..runtime import message_class, qos_profile
 from .subscriptions import installed_class
@@ -26,7 +27,7 @@ def clock_message(stamp: int) -> bytes:
     """A message for ``/clock`` in CDR."""
     types = jazzy().types
     time_class, clock_class = types["builtin_interfaces/msg/Time"], types[CLOCK_TYPE]
-    now = time_class(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000)
+    now = time_class(sec=stamp // SECOND, nanosec=stamp % SECOND)
     return bytes(jazzy().serialize_cdr(clock_class(clock=now), CLOCK_TYPE))
 
 
@@ -35,8 +36,6 @@ LOOK = 0.05
 """Time (s) between looks for listeners."""
 SETTLE = 0.5
 """Time (s) from the match with the last listener to the first message."""
-
-NANO = 1e-9
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from ...config.settings import Settings, Thresholds
 from ...diagnostics.recorder_status import RecordingJudge, TopicState
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
+from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
 from .subscriptions import Wanted, subscription_of
 
@@ -209,7 +210,7 @@ class _Recording:
     def tell(self, end: str | None = None) -> None:
         """Publish the state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
-        clock = self.node.get_clock().now().nanoseconds * 1e-9
+        clock = self.node.get_clock().now().nanoseconds * NANO
         disk = self.storage.state()
         self._board.show([self._judge.status(topics, disk, end, self._thresholds, time.monotonic(), clock)])
         if end is not None:

@@ -30,7 +30,7 @@ from ...offline.replay import Replay, replay_into
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import REPLAY, result_folder
-from ...types import Array, Stream
+from ...types import NANO, Array, Stream
 from ..isolation import add_domain
 from ..startup import require_rclpy
 from .processes import DemoProcesses, company
@@ -118,7 +118,7 @@ def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
 
 def _tip_error(positions: Positions, truth: TipTruth, first: int) -> float:
     """Root mean square distance between predicted and true tip, m; `first` is the stamp of the truth's first row."""
-    times = (np.array(list(positions)) - first) * 1e-9 + truth.times[0]
+    times = (np.array(list(positions)) - first) * NANO + truth.times[0]
     x, z = np.array(list(positions.values())).T
     true = truth.position.T
     squares = (x - np.interp(times, truth.times, true[0])) ** 2 + (z - np.interp(times, truth.times, true[1])) ** 2
@@ -190,7 +190,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
         running.meet(player)
         with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in running.play(player, duration):
-                bar.update(elapsed * 1e-9 - bar.n)
+                bar.update(elapsed * NANO - bar.n)
         time.sleep(SETTLE)
         running.check()
         player.close()

@@ -23,7 +23,7 @@ from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...system.terminal_text import printable
 from ...twin.twin import EVENTS, TOLD_AT_ONCE, Twin
-from ...types import Report, Sample, Stream
+from ...types import NANO, Report, Sample, Stream
 from ..log import Log
 from ..runtime import qos_profile
 from .receive_queue import ReceiveQueue
@@ -143,7 +143,6 @@ def node_name(endpoint: Any) -> str:
 
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
-NANO = 1e-9
 
 
 class Diagnostics:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
-from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -19,6 +18,7 @@ from ...messages.mapping import load_mapping
 from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
+from ...twin.driver import drive
 from ...twin.twin import Twin
 from ...types import Stream
 from ..log import Log
@@ -194,14 +194,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
         self._diagnostics.seen(stream, stamp)
-        sample = self._intake.put(stream, stamp, msg)
-        if sample is None:
-            return
-        began = perf_counter()
-        report = self._twin.update(sample)
-        self._diagnostics.took(sample, report, perf_counter() - began)
-        for each in report.all:
-            if each.change is not None:
-                self._started.tell(each, each.change)
-            for key, encoded in self._outlet.fill(each):
-                self._outputs[key].publish(encoded)
+        for step in drive(self._twin, self._intake.samples((stream,), stamp, msg)):
+            self._diagnostics.took(*step)
+            for each in step.report.all:
+                if each.change is not None:
+                    self._started.tell(each, each.change)
+                for key, encoded in self._outlet.fill(each):
+                    self._outputs[key].publish(encoded)

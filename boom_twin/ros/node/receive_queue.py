@@ -15,12 +15,12 @@ from math import nan
 from typing import Any
 
 from ...diagnostics.source_status import Reception
+from ...types import NANO
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
 CATCH_UP = 0.5
 """Most time (s) for reading what arrived before a request, where the answer depends on it."""
-NANO = 1e-9
 
 
 class _Topic:

@@ -38,8 +38,7 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from ...scene.edit import parameter, parameter_names, with_parameters
 from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
-from ...types import Array
-from .sensors import NANO
+from ...types import SECOND, Array
 from .session import RigSession
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
@@ -237,7 +236,7 @@ def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSess
 def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) -> RigSession:
     after = session.truth["t"] >= fault.onset
     if fault.kind == "late":
-        late = np.where(after, round(fault.size * NANO), 0)
+        late = np.where(after, round(fault.size * SECOND), 0)
         return replace(session, angle_stamps=session.angle_stamps + late)
     name = "joints" if fault.cause.startswith("joint") else "strokes"
     values: Array = getattr(session, name).copy()

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.schema import Point
-from ...types import Array
-
-NANO = 1_000_000_000
+from ...types import SECOND, Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +43,7 @@ def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.rando
     """
     count = round(duration * sensors.rate)
     instants = (np.arange(count) + 0.5) / sensors.rate + rng.uniform(-sensors.jitter, sensors.jitter, count)
-    return start + np.rint(instants * NANO).astype(np.int64)
+    return start + np.rint(instants * SECOND).astype(np.int64)
 
 
 def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator) -> Array:

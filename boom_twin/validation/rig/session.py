@@ -16,13 +16,13 @@ from scipy.interpolate import CubicSpline
 
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
-from ...types import Array
+from ...types import SECOND, Array
 from .exudyn.solve import simulate
 from .exudyn.system import gravity_in_base
 from .motion import Programme
-from .sensors import NANO, Sensors, read, sampling_stamps, specific_force
+from .sensors import Sensors, read, sampling_stamps, specific_force
 
-EPOCH = 1_700_000_000 * NANO
+EPOCH = 1_700_000_000 * SECOND
 """Stamp (ns) of the start of every session."""
 
 
@@ -103,7 +103,7 @@ def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors:
     """
     clock, stroke_noise, angle_noise, imu_noise = np.random.default_rng(seed).spawn(4)
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
-    times = (stamps - EPOCH) / NANO
+    times = (stamps - EPOCH) / SECOND
     truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
     truth |= {"t": times, "strokes": programme(times)[0]}
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))

@@ -93,8 +93,8 @@ def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array,
     plan = compile_scene(scene)
     state = plan.state()
     settle(plan, state, plan.work(), strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
-    row = taken_apart(plan, first_row(plan, state)[None])
-    return row.tip[0, 0, :2], row.joints[0], row.pins[0]
+    found = taken_apart(plan, first_row(plan, state))
+    return found.tip[0, :2], found.joints, found.pins
 
 
 STEP = 1e-3  # s

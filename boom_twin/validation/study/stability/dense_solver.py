@@ -18,7 +18,7 @@ import numpy as np
 from ....compiler.plan import Plan
 from ....kernels.elements.cylinder import BARREL
 from ....kernels.elements.linkage import LINK_L
-from ....kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION
+from ....kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LAMBDA, Z_LINK_L, Z_LINK_R
 from ....types import Array
 
 Long = np.longdouble
@@ -127,12 +127,12 @@ class Kinematics:
         section = frame.turned(Long(self.z[joint.z]), self.eye[joint.z])
         left, right = (
             own.shifted(x, y).turned(Long(self.z[joint.z + k]), self.eye[joint.z + k])
-            for k, own, x, y in ((1, frame, link.dx, link.dy), (2, section, link.ex, link.ey))
+            for k, own, x, y in ((Z_LINK_L, frame, link.dx, link.dy), (Z_LINK_R, section, link.ex, link.ey))
         )
         for row in t.links[joint.first_link : joint.first_link + joint.links]:
             self._put(row.history, (left if row.side == LINK_L else right).shifted(row.middle, 0.0))
         gap = left.point(link.length_l, 0.0)[1] - right.point(link.length_r, 0.0)[1]
-        self.closures += [(joint.z + 3, gap[0]), (joint.z + 4, gap[1])]
+        self.closures += [(joint.z + Z_LAMBDA, gap[0]), (joint.z + Z_LAMBDA + 1, gap[1])]
         self.pins[index, 1] = (left if link.mount == LINK_L else right).point(link.along, link.left)
         self._cylinder(index)
         return section

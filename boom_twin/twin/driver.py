@@ -1,0 +1,58 @@
+"""Drive a twin with the samples of a session: the one loop of the live node, the replay, the live page and the calibration.
+
+What a twin predicts depends on its samples and on the changes between them alone. Every user takes both from here, in the
+order in which they come, and only differs in what it does with the reports: so a replay repeats the live node to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple, overload
+
+from ..types import Change, Report, Sample
+
+if TYPE_CHECKING:  # a replay imports this before it starts its other processes, and the model's modules beside them
+    from .twin import Twin
+
+
+class Step(NamedTuple):
+    """A sample, what it caused, and how long that took the twin, s."""
+
+    sample: Sample
+    report: Report
+    duration: float
+
+
+@overload
+def drive(twin: Twin, items: Iterable[Sample]) -> Iterator[Step]: ...
+
+
+@overload
+def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step | None]: ...
+
+
+def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step | None]:
+    """Update `twin` with every sample, as it is asked for.
+
+    Parameters
+    ----------
+    twin : Twin
+    items : iterable of Sample, Change or None
+        None is a message without a usable value. A change is asked of the twin, and takes effect with the next full stroke
+        sample, as it did while the session was recorded.
+
+    Yields
+    ------
+    Step or None
+        Of every sample; None for a message without a usable value.
+    """
+    for item in items:
+        if isinstance(item, Change):
+            twin.requests.repeat(item)
+        elif item is None:
+            yield None
+        else:
+            began = perf_counter()
+            report = twin.update(item)
+            yield Step(item, report, perf_counter() - began)
