@@ -14,7 +14,7 @@ from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
 from ..system.received_files import open_received
 from ..types import NANO, Stream
-from .integrity import blame, compare_counts
+from .integrity import as_bag_error, compare_counts
 from .mcap_records import LARGEST, chunk_at, heads
 from .mcap_summary import McapFile
 from .reader import Session, scan
@@ -170,7 +170,7 @@ def inspect(path: Path) -> BagInfo:
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
         _count(file, tallies)
-    with blame(files[0].path):
+    with as_bag_error(files[0].path):
         library, compression = _writer(files[0])
     size = sum(file.path.stat().st_size for file in files)
     return BagInfo(session, tuple(tallies.values()), library, compression, size)
@@ -183,7 +183,7 @@ def _count(file: McapFile, tallies: dict[str, Tally]) -> None:
         schema = file.schemas.get(channel.schema_id)
         own[key].stamped = schema is not None and has_header(schema)
     seen: Counter[int] = Counter()
-    with blame(file.path):
+    with as_bag_error(file.path):
         for key, log_time, data in heads(file.path, file.chunks):
             seen[key] += 1
             own[key].add(log_time, data)

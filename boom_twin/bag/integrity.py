@@ -27,7 +27,7 @@ STUMBLES = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
 
 
 @contextmanager
-def blame(path: Path) -> Iterator[None]:
+def as_bag_error(path: Path) -> Iterator[None]:
     """Turn what reading `path` stumbles over into a BagError that names it."""
     try:
         yield

@@ -14,7 +14,7 @@ from mcap.summary import Summary
 
 from ..errors import BagError
 from ..system.received_files import open_received
-from .integrity import blame, check_ends, compare_counts
+from .integrity import as_bag_error, check_ends, compare_counts
 from .mcap_records import LARGEST, records
 from .recovery.chunk_head import head_at
 
@@ -61,7 +61,7 @@ class McapFile:
         return dict(topics)
 
 
-def survey(path: Path) -> McapFile:
+def summarise(path: Path) -> McapFile:
     """Look at one file: only at its summary if that is complete, else at all of it.
 
     Raises
@@ -69,7 +69,7 @@ def survey(path: Path) -> McapFile:
     BagError
         If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
     """
-    with blame(path), open_received(path) as file:
+    with as_bag_error(path), open_received(path) as file:
         check_ends(path, file)
         file.seek(0)
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))

@@ -22,9 +22,9 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import decode, jazzy
 from ..system.received_files import holds_file
-from .integrity import RESCUE, STUMBLES, blame, compare_counts
+from .integrity import RESCUE, STUMBLES, as_bag_error, compare_counts
 from .mcap_records import messages
-from .mcap_summary import McapFile, survey
+from .mcap_summary import McapFile, summarise
 from .metadata import FILE_NAME, BagMetadata, read_metadata
 from .session_sheet import incompleteness
 
@@ -173,7 +173,7 @@ def scan(path: Path) -> Session:
 def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
-    files = tuple(survey(file) for file in named)
+    files = tuple(summarise(file) for file in named)
     if metadata is not None:
         check_listed(path, named)
     topics = _topics(path, files)
@@ -270,7 +270,7 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
     known = jazzy().types
     channels = file.channels
     seen: Counter[int] = Counter()
-    with blame(file.path):
+    with as_bag_error(file.path):
         for message in messages(file.path, file.chunks):
             channel = channels[message.channel_id]
             seen[message.channel_id] += 1

@@ -24,7 +24,7 @@ from .mcap_summary import NOTES, PROFILE
 from .metadata import Recorded, file_information, metadata_of
 
 
-def claim(directory: Path) -> None:
+def claim_directory(directory: Path) -> None:
     """Make the directory; refuse one that holds anything but the mark of a result that is being built.
 
     Raises
@@ -95,7 +95,7 @@ class BagWriter:
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
-        claim(directory)
+        claim_directory(directory)
         self._open()
 
     @property

@@ -22,7 +22,7 @@ AXES = (("x (forward)", BLUE), ("y (up)", ORANGE))
 
 def tip_picture(path: Path, session: str, history: History, truth: Truth | None, note: str) -> None:
     """Write ``tip.png``."""
-    window = liveliest(history.stamps_s, history.tip_acceleration)
+    window = most_active_window(history.stamps_s, history.tip_acceleration)
     with picture(path, f"{session}: tip motion", note) as figure:
         grid = figure.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.1])
         upper = figure.add_subplot(grid[0, :])
@@ -39,7 +39,7 @@ def tip_picture(path: Path, session: str, history: History, truth: Truth | None,
             _enlarged(lower, history, truth, window)
 
 
-def liveliest(stamps: Array, acceleration: Array) -> tuple[float, float]:
+def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
     """Window of `WINDOW` s about the largest acceleration (m, 2), inside the session; all of it if that is shorter."""
     size = np.hypot(acceleration[:, 0], acceleration[:, 1])
     if not np.isfinite(size).any():

@@ -19,7 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 from boom_twin.bag.mcap_records import LARGEST, UnpackBudget, UnpackError
 from boom_twin.bag.reader import scan
 from boom_twin.bag.recovery.recover import recover
-from boom_twin.bag.recovery.scanner import DamagedBytes, walk
+from boom_twin.bag.recovery.scanner import DamagedBytes, scan_damaged
 
 SIZE = 65536  # bytes of a file, at least
 SECONDS, MEGABYTES = 1.0, 400
@@ -112,7 +112,7 @@ def test_recovery_of_a_bomb_ends_soon(bombs: Path, tmp_path: Path, compression: 
 def test_a_chunk_that_is_not_sound_is_unpacked_once(bombs: Path, monkeypatch: pytest.MonkeyPatch, name: str, cut: str) -> None:
     path, unpacked = bombs / f"{name}{cut}.mcap", []
     monkeypatch.setattr(UnpackBudget, "unpack", lambda *of: unpacked.append(len(of[1].data)) or UNPACK(*of))
-    faults = [each for each in walk(path, unverified=True) if isinstance(each, DamagedBytes)]
+    faults = [each for each in scan_damaged(path, unverified=True) if isinstance(each, DamagedBytes)]
     assert faults and len(unpacked) == len([each for each in faults if "chunk" in each.reason])
 
 

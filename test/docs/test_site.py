@@ -54,7 +54,7 @@ def test_nothing_is_named_from_another_host(site: Path) -> None:
         "<img alt='' src=//a.b/c.png>",
         '<link rel="stylesheet" href="https://fonts.googleapis.com/css">',
         "<style>@import 'https://a.b/c.css'</style>",
-        "<p style=\"background: url(https://a.b/c.png)\">",
+        '<p style="background: url(https://a.b/c.png)">',
     ],
 )
 def test_the_search_for_external_loads_finds_them(tmp_path: Path, load: str) -> None:

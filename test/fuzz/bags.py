@@ -21,7 +21,7 @@ from mcap.opcode import Opcode
 from numpy.random import Generator
 
 from boom_twin import load_scene
-from boom_twin.bag.integrity import blame
+from boom_twin.bag.integrity import as_bag_error
 from boom_twin.bag.mcap_records import heads
 from boom_twin.bag.reader import Session, scan
 from boom_twin.bag.recovery.recover import recover
@@ -79,7 +79,7 @@ def _messages(session: Session) -> list[Message]:
     """Topic, log time and bytes of all messages."""
     found = []
     for file in session.files:
-        with blame(file.path):
+        with as_bag_error(file.path):
             for channel, time, data in heads(file.path, file.chunks):
                 found.append((file.channels[channel].topic, time, data))
     return found

@@ -14,7 +14,7 @@ from boom_twin.plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
 from boom_twin.plots.posture import spread
 from boom_twin.plots.residuals import density, residual_picture, running_mean
 from boom_twin.plots.style import broken, limits
-from boom_twin.plots.tip import liveliest, rms_difference
+from boom_twin.plots.tip import most_active_window, rms_difference
 from boom_twin.types import Array
 
 ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
@@ -119,7 +119,7 @@ def test_nothing_but_strokes(tmp_path: Path) -> None:
 def test_window_holds_the_largest_acceleration() -> None:
     t = np.arange(0.0, 60.0, 0.005)
     for peak in (0.1, 30.0, 59.9):
-        start, stop = liveliest(t, np.stack([np.exp(-((t - peak) ** 2)), np.zeros_like(t)], axis=1))
+        start, stop = most_active_window(t, np.stack([np.exp(-((t - peak) ** 2)), np.zeros_like(t)], axis=1))
         assert 0.0 <= start <= peak <= stop <= t[-1] + 1e-9
         assert stop - start == pytest.approx(6.0, abs=0.01)
 

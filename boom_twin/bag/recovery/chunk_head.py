@@ -137,7 +137,7 @@ def _fitting_content(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
     return content
 
 
-def loose_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
+def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
     """The whole records at the start of a chunk that is cut off; no checksum vouches for them.
 
     Raises

@@ -18,7 +18,7 @@ from ..integrity import checksum_of, summary_start
 from ..mcap_records import LARGEST, definition_of, parts
 from ..mcap_summary import NOTES, PROFILE
 from ..metadata import BagMetadata, Recorded, offered_qos, profiles
-from .scanner import SoundRecords, walk
+from .scanner import SoundRecords, scan_damaged
 
 
 @dataclass(slots=True)
@@ -66,7 +66,7 @@ class FileDefinitions:
         )
 
 
-def legend_of(path: Path, unverified: bool = False) -> FileDefinitions:
+def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     """Walk through a file once for everything but its messages.
 
     A definition counts if its chunk's or the summary's checksum fits, or if none is there to deny it; if `unverified`,
@@ -82,7 +82,7 @@ def legend_of(path: Path, unverified: bool = False) -> FileDefinitions:
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST, True
-    for piece in walk(path, unverified):
+    for piece in scan_damaged(path, unverified):
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary

@@ -15,14 +15,14 @@ from ...errors import BagError
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import RECOVER, result_folder
-from ..integrity import blame
+from ..integrity import as_bag_error
 from ..mcap_records import heads, message_of, parts
 from ..metadata import BagMetadata, Recorded
 from ..reader import RECOVERED, scan, sources
 from ..session_sheet import sheet_path
 from ..writer import BagWriter
-from .definitions import FileDefinitions, legend_of
-from .scanner import DamagedBytes, SoundRecords, walk
+from .definitions import FileDefinitions, definitions_of
+from .scanner import DamagedBytes, SoundRecords, scan_damaged
 
 MOST_FAULTS = 1000
 """Faults that are told one by one."""
@@ -91,8 +91,8 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     files, metadata = sources(path)
     legends = []
     for file in files:
-        with blame(file):
-            legends.append(legend_of(file, unverified))
+        with as_bag_error(file):
+            legends.append(definitions_of(file, unverified))
     outcome = Recovery()
     notes = {key: value for legend in legends for key, value in legend.notes.items()}
     notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
@@ -102,7 +102,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
         for number, (file, legend) in enumerate(zip(files, legends, strict=True)):
             if number and bag.has_messages:
                 bag.split()
-            with blame(file):
+            with as_bag_error(file):
                 _copy(file, legend, bag, keys, outcome, metadata, unverified)
         bag.close()
     except BaseException:
@@ -128,7 +128,7 @@ def _copy(
     """Copy the messages of one file; those of a chunk that is the copy of another are left out."""
     own: dict[int, int] = {}
     seen: Counter[bytes] = Counter()
-    for piece in walk(file, unverified, legend.channels):
+    for piece in scan_damaged(file, unverified, legend.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
             continue

@@ -17,7 +17,7 @@ from mcap.writer import MCAP0_MAGIC
 from ...system.received_files import open_received
 from ..integrity import BLOCK, STUMBLES
 from ..mcap_records import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, whole_parts
-from .chunk_head import ChunkHead, UnsoundError, head_at, loose_start, sound_content
+from .chunk_head import ChunkHead, UnsoundError, head_at, sound_content, unverified_start
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""
@@ -68,7 +68,9 @@ class DamagedBytes:
     reason: str
 
 
-def walk(path: Path, unverified: bool = False, channels: Container[int] | None = None) -> Iterator[SoundRecords | DamagedBytes]:
+def scan_damaged(
+    path: Path, unverified: bool = False, channels: Container[int] | None = None
+) -> Iterator[SoundRecords | DamagedBytes]:
     """All of a file in order; one chunk in memory at a time.
 
     Parameters
@@ -107,7 +109,7 @@ def _next(
         start = b""
         if head.crc == 0 or unverified:
             try:
-                start = loose_start(file, head, budget)
+                start = unverified_start(file, head, budget)
             except UnpackError as error:
                 reason = str(error)
         return _broken(head, size - offset, reason, start), size

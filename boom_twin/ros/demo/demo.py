@@ -33,7 +33,7 @@ from ...system.result_folder import REPLAY, result_folder
 from ...types import NANO, Array, Stream
 from ..isolation import add_domain
 from ..startup import require_rclpy
-from .processes import DemoProcesses, company
+from .processes import DemoProcesses, demo_processes
 
 Positions = dict[int, tuple[float, float]]
 
@@ -147,7 +147,7 @@ def main() -> int:
         session = scan(args.bag)
         about = session.notes.get("origin", "origin not noted")
         taken = scene_of(args.bag)
-        with company(args.out, f"live run of: {about}", taken.text, args.domain) as running:
+        with demo_processes(args.out, f"live run of: {about}", taken.text, args.domain) as running:
             sent, recorded = _play(session, args.duration, running), running.recorded
         if holds_file(args.bag / TRUTH):
             with open_received(args.bag / TRUTH) as truth:

@@ -17,7 +17,7 @@ from ...bag.session_model import scene_of
 from ...errors import BoomTwinError
 from ..isolation import add_domain
 from ..startup import require_rclpy
-from .processes import LOOK, DemoProcesses, company
+from .processes import LOOK, DemoProcesses, demo_processes
 
 
 def main() -> int:
@@ -25,7 +25,7 @@ def main() -> int:
     args = _arguments()
     try:
         require_rclpy()
-        with company(args.out, f"demo-live of {args.bag}", scene_of(args.bag).text, args.domain) as running:
+        with demo_processes(args.out, f"demo-live of {args.bag}", scene_of(args.bag).text, args.domain) as running:
             _play(args, running)
     except BoomTwinError as error:
         print(f"demo-live: {error}", file=sys.stderr)

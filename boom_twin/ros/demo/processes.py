@@ -176,7 +176,7 @@ def _free(folder: Path) -> Path:
 
 
 @contextmanager
-def company(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[DemoProcesses]:
+def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[DemoProcesses]:
     """Node and recorder as long as this lasts, isolated; recordings of earlier runs stay.
 
     Parameters
