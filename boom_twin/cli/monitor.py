@@ -114,15 +114,15 @@ def _feed(args: Namespace) -> Iterator[Feed]:
             yield feed
 
 
-def _serve(args: Namespace, feed: Feed, desk: Any) -> None:
+def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl
     from ..monitor.server import Server
 
-    door = AccessControl(args.host)
+    access = AccessControl(args.host)
     try:
-        asyncio.run(_run(args, Server(feed, desk, door), door.token))
+        asyncio.run(_run(args, Server(feed, actions, access), access.token))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 

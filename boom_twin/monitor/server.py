@@ -40,8 +40,8 @@ class Server:
     door : AccessControl
     """
 
-    def __init__(self, feed: Feed, desk: ViewerActions, door: AccessControl) -> None:
-        self._feed, self._desk, self._door = feed, desk, door
+    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl) -> None:
+        self._feed, self._actions, self._access = feed, actions, access
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
@@ -56,7 +56,7 @@ class Server:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        self._door.check(request)
+        self._access.check(request)
         if isinstance(request.protocol, Connection):
             request.protocol.let_in()
         return await handler(request)
@@ -80,7 +80,7 @@ class Server:
             await socket.prepare(request)
             if isinstance(request.protocol, Connection):
                 request.protocol.become_viewer()
-            await Viewer(socket, self._feed, self._desk, self._analyst).serve()
+            await Viewer(socket, self._feed, self._actions, self._analyst).serve()
         finally:
             self._viewers.discard(socket)
         return socket

@@ -47,8 +47,8 @@ class Viewer:
         Common to all viewers.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, feed: Feed, desk: ViewerActions, analyst: Analyst) -> None:
-        self._socket, self._feed, self._desk, self._analyst = socket, feed, desk, analyst
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, actions: ViewerActions, analyst: Analyst) -> None:
+        self._socket, self._feed, self._actions, self._analyst = socket, feed, actions, analyst
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
@@ -73,7 +73,7 @@ class Viewer:
                 "kind": "hello",
                 "title": feed.title,
                 "end": feed.end,
-                "permitted": sorted(self._desk.permitted),
+                "permitted": sorted(self._actions.permitted),
                 "history": HISTORY,
             }
         )
@@ -107,11 +107,11 @@ class Viewer:
     async def _say_state(self, position: float) -> None:
         feed, play = self._feed, self._playback
         now = feed.now() if play is None else position
-        message = state(feed.store, now, position, feed.catch.dropped)
+        message = state(feed.store, now, position, feed.topic_rows.dropped)
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        message |= {"trouble": feed.trouble, "is_recording": self._desk.is_recording}
+        message |= {"trouble": feed.trouble, "is_recording": self._actions.is_recording}
         await self._say(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
@@ -204,7 +204,7 @@ class Viewer:
                 raise ValueError("not a number")
             self._steer(play, request["do"], value)
             return None
-        return self._desk.act(request)
+        return self._actions.act(request)
 
     def _steer(self, play: Playback, what: str, value: float) -> None:
         if what == "seek":

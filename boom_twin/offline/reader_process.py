@@ -124,7 +124,7 @@ def main() -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
     path, topics, wanted, joints = pickle.load(sys.stdin.buffer)
     heard: dict[str, list[Stream]] = topics.heard
-    intake = SampleDecoder(joints, topics)
+    decoder = SampleDecoder(joints, topics)
     say_ready()
     batch: list[Packed] = []
     try:
@@ -134,7 +134,7 @@ def main() -> int:
             stamp = stamp_of(message)
             if Stream.STROKES in heard[name]:
                 batch += changes.due(log, stamp)
-            found = intake.samples(heard[name], stamp, message)
+            found = decoder.samples(heard[name], stamp, message)
             batch += [(sample.stream.value, stamp, sample.values.tobytes()) for sample in found] or [None]
             if len(batch) >= BATCH:
                 post([batch])
@@ -144,7 +144,7 @@ def main() -> int:
     except BoomTwinError as error:
         print(error, file=sys.stderr)
         return 1
-    post([batch, intake.oddities, END])
+    post([batch, decoder.oddities, END])
     return 0
 
 

@@ -128,13 +128,13 @@ def main(directory: Path) -> int:
     try:
         notes, topics, scene, settings = next(items)
         outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
-        outlet = ReportEncoder(scene, settings)
+        encoder = ReportEncoder(scene, settings)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             for batch in items:
                 for packed in batch:
                     report = unpack(packed)
-                    for key, data in outlet.fill(report):
+                    for key, data in encoder.fill(report):
                         writer.write_encoded(key, report.stamp, data)
         return 0
     except BoomTwinError as error:

@@ -52,7 +52,7 @@ class TopicFeed(Feed):
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:
-            if topic.absolute in self.catch.names:
+            if topic.absolute in self.topic_rows.names:
                 kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
                 if topic not in (*(topics.outputs[role] for role in RARE), topics.events):
                     qos.reliability = ReliabilityPolicy.BEST_EFFORT
@@ -69,7 +69,7 @@ class TopicFeed(Feed):
             with subscription.handle:
                 receive = partial(subscription.handle.take_message, subscription.msg_type, True)
                 for data in _taken(receive):
-                    self.catch.take_encoded(name, data, now)
+                    self.topic_rows.take_encoded(name, data, now)
 
         with self._asked.handle:
             _, answer = self._asked.handle.take_response(Trigger.Response)

@@ -30,9 +30,9 @@ STEPS = ((0.0025, 0.013), (0.005, 0.013), (0.005, 0.026), (0.005, 0.05), (0.0101
 def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
     """Stamps, measured strokes and true strokes."""
     scene, truth = load_scene(), np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
-    intake, stamps, measured = SampleDecoder(len(scene.joints)), [], []
+    decoder, stamps, measured = SampleDecoder(len(scene.joints)), [], []
     for _, _, message in read(scan(SESSION), {"cylinder_strokes": "sensor_msgs/msg/JointState"}):
-        sample = intake.put(Stream.STROKES, stamp_of(message), message)
+        sample = decoder.put(Stream.STROKES, stamp_of(message), message)
         stamps.append(sample.stamp)
         measured.append(sample.values)
     true = np.column_stack([truth[f"stroke_{i + 1}_m"] for i in range(len(scene.joints))])

@@ -80,10 +80,10 @@ def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, outlet, found = Twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
+    twin, encoder, found = Twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
     for number in range(400):
         for stream in Stream:
-            for key, data in outlet.fill(twin.update(_true(random, number, stream))):
+            for key, data in encoder.fill(twin.update(_true(random, number, stream))):
                 found.setdefault(key.name, []).append(bytes(data))
     return found
 
@@ -178,7 +178,7 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._intake = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
+        self._twin, self._decoder = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
         self._wires = {stream: CdrDecoder(TYPES[stream]) for stream in Stream}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 
@@ -216,12 +216,12 @@ class _Listener:
                 return "read, and a full decoder refuses it"
             if list(whole.name) != list(message.name) or not np.array_equal(whole.position, message.position, equal_nan=True):
                 return "read otherwise than a full decoder reads it"
-        return self._intake.put(stream, stamp, message)
+        return self._decoder.put(stream, stamp, message)
 
     def _show(self, key: Output, data: bytes) -> str:
-        name, catch, store = self._topics.outputs[key].absolute, self._feed.catch, self._feed.store
-        if name in catch.names:
-            catch.take_encoded(name, data, 0.0)
+        name, topic_rows, store = self._topics.outputs[key].absolute, self._feed.topic_rows, self._feed.store
+        if name in topic_rows.names:
+            topic_rows.take_encoded(name, data, 0.0)
         for words in (dump(layout(store)), dump(state(store, 0.0, store.newest)), dump(alarms(store.alarms.all))):
             json.loads(words, parse_constant=_refuse_constant)
         return ""

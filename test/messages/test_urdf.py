@@ -185,9 +185,9 @@ def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
 def test_joint_states_drive_every_joint() -> None:
     """A message that comes with a shape names each joint of the URDF that can move, and no other."""
     scene = load_scene()
-    twin, outlet = Twin(scene), ReportEncoder(scene, Settings())
+    twin, encoder = Twin(scene), ReportEncoder(scene, Settings())
     report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
-    msg = jazzy().deserialize_cdr(dict(outlet.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
+    msg = jazzy().deserialize_cdr(dict(encoder.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
     robot = ElementTree.fromstring(urdf(scene))
     assert set(msg.name) == {j.attrib["name"] for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
     positions = dict(zip(msg.name, msg.position.tolist(), strict=True))

@@ -48,12 +48,12 @@ def drifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
     """The bundled session's first 40 s with a gap, its joint angles spoilt by a function of times (s) and angles (rad)."""
-    topics, intake = load_topics().inputs, SampleDecoder(4)
+    topics, decoder = load_topics().inputs, SampleDecoder(4)
     values: dict[Stream, list[Any]] = {stream: [] for stream in Stream}
     names = {topic.absolute: stream for stream, topic in topics.items()}
     stamps = []
     for name, _, message in read(scan(BUNDLED), {topic.absolute: topic.type for topic in topics.values()}):
-        sample = intake.put(names[name], stamp_of(message), message)
+        sample = decoder.put(names[name], stamp_of(message), message)
         assert sample is not None
         values[names[name]].append(sample.values)
         if names[name] is Stream.STROKES:

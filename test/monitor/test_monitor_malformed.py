@@ -118,7 +118,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.feed, self.now = Feed("made", Store(CAPACITY), TOPICS), 0.0
-        self.catch, self.store = self.feed.catch, self.feed.store
+        self.topic_rows, self.store = self.feed.topic_rows, self.feed.store
 
     def send(self, role: Role | None, message: Any, stamp: int | None = None) -> None:
         """To the topic of a role, or of events; with a stamp (ns) unless its own is to stay."""
@@ -127,7 +127,7 @@ class Bench:
             for part in message.markers if role is Output.SHAPE else [message]:
                 header = getattr(part, "header", part)
                 header.stamp.sec, header.stamp.nanosec = divmod(stamp, 10**9)
-        self.catch.take_encoded(name, bytes(jazzy().serialize_cdr(message, kind)), self.now)
+        self.topic_rows.take_encoded(name, bytes(jazzy().serialize_cdr(message, kind)), self.now)
 
     def go_on(self, first: int, count: int = 3) -> None:
         """Good messages of all topics from row `first` on."""
@@ -136,7 +136,7 @@ class Bench:
                 self.send(role, make(), EPOCH + row * STEP)
 
     def lost(self, role: Role | None = None) -> tuple[int, str]:
-        loss = self.catch.dropped.by_topic.get(TOPICS.events.absolute if role is None else topic(role).absolute)
+        loss = self.topic_rows.dropped.by_topic.get(TOPICS.events.absolute if role is None else topic(role).absolute)
         return (0, "") if loss is None else (loss.count, loss.reason)
 
 
@@ -182,7 +182,7 @@ def test_a_malformed_message_is_dropped_counted_and_told_and_all_others_are_show
     count, told = bench.lost(role)
     assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST
     assert set(bench.store.tables) == TABLES and {table.count for table in bench.store.tables.values()} == {6}
-    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.catch.dropped.told()) == 2
+    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) == 2
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
 
 
@@ -198,7 +198,7 @@ def test_a_stamp_that_is_none_is_told(role: Role | None, stamp: int, reason: str
 def test_bytes_that_are_no_message_are_dropped() -> None:
     bench, chance = Bench(), random.Random(5)
     bench.go_on(0)
-    names = sorted(bench.catch.names)
+    names = sorted(bench.topic_rows.names)
     good = {role: bytes(jazzy().serialize_cdr(make(), topic(role).type)) for role, make in GOOD.items()}
     tracemalloc.start()
     for _ in range(3000):
@@ -206,10 +206,10 @@ def test_bytes_that_are_no_message_are_dropped() -> None:
         data = bytearray(good[role])
         for _ in range(chance.randint(1, 8)):
             data[chance.randrange(len(data))] = chance.choice((0, 0xFF, chance.randrange(256)))
-        bench.catch.take_encoded(chance.choice([topic(role).absolute, chance.choice(names)]), bytes(data), 0.0)
+        bench.topic_rows.take_encoded(chance.choice([topic(role).absolute, chance.choice(names)]), bytes(data), 0.0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 50e6 and sum(loss["count"] for loss in bench.catch.dropped.told()) > 1000
+    assert peak < 50e6 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) > 1000
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
     bench.go_on(10**6, 5)
     last = EPOCH + (10**6 + 4) * STEP - bench.store.epoch
@@ -235,7 +235,7 @@ def test_a_pause_costs_no_message() -> None:
     bench = Bench()
     bench.go_on(0)
     bench.go_on(10**5)
-    assert not bench.catch.dropped.told() and bench.store.tables["displacement"].count == 6
+    assert not bench.topic_rows.dropped.told() and bench.store.tables["displacement"].count == 6
     assert [alarm.name for alarm in bench.store.alarms.all if not alarm.causes] == ["cylinder_strokes"]
 
 
@@ -341,4 +341,4 @@ def test_the_catch_bounds_what_waits() -> None:
     for row in range(3000):
         bench.send(Stream.IMU, GOOD[Stream.IMU](), EPOCH + row * STEP)
         bench.send(Output.RESIDUALS, joint_state(["tip_imu_x", "tip_imu_z"]), EPOCH + row * STEP + 1)
-    assert max(len(bench.catch._measured), len(bench.catch._residuals)) <= catching.WAITING + 1
+    assert max(len(bench.topic_rows._measured), len(bench.topic_rows._residuals)) <= catching.WAITING + 1

@@ -55,8 +55,8 @@ def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), host: str = "
     """Run `talk` with a session and the address of a server of `feed`."""
 
     async def run() -> None:
-        door = AccessControl(host)
-        application = Server(feed, ViewerActions(feed, frozenset(permitted)), door).application()
+        access = AccessControl(host)
+        application = Server(feed, ViewerActions(feed, frozenset(permitted)), access).application()
         async with TestServer(application) as server, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
             await asyncio.wait_for(talk(session, str(server.make_url("/"))), 60.0)
 
@@ -215,15 +215,15 @@ def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
     assert not is_loopback("rig.local")
 
     async def run() -> None:
-        door, feed = AccessControl("0.0.0.0"), Made()
-        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), door).application()) as server:
+        access, feed = AccessControl("0.0.0.0"), Made()
+        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), access).application()) as server:
             url = str(server.make_url("/"))
             async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
                 for path in ("", "page/main.js", "?token=wrong"):
                     assert (await session.get(url + path)).status == 403, path
                 with pytest.raises(WSServerHandshakeError):
                     await connect(session, url)
-                opened = await session.get(f"{url}?token={door.token}")
+                opened = await session.get(f"{url}?token={access.token}")
                 assert opened.status == 200 and "token" not in str(opened.url)
                 async with connect(session, url) as socket:
                     await until(socket, "hello")
@@ -234,9 +234,9 @@ def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
 @pytest.mark.parametrize("path", ["/", "//evil.example/path", "/%5cevil.example/", "/page/x"])
 def test_with_a_token_one_is_led_to_the_page_and_nowhere_else(path: str) -> None:
     async def run() -> None:
-        door, feed = AccessControl("0.0.0.0"), Made()
-        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), door).application()) as server:
-            head = await ask(server, f"{path}?token={door.token}")
+        access, feed = AccessControl("0.0.0.0"), Made()
+        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), access).application()) as server:
+            head = await ask(server, f"{path}?token={access.token}")
             assert " 302 " in head and "\r\nLocation: /\r\n" in head and "Content-Security-Policy" in head
             head = await ask(server, "/", "Cookie: boom_twin_monitor=\xff")
             assert " 403 " in head and "Content-Security-Policy" in head

@@ -76,11 +76,11 @@ def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
     wanted = {inputs[stream].name: inputs[stream].type for stream in Stream}
     roles = {inputs[stream].name: stream for stream in Stream}
     scene, store = load_scene(), jazzy()
-    twin, intake, outlet = Twin(scene, baseline=load_baseline()), SampleDecoder(4), ReportEncoder(scene, Settings())
+    twin, decoder, encoder = Twin(scene, baseline=load_baseline()), SampleDecoder(4), ReportEncoder(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(SESSION), wanted):
-        sample = intake.put(roles[name], stamp_of(message), message)
-        for key, data in outlet.fill(twin.update(sample)):
+        sample = decoder.put(roles[name], stamp_of(message), message)
+        for key, data in encoder.fill(twin.update(sample)):
             expected.append((outputs[key].absolute, log_time, data))
         if len(expected) > 2400:
             break

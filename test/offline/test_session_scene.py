@@ -138,10 +138,10 @@ def test_other_names_do_not_matter_and_a_mapping_can_say_which_are_the_booms():
 def test_the_intake_takes_nothing_of_another_boom():
     """So the node publishes nothing by it, and its diagnostics have the names."""
     names = [f"cylinder_{i}" for i in range(1, 6)]
-    intake, msg = SampleDecoder(4), SimpleNamespace(name=names, position=[0.1] * 5)
-    assert intake.put(Stream.STROKES, 10**18, msg) is None
-    assert intake.oddities == {"names of another boom": 1} and intake.strangers == {Stream.STROKES: ["cylinder_5"]}
-    assert intake.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
+    decoder, msg = SampleDecoder(4), SimpleNamespace(name=names, position=[0.1] * 5)
+    assert decoder.put(Stream.STROKES, 10**18, msg) is None
+    assert decoder.oddities == {"names of another boom": 1} and decoder.strangers == {Stream.STROKES: ["cylinder_5"]}
+    assert decoder.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
 
 
 def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, capsys):

@@ -91,7 +91,7 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
     twin = Twin(scene, settings, baseline=load_baseline())
-    intake, outlet = SampleDecoder(twin.plan.joints), ReportEncoder(scene, settings)
+    decoder, encoder = SampleDecoder(twin.plan.joints), ReportEncoder(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     changes = recorded_changes(scan(recorded), load_topics())
     for name, log, msg in read(scan(recorded), {name: TYPES[stream] for name, stream in inputs.items()}):
@@ -101,9 +101,9 @@ def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> 
                 continue
             for change in changes.due(log, stamp):
                 twin.requests.repeat(change)
-        sample = intake.put(stream, stamp, msg)
+        sample = decoder.put(stream, stamp, msg)
         assert sample is not None
-        for key, data in outlet.fill(twin.update(sample)):
+        for key, data in encoder.fill(twin.update(sample)):
             made[key].append((_stamp(jazzy().deserialize_cdr(data, TYPES[key])), data))
     return made
 

@@ -77,7 +77,7 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     BagError
         The file is of another profile than ros2.
     """
-    legend = FileDefinitions()
+    definitions = FileDefinitions()
     loose = FileDefinitions()
     statistics: Statistics | None = None
     summary = summary_start(path)
@@ -86,30 +86,30 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
-        taker = legend if piece.vouched or is_in_summary else loose
+        taker = definitions if piece.vouched or is_in_summary else loose
         for opcode, body in parts(piece.content):
             if opcode == Opcode.HEADER:
                 _check_profile(path, body)
             elif opcode == Opcode.METADATA:
-                _note(legend, body)
+                _note(definitions, body)
             elif opcode == Opcode.DATA_END:
                 is_data = False
-                legend.is_summed = _is_summed(path, piece.offset, body)
+                definitions.is_summed = _is_summed(path, piece.offset, body)
             elif opcode == Opcode.STATISTICS and is_in_summary:
                 statistics = Statistics.read(ReadDataStream(BytesIO(body)))
             elif opcode == Opcode.CHUNK_INDEX and is_in_summary:
                 index = ChunkIndex.read(ReadDataStream(BytesIO(body)))
-                legend.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
-            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (taker is legend or is_data):
+                definitions.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
+            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (taker is definitions or is_data):
                 budget -= len(body)
                 if budget < 0:
                     raise BagError(f"{path}: more than {LARGEST} bytes of definitions. It is not the work of a recorder.")
                 _define(taker, opcode, body)
-    legend.channels = {**loose.channels, **legend.channels}
-    legend.schemas = {**loose.schemas, **legend.schemas}
-    if statistics is not None and statistics.channel_message_counts.keys() <= legend.channels.keys():
-        legend.told = _by_topic(statistics.channel_message_counts, legend.channels)
-    return legend
+    definitions.channels = {**loose.channels, **definitions.channels}
+    definitions.schemas = {**loose.schemas, **definitions.schemas}
+    if statistics is not None and statistics.channel_message_counts.keys() <= definitions.channels.keys():
+        definitions.told = _by_topic(statistics.channel_message_counts, definitions.channels)
+    return definitions
 
 
 def _check_profile(path: Path, body: bytes) -> None:
@@ -118,10 +118,10 @@ def _check_profile(path: Path, body: bytes) -> None:
         raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
 
 
-def _note(legend: FileDefinitions, body: bytes) -> None:
+def _note(definitions: FileDefinitions, body: bytes) -> None:
     record: Metadata = Metadata.read(ReadDataStream(BytesIO(body)))
     if record.name == NOTES:
-        legend.notes |= record.metadata
+        definitions.notes |= record.metadata
 
 
 def _is_summed(path: Path, offset: int, body: bytes) -> bool:
@@ -133,12 +133,12 @@ def _is_summed(path: Path, offset: int, body: bytes) -> bool:
         return checksum_of(file, 0, offset) == told
 
 
-def _define(legend: FileDefinitions, opcode: int, body: bytes) -> None:
+def _define(definitions: FileDefinitions, opcode: int, body: bytes) -> None:
     record = definition_of(opcode, body)
     if isinstance(record, Channel):
-        legend.channels.setdefault(record.id, record)
+        definitions.channels.setdefault(record.id, record)
     elif isinstance(record, Schema):
-        legend.schemas.setdefault(record.id, record)
+        definitions.schemas.setdefault(record.id, record)
 
 
 def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:

@@ -89,21 +89,21 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
 
 def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     files, metadata = sources(path)
-    legends = []
+    all_definitions = []
     for file in files:
         with as_bag_error(file):
-            legends.append(definitions_of(file, unverified))
+            all_definitions.append(definitions_of(file, unverified))
     outcome = Recovery()
-    notes = {key: value for legend in legends for key, value in legend.notes.items()}
+    notes = {key: value for definitions in all_definitions for key, value in definitions.notes.items()}
     notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
     bag = BagWriter(out, {**notes, RECOVERED: path.name}, distro=metadata.ros_distro if metadata else "")
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
-        for number, (file, legend) in enumerate(zip(files, legends, strict=True)):
+        for number, (file, definitions) in enumerate(zip(files, all_definitions, strict=True)):
             if number and bag.has_messages:
                 bag.split()
             with as_bag_error(file):
-                _copy(file, legend, bag, keys, outcome, metadata, unverified)
+                _copy(file, definitions, bag, keys, outcome, metadata, unverified)
         bag.close()
     except BaseException:
         bag.abandon()
@@ -112,13 +112,13 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
         raise BagError(f"{path}: nothing can be saved: {_first(outcome)}.")
     _copy_sheet(path, out)
     outcome.saved = _count(out)
-    outcome.lost = _lost(outcome.saved, legends, metadata, files)
+    outcome.lost = _lost(outcome.saved, all_definitions, metadata, files)
     return outcome
 
 
 def _copy(
     file: Path,
-    legend: FileDefinitions,
+    definitions: FileDefinitions,
     bag: BagWriter,
     keys: dict[tuple[str, str, bytes], int],
     outcome: Recovery,
@@ -128,11 +128,11 @@ def _copy(
     """Copy the messages of one file; those of a chunk that is the copy of another are left out."""
     own: dict[int, int] = {}
     seen: Counter[bytes] = Counter()
-    for piece in scan_damaged(file, unverified, legend.channels):
+    for piece in scan_damaged(file, unverified, definitions.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
             continue
-        if _is_copy(piece, legend, seen):
+        if _is_copy(piece, definitions, seen):
             outcome.copies += sum(opcode == Opcode.MESSAGE for opcode, _ in parts(piece.content))
             continue
         for opcode, body in parts(piece.content):
@@ -140,29 +140,29 @@ def _copy(
                 continue
             message = message_of(body)
             if message.channel_id not in own:
-                topic = legend.topic(message.channel_id, metadata)
+                topic = definitions.topic(message.channel_id, metadata)
                 if topic is None:
                     outcome.nameless += 1
                     continue
                 own[message.channel_id] = _key(bag, keys, topic)
             key = own[message.channel_id]
             bag.write(key, message.log_time, message.data, message.publish_time, message.sequence)
-            if not (piece.vouched or legend.is_summed):
+            if not (piece.vouched or definitions.is_summed):
                 outcome.unvouched[bag.topics[key].topic] += 1
 
 
-def _is_copy(piece: SoundRecords, legend: FileDefinitions, seen: Counter[bytes]) -> bool:
+def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[bytes]) -> bool:
     """Whether a piece is a chunk that was `seen` before, and more often than the recorder wrote it.
 
     Equal messages in one chunk were recorded as they stand there. So were equal chunks (a clock that stands still gives
     such), if the checksum of all data fits, or as many as a sound index lists.
     """
     head = piece.chunk
-    if head is None or legend.is_summed:
+    if head is None or definitions.is_summed:
         return False
     digest = sha256(piece.content).digest()
     seen[digest] += 1
-    return seen[digest] > max(1, legend.listed[head.start, head.end, head.unpacked])
+    return seen[digest] > max(1, definitions.listed[head.start, head.end, head.unpacked])
 
 
 def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:
@@ -191,18 +191,20 @@ def _count(out: Path) -> Counter[str]:
 
 
 def _lost(
-    saved: Mapping[str, int], legends: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
+    saved: Mapping[str, int], all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
 ) -> dict[str, int] | None:
     """What is missing of the source's own count, if there is a sound one that can be true."""
-    for told in _counts_told(legends, metadata, files):
+    for told in _counts_told(all_definitions, metadata, files):
         if all(told.get(topic, 0) >= count for topic, count in saved.items()):
             return {topic: told[topic] - saved.get(topic, 0) for topic in told}
     return None
 
 
-def _counts_told(legends: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]) -> Iterator[Counter[str]]:
+def _counts_told(
+    all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
+) -> Iterator[Counter[str]]:
     """The counts by the files' summaries, if all have one; by the metadata, if it knows of all files."""
-    counts = [legend.told for legend in legends]
+    counts = [definitions.told for definitions in all_definitions]
     if None not in counts:
         yield sum((each for each in counts if each is not None), Counter[str]())
     if metadata is not None and {file.name for file in files} <= {Path(name).name for name in metadata.relative_file_paths}:

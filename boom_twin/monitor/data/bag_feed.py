@@ -144,9 +144,9 @@ def _title(session: Session, is_published: bool) -> str:
 
 def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int]) -> Generator[None]:
     """What the node said, beside the measured acceleration; one message a step."""
-    known, catch = _names(topics), feed.catch
-    for name, _, message in read(session, {name: known[name].type for name in counts if name in catch.names}):
-        catch.take(name, message, feed.now())
+    known, topic_rows = _names(topics), feed.topic_rows
+    for name, _, message in read(session, {name: known[name].type for name in counts if name in topic_rows.names}):
+        topic_rows.take(name, message, feed.now())
         yield
 
 
@@ -173,8 +173,8 @@ class _Twin:
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self.twin, self._outlet = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
-        self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.catch.names}
+        self.twin, self._encoder = Twin(scene, settings, mounts, usual), ReportEncoder(scene, settings)
+        self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
         sensors = sensors_of(scene, settings, required, mounts)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
@@ -197,13 +197,13 @@ class _Twin:
             self._watch.begin()
             self._looked = self._time
         if sample.stream is Stream.IMU:
-            self._feed.catch.measure(sample)
+            self._feed.topic_rows.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))
-        for key, encoded in chain.from_iterable(map(self._outlet.fill, report.all)):
+        for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
-                self._feed.catch.take_encoded(self._names[key], encoded, self._feed.now())
+                self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
         if self._time - self._looked >= LOOK or self._watch.is_urgent():
             self._look()
 

@@ -35,7 +35,7 @@ class Feed:
 
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
-        self.catch = TopicRows(store, topics)
+        self.topic_rows = TopicRows(store, topics)
         self.trouble = ""
         self._scene = scene
 
@@ -59,7 +59,7 @@ class Feed:
 
     def scene(self) -> Scene | None:
         """The scene, as soon as it is known."""
-        if self._scene is None and self.catch.scene == DEFAULT_NAME:
+        if self._scene is None and self.topic_rows.scene == DEFAULT_NAME:
             self._scene = load_scene()
         return self._scene
 

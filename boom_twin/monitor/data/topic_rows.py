@@ -66,7 +66,7 @@ class TopicRows:
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
-        self._store, self._intake, self._order = store, SampleDecoder(1, topics), RowOrder()
+        self._store, self._decoder, self._order = store, SampleDecoder(1, topics), RowOrder()
         self.dropped = DroppedMessages()
         self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
         self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
@@ -135,9 +135,9 @@ class TopicRows:
             store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
 
     def _take_measured(self, msg: Any, now: float) -> None:
-        before = self._intake.oddities.copy()
-        sample = self._intake.put(Stream.IMU, stamp_of(msg), msg)
-        odd = self._intake.oddities - before
+        before = self._decoder.oddities.copy()
+        sample = self._decoder.put(Stream.IMU, stamp_of(msg), msg)
+        odd = self._decoder.oddities - before
         if sample is not None:
             self.measure(sample)
         elif NO_MEASUREMENT not in odd:

@@ -170,12 +170,12 @@ class Diagnostics:
         self._strangers: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
 
-    def watch(self, twin: Twin, intake: SampleDecoder, scene: str) -> None:
+    def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
-        self._counts = {"samples": twin.counts, "messages": intake.oddities}
-        self._scene, self._joints, self._strangers = scene, twin.plan.joints, intake.strangers
+        self._counts = {"samples": twin.counts, "messages": decoder.oddities}
+        self._scene, self._joints, self._strangers = scene, twin.plan.joints, decoder.strangers
         self._told.clear()
 
     def tune(self, thresholds: Thresholds) -> None:

@@ -146,13 +146,13 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
-        self._twin, self._intake = twin, SampleDecoder(joints, topics)
-        self._outlet = ReportEncoder(scene, settings)
+        self._twin, self._decoder = twin, SampleDecoder(joints, topics)
+        self._encoder = ReportEncoder(scene, settings)
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._asked = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
         self._started = Started(self._log)
-        self._diagnostics.watch(twin, self._intake, name)
+        self._diagnostics.watch(twin, self._decoder, name)
         self._log.info("model ready")
 
     def _tune(self, live: dict[str, float]) -> None:
@@ -194,10 +194,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
         self._diagnostics.seen(stream, stamp)
-        for step in drive(self._twin, self._intake.samples((stream,), stamp, msg)):
+        for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg)):
             self._diagnostics.took(*step)
             for each in step.report.all:
                 if each.change is not None:
                     self._started.tell(each, each.change)
-                for key, encoded in self._outlet.fill(each):
+                for key, encoded in self._encoder.fill(each):
                     self._outputs[key].publish(encoded)

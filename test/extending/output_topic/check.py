@@ -29,10 +29,10 @@ def numbers(message):
 scene = load_scene()
 stamps = 10**9 + 5_000_000 * np.arange(400)
 strokes = strokes_of_posture(scene, "arch") + np.outer(0.02 * np.sin(np.linspace(0.0, 3.0, 400)), [1.0, 0.0, 0.5, 0.0])
-twin, outlet, sent, joints = Twin(scene), ReportEncoder(scene, Settings()), [], []
+twin, encoder, sent, joints = Twin(scene), ReportEncoder(scene, Settings()), [], []
 for stamp, row in zip(stamps.tolist(), strokes, strict=True):
     report = twin.update(Sample(Stream.STROKES, stamp, row))
-    (encoded,) = (data for output, data in outlet.fill(report) if output is Output.TIP_VELOCITY)
+    (encoded,) = (data for output, data in encoder.fill(report) if output is Output.TIP_VELOCITY)
     p = report.prediction
     sent.append(numbers(jazzy().deserialize_cdr(encoded, KIND)))
     assert sent[-1] == (stamp, "base_link", *p.tip_velocity, -p.tip_angular_velocity)

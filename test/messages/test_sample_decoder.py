@@ -43,11 +43,11 @@ def imu(x: float, z: float) -> Any:
 def test_any_order_and_extra_names(values: list[float], others: list[tuple[str, float]], data: st.DataObject) -> None:
     pairs = [(f"joint_{i}", value) for i, value in enumerate(values, 1)] + others
     mixed = data.draw(st.permutations(pairs))
-    intake = SampleDecoder(len(values))
-    sample = intake.put(Stream.ANGLES, 12, joint_state([n for n, _ in mixed], [v for _, v in mixed]))
+    decoder = SampleDecoder(len(values))
+    sample = decoder.put(Stream.ANGLES, 12, joint_state([n for n, _ in mixed], [v for _, v in mixed]))
     assert sample is not None and (sample.stream, sample.stamp) == (Stream.ANGLES, 12)
     assert sample.values.tolist() == values
-    assert not intake.oddities
+    assert not decoder.oddities
 
 
 @settings(deadline=None)
@@ -93,9 +93,9 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
 def test_oddities_are_counted_by_name(
     names: list[str], positions: list[float], expected: list[float] | None, oddities: dict[str, int]
 ) -> None:
-    intake = SampleDecoder(2)
-    sample = intake.put(Stream.STROKES, 5, joint_state(names, positions))
-    assert dict(intake.oddities) == oddities
+    decoder = SampleDecoder(2)
+    sample = decoder.put(Stream.STROKES, 5, joint_state(names, positions))
+    assert dict(decoder.oddities) == oddities
     if expected is None:
         assert sample is None
     else:
@@ -110,25 +110,25 @@ def test_imu_gives_x_and_z() -> None:
 
 
 def test_imu_without_acceleration_gives_nothing() -> None:
-    intake, msg = SampleDecoder(4), imu(0.0, 0.0)
+    decoder, msg = SampleDecoder(4), imu(0.0, 0.0)
     msg.linear_acceleration_covariance[0] = -1.0
-    assert intake.put(Stream.IMU, 9, msg) is None
-    assert dict(intake.oddities) == {"no measurement": 1}
+    assert decoder.put(Stream.IMU, 9, msg) is None
+    assert dict(decoder.oddities) == {"no measurement": 1}
 
 
 def test_imu_with_one_bad_axis_keeps_the_other() -> None:
-    intake = SampleDecoder(4)
-    sample = intake.put(Stream.IMU, 9, imu(nan, 9.7))
+    decoder = SampleDecoder(4)
+    sample = decoder.put(Stream.IMU, 9, imu(nan, 9.7))
     assert sample is not None
     np.testing.assert_array_equal(sample.values, [nan, 9.7])
-    assert dict(intake.oddities) == {"not finite": 1}
+    assert dict(decoder.oddities) == {"not finite": 1}
 
 
 def test_counts_add_up_over_messages() -> None:
-    intake = SampleDecoder(1)
+    decoder = SampleDecoder(1)
     for _ in range(3):
-        intake.put(Stream.STROKES, 1, joint_state(["x"], [1.0]))
-    assert dict(intake.oddities) == {"unknown names only": 3}
+        decoder.put(Stream.STROKES, 1, joint_state(["x"], [1.0]))
+    assert dict(decoder.oddities) == {"unknown names only": 3}
 
 
 def test_messages_of_rclpy_give_the_same() -> None:
@@ -159,19 +159,19 @@ def test_stamp_of_is_exact() -> None:
 
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
-    intake = SampleDecoder(1)
+    decoder = SampleDecoder(1)
     message = RosbagsTypes().make("sensor_msgs/msg/JointState")
     message.name, message.position = ["cylinder_1"], np.array([0.1])
-    assert intake.put(Stream.STROKES, stamp, message) is None
-    assert intake.oddities == {name: 1}
+    assert decoder.put(Stream.STROKES, stamp, message) is None
+    assert decoder.oddities == {name: 1}
 
 
 def test_a_flood_of_names_is_not_looked_through() -> None:
-    intake = SampleDecoder(1)
+    decoder = SampleDecoder(1)
     names = [*(f"x{i}" for i in range(LONGEST)), "cylinder_1"]
-    assert intake.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
-    assert intake.oddities == {"too many names": 1}
-    assert intake.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * LONGEST)) is not None
+    assert decoder.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
+    assert decoder.oddities == {"too many names": 1}
+    assert decoder.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * LONGEST)) is not None
 
 
 def mapped(sensors: dict[str, Any], **names: str) -> Topics:
@@ -212,10 +212,10 @@ def test_an_imu_may_lie_on_its_side() -> None:
 
 def test_one_topic_for_both_kinds() -> None:
     """A message feeds the streams that it has values of, and a stream without any is nothing odd."""
-    intake = SampleDecoder(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
+    decoder = SampleDecoder(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
     both = joint_state(["other", "a", "cylinder_1"], [9.0, 0.1, 0.2])
     angles, strokes, neither = joint_state(["a"], [0.3]), joint_state(["cylinder_1"], [0.4]), joint_state(["joint_1"], [1.0])
-    samples = [intake.put(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)]
+    samples = [decoder.put(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)]
     found = [None if sample is None else sample.values.tolist() for sample in samples]
-    assert found == [[0.2], [0.1], None, [0.3], [0.4], None] and not intake.oddities
-    assert intake.put(Stream.STROKES, 1, neither) is None and intake.oddities == {"unknown names only": 1}
+    assert found == [[0.2], [0.1], None, [0.3], [0.4], None] and not decoder.oddities
+    assert decoder.put(Stream.STROKES, 1, neither) is None and decoder.oddities == {"unknown names only": 1}

@@ -70,7 +70,7 @@ def judged(*alarms: Alarm) -> Report:
     return replace(report(), health=health)
 
 
-def outlet() -> ReportEncoder:
+def encoder() -> ReportEncoder:
     """One for the first three sections of the default boom."""
     scene = load_scene()
     three = scene.model_copy(update={"sections": scene.sections[:3], "joints": scene.joints[:3], "postures": {}})
@@ -83,7 +83,7 @@ def decoded(messages: list[tuple[Output, bytes]]) -> dict[Output, Any]:
 
 @pytest.fixture(scope="module")
 def filled() -> dict[Output, Any]:
-    return decoded(outlet().fill(report()))
+    return decoded(encoder().fill(report()))
 
 
 def test_displacement(filled: dict[Output, Any]) -> None:
@@ -104,7 +104,7 @@ def test_acceleration_turns_about_minus_y(filled: dict[Output, Any]) -> None:
 
 def test_angular_sign_fits_the_axes() -> None:
     """A turn that speeds up anticlockwise in the model lifts a point ahead: omega' x r must point up in base_link."""
-    accel = decoded(outlet().fill(report()))[Output.TIP_ACCELERATION].accel
+    accel = decoded(encoder().fill(report()))[Output.TIP_ACCELERATION].accel
     lift = np.cross([accel.angular.x, accel.angular.y, accel.angular.z], [1.0, 0.0, 0.0])
     np.testing.assert_allclose(lift, [0.0, 0.0, 0.7])
 
@@ -123,7 +123,7 @@ def test_joint_states(filled: dict[Output, Any]) -> None:
 
 def test_passive_joints_come_with_a_shape_only() -> None:
     """Both lengths in turn, from one outlet."""
-    own, bare = outlet(), replace(report(), prediction=replace(prediction(), shape=None))
+    own, bare = encoder(), replace(report(), prediction=replace(prediction(), shape=None))
     counts = [len(decoded(own.fill(each))[Output.JOINT_STATES].name) for each in (report(), bare, report())]
     assert counts == [13, 6, 13]
 
@@ -137,7 +137,7 @@ def test_residuals_are_named(filled: dict[Output, Any]) -> None:
 
 
 def test_an_alarm_is_told_in_words_and_numbers() -> None:
-    msg = decoded(outlet().fill(judged(ALARM)))[Output.HEALTH]
+    msg = decoded(encoder().fill(judged(ALARM)))[Output.HEALTH]
     (status,) = msg.status
     assert (status.name, status.level, status.message) == ("joint_2", 2, "cylinder_2.k is 29 % softer")
     assert {pair.key: pair.value for pair in status.values} == {
@@ -158,13 +158,13 @@ def test_an_alarm_is_told_in_words_and_numbers() -> None:
 
 def test_levels_of_alarms() -> None:
     unknown, ended = replace(ALARM, cause=None), replace(ALARM, until=STAMP)
-    msg = decoded(outlet().fill(judged(ALARM, unknown, ended)))[Output.HEALTH]
+    msg = decoded(encoder().fill(judged(ALARM, unknown, ended)))[Output.HEALTH]
     assert [status.level for status in msg.status] == [2, 1, 0]
     assert {pair.key: pair.value for pair in msg.status[2].values}["to_s"] == "1700000000.123"
 
 
 def test_how_far_off_the_tip_may_be() -> None:
-    found = decoded(outlet().fill(judged()))
+    found = decoded(encoder().fill(judged()))
     vector = found[Output.TIP_UNCERTAINTY].vector
     assert (vector.x, vector.y, vector.z) == (0.001, 0.0, 0.004)
     assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
@@ -172,7 +172,7 @@ def test_how_far_off_the_tip_may_be() -> None:
 
 
 def test_a_report_passes_between_processes_whole() -> None:
-    own, other = outlet(), outlet()
+    own, other = encoder(), encoder()
     assert own.fill(unpack(pack(judged(ALARM)))) == other.fill(judged(ALARM))
 
 
@@ -187,13 +187,13 @@ def test_every_message_has_the_stamp_of_its_cause(filled: dict[Output, Any]) -> 
 
 def test_without_prediction_only_residuals() -> None:
     bare = Report(stamp=STAMP, accepted=True, residuals=report().residuals)
-    assert [key for key, _ in outlet().fill(bare)] == [Output.RESIDUALS]
-    assert outlet().fill(Report(stamp=STAMP, accepted=False)) == []
+    assert [key for key, _ in encoder().fill(bare)] == [Output.RESIDUALS]
+    assert encoder().fill(Report(stamp=STAMP, accepted=False)) == []
 
 
 def test_no_shape_without_a_line() -> None:
     bare = replace(report(), prediction=replace(report().prediction, shape=None))
-    assert Output.SHAPE not in dict(outlet().fill(bare))
+    assert Output.SHAPE not in dict(encoder().fill(bare))
 
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
@@ -213,7 +213,7 @@ def test_factory_makes_a_new_message_each_time() -> None:
 
 def test_the_bytes_are_those_of_rosbags() -> None:
     """Encoded anew by it, a message is the same to the byte: lengths, padding, order, byte order."""
-    own = outlet()
+    own = encoder()
     for number in range(60):
         for key, data in own.fill(replace(judged(ALARM), prediction=prediction(STAMP + 100_000_000 * number))):
             msg = jazzy().deserialize_cdr(data, TYPES[key])
@@ -223,7 +223,7 @@ def test_the_bytes_are_those_of_rosbags() -> None:
 def test_rclpy_reads_the_same_numbers() -> None:
     serialization = pytest.importorskip("rclpy.serialization")
     types = pytest.importorskip("boom_twin.ros.runtime")
-    for key, data in outlet().fill(judged(ALARM)):
+    for key, data in encoder().fill(judged(ALARM)):
         assert_same(
             jazzy().deserialize_cdr(data, TYPES[key]),
             serialization.deserialize_message(data, types.message_class(TYPES[key])),
