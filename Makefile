@@ -52,6 +52,7 @@ test: lint warm
 
 lint: $(READY)
 	$(BIN)/ruff check boom_twin test setup.py docs/site_hooks.py
+	$(BIN)/ruff format --check --quiet boom_twin test setup.py docs/site_hooks.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
