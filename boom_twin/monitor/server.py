@@ -36,8 +36,8 @@ class Server:
     Parameters
     ----------
     feed : Feed
-    desk : ViewerActions
-    door : AccessControl
+    actions : ViewerActions
+    access : AccessControl
     """
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl) -> None:

@@ -43,7 +43,7 @@ class Viewer:
     ----------
     socket : WebSocketResponse
         Prepared.
-    feed, desk, analyst
+    feed, actions, analyst
         Common to all viewers.
     """
 

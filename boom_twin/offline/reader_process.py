@@ -89,7 +89,7 @@ class SampleReader:
     Attributes
     ----------
     oddities : Counter
-        Of the intake, once the iteration has ended.
+        Of the decoder, once the iteration has ended.
     """
 
     def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int) -> None:

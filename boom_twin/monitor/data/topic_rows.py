@@ -37,7 +37,7 @@ NOT_SHOWN = frozenset(Stream) - {Stream.STROKES, Stream.ANGLES, Stream.IMU}
 """Sensors whose residuals the page has no place for."""
 CYLINDER = re.compile(r"cylinder_[1-9][0-9]{0,2}")
 NO_MEASUREMENT = "no measurement"
-"""Of the intake: an Imu that says that it has none is nothing odd."""
+"""Of `SampleDecoder`: an Imu that says that it has none is nothing odd."""
 PLANE = ("x_m", "z_m")
 ACCELERATION = ("x_m_s2", "z_m_s2")
 
