@@ -57,7 +57,7 @@ def _arch() -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def _rig() -> _Messages:
-    return _Messages(4)
+    return _Messages()
 
 
 def _true(random: Generator, number: int, stream: Stream) -> Sample:
