@@ -184,7 +184,7 @@ class _Listener:
 
     def told(self) -> str:
         """What was odd, in the words of intake and twin."""
-        return f"{self.odd} refused or with events; {dict(self._intake.oddities)}, {dict(self._twin.counts)}"
+        return f"{self.odd} refused or with events; {dict(self._decoder.oddities)}, {dict(self._twin.counts)}"
 
     def take(self, role: str, *content: Any) -> str:
         """Take one message; gives what is wrong, or nothing."""
