@@ -74,6 +74,7 @@ def test_scene_baseline_and_names_come_from_the_node(
     sheet = out / "session.yaml"
     rig.until(lambda: sheet.is_file() and BASELINE.splitlines()[0] in sheet.read_text() and "# a copy" in sheet.read_text())
     rig.until(lambda: min(each.get_subscription_count() for each in (rig.strokes, rig.angles)) >= 2)
+    time.sleep(0.5)  # a subscription may know of its publisher a moment after the publisher of it
     for row in range(ROWS):
         stamp = int(motion["stamps_ns"][row])
         rig.send(rig.strokes, "cylinder", stamp, motion["strokes"][row])
