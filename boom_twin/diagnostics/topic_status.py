@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import nan
 
 from ..config.settings import Thresholds
-from ..types import NANO
+from ..types import NANO, SECOND
 from .levels import Bounds, ComponentJudge, Level, Status
 from .stream_stats import StreamWatch
 
@@ -105,7 +105,7 @@ class TopicJudge:
 
 def seconds(stamp: int | None) -> str:
     """A stamp (ns) in seconds, exactly."""
-    return "nan" if stamp is None else f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d}"
+    return "nan" if stamp is None else f"{stamp // SECOND}.{stamp % SECOND:09d}"
 
 
 class OutputsJudge:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from mcap.records import Schema
 
-from ..types import Stream
+from ..types import SECOND, Stream
 from .topic_table import TYPES
 from .type_store import decode
 
@@ -35,7 +35,7 @@ def stamp_in(data: bytes) -> int | None:
     if order is None or len(data) < _ORIGIN + 8:
         return None
     seconds, nanoseconds = _STAMPS[order].unpack_from(data, _ORIGIN)
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
+    return int(seconds) * SECOND + int(nanoseconds)
 
 
 def names_in(data: bytes) -> tuple[tuple[str, ...], int]:

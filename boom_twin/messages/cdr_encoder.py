@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..types import Array
+from ..types import SECOND, Array
 from .message_fields import fill_header
 from .type_store import jazzy
 
@@ -70,7 +70,7 @@ class Template:
 
     def fill(self, stamp: int, doubles: Array | Sequence[float], singles: Sequence[float] = ()) -> bytes:
         """The message with a stamp (ns) in all its headers, and with numbers in the order in which the holes were made."""
-        time = divmod(stamp, 1_000_000_000)
+        time = divmod(stamp, SECOND)
         for place in self._stamps:
             _TIME.pack_into(self._data, place, *time)
         self._doubles[self._double_places] = doubles
@@ -81,7 +81,7 @@ class Template:
 
 def stamped(header: Any) -> None:
     """Put the hole of a stamp, and the frame, into a header."""
-    fill_header(header, STAMP * 1_000_000_000)
+    fill_header(header, STAMP * SECOND)
 
 
 def _places(bits: Any, first: int, count: int) -> Any:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..types import Array
+from ..types import SECOND, Array
 
 FRAME = "base_link"
 
 
 def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
     """Put a stamp (nanoseconds) and a frame into a ``std_msgs/Header``."""
-    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp, SECOND)
     header.frame_id = frame
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..types import LIMIT, SENSORS, Sample, Stream
+from ..types import LIMIT, SECOND, SENSORS, Sample, Stream
 from .topic_table import Topics, factor, load_topics
 
-LATEST = 2**31 * 1_000_000_000
+LATEST = 2**31 * SECOND
 """Stamps (ns) from here on have no place in a message."""
 
 LONGEST = 1000
@@ -28,7 +28,7 @@ _ABSENT = float("nan")
 def stamp_of(msg: Any) -> int:
     """``header.stamp`` of a message in nanoseconds."""
     stamp = msg.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    return int(stamp.sec) * SECOND + int(stamp.nanosec)
 
 
 class _Channels:

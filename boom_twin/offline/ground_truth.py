@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
-from ..types import Array, Prediction
+from ..types import NANO, Array, Prediction
 
 FILE_NAME = "truth.csv.gz"
 LARGEST = 64 * 2**20
@@ -37,7 +37,7 @@ class TipTruth:
 
     def errors(self, predictions: list[Prediction]) -> dict[str, float]:
         """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; stamps of one clock."""
-        times = np.array([prediction.stamp - predictions[0].stamp for prediction in predictions]) * 1e-9 + self.times[0]
+        times = np.array([prediction.stamp - predictions[0].stamp for prediction in predictions]) * NANO + self.times[0]
         position = np.array([prediction.tip_position for prediction in predictions])
         acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
         return {

@@ -104,10 +104,11 @@ def _next(
     if head is None:
         record = _whole_record(file, offset, size)
         return ([SoundRecords(offset, False, record)], offset + len(record)) if record else ([], None)
+    takes_start = head.crc == 0 or unverified  # no checksum denies it, or it is wanted all the same
     if head.is_certain and head.after > size:
         reason = f"cut off, {size - offset} of {head.after - offset} bytes are there"
         start = b""
-        if head.crc == 0 or unverified:
+        if takes_start:
             try:
                 start = unverified_start(file, head, budget)
             except UnpackError as error:
@@ -119,7 +120,7 @@ def _next(
     except UnsoundError as error:
         if not head.is_certain:
             return [], None
-        start = whole_parts(error.start) if head.crc == 0 or unverified else b""
+        start = whole_parts(error.start) if takes_start else b""
         return _broken(head, head.after - offset, str(error), start), head.after
 
 
