@@ -149,6 +149,15 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
+class Outline:
+    """Of one prediction: ``shape``, ``undeflected`` and ``pins``, see `Prediction`, m."""
+
+    shape: Array
+    undeflected: Array
+    pins: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Prediction:
     """What the model says at the stamp of one stroke sample (model frame: x forward, y up).
 

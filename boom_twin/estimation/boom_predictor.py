@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,15 +11,14 @@ from ..analysis.bending_moments import moments_by_unknowns
 from ..analysis.equilibrium import outline, set_undeformed, settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
-from ..config.settings import Settings
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import PIN, places_in, prediction_width
-from ..kernels.tables import State
+from ..kernels.tables import State, Tables, Work
 from ..kernels.transfer.forward_kinematics import place
 from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
 from ..scene.schema import Scene
-from ..types import Array, Prediction
-from .look_ahead import Tuning, follow, new_track
+from ..types import Array, Outline, Prediction
+from .look_ahead import Track, new_track
 
 
 class UndeflectedPredictor:
@@ -47,9 +46,24 @@ class UndeflectedPredictor:
         return np.asarray(np.cumsum(steps))
 
 
-PAUSE = 0.1  # s without strokes, after which
 TINY = 1e-12
-AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
+
+
+class CompiledBoom(NamedTuple):
+    """A boom as kernels take it.
+
+    tables : of the scene. anchor, live : the boom that is remembered, and as predicted by the newest sample. work : scratch.
+    track : see `boom_twin.estimation.look_ahead.Track`. bending : (stations, unknowns) bending moments by the unknowns, N m.
+    row : the newest prediction, see `boom_twin.kernels.result_row`.
+    """
+
+    tables: Tables
+    anchor: State
+    live: State
+    work: Work
+    track: Track
+    bending: Array
+    row: Array
 
 
 class BoomPredictor:
@@ -59,35 +73,35 @@ class BoomPredictor:
     ----------
     scene : Scene
         With its load.
-    settings : Settings
-        Noise of the strokes, tuning of the estimator.
 
     Attributes
     ----------
     plan : Plan
     live : State
         The boom as predicted by the newest sample.
+    compiled : CompiledBoom
+        The same for kernels; `boom_twin.twin.update` steps it.
+    places : Places
+        Where everything stands in a row of a prediction.
     """
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
+    def __init__(self, scene: Scene) -> None:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
         self._anchor, self._work = self.plan.state(), self.plan.work()
-        self._undeflected, self._bending = UndeflectedPredictor(scene, self.plan), moments_by_unknowns(self.plan)
+        self._undeflected = UndeflectedPredictor(scene, self.plan)
         self._track = new_track(self.plan, np.array([section.length for section in scene.sections]))
-        self._tuning = Tuning(
-            settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
-        )
-        self._patient = self._tuning._replace(lag=max(AFTER_PAUSE, settings.lag))
-        self._newest, self._paused = 0.0, -math.inf
         size = self.plan.joints, len(self.plan.pins)
         self._row = np.zeros(prediction_width(*size))
-        self._at = places_in(*size)
+        self.places = places_in(*size)
+        self.compiled = CompiledBoom(
+            self.plan.tables, self._anchor, self.live, self._work, self._track, moments_by_unknowns(self.plan), self._row
+        )
 
     @property
     def variances(self) -> Array:
         """Of the newest strokes' estimates, m^2, shape (n,)."""
-        return self._row[self._at.variances]
+        return self._row[self.places.variances]
 
     @property
     def angles(self) -> Array:
@@ -115,16 +129,6 @@ class BoomPredictor:
         settle(self.plan, self._anchor, self._work, strokes, angles)
         self._track.angles[:] = angles
         self._track.nodes[0] = 0
-        self._newest, self._paused = 0.0, -math.inf
-
-    def step(self, time: float, strokes: Array) -> int:
-        """Go on to strokes (m; NaN = missing) measured at `time` (s since the start); a status of `kernels.tables`."""
-        if time - self._newest > PAUSE:
-            self._paused = time
-        self._newest = time
-        tuning = self._patient if time - self._paused < AFTER_PAUSE else self._tuning
-        tables, work = self.plan.tables, self._work
-        return int(follow(tables, self._anchor, self.live, work, self._track, tuning, time, strokes, self._row))
 
     def extrapolated(self, span: float) -> Array:
         """Strokes (m) `span` s after the newest sample, by its estimates; shape (n,)."""
@@ -147,9 +151,19 @@ class BoomPredictor:
         braking = np.maximum(-x[:, 2] * np.sign(x[:, 1]), 0.0) + sure * deviations[:, 2]
         return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, TINY))).max())
 
-    def prediction(self, stamp: int, shaped: bool) -> Prediction:
-        """What the newest sample gave; with centre lines and cylinder pins if `shaped`."""
-        row, at = self._row.copy(), self._at
+    @property
+    def estimate(self) -> Array:
+        """Strokes (m) as estimated at the newest sample, shape (n,)."""
+        return self._row[self.places.strokes]
+
+    def outline(self) -> Outline:
+        """Centre lines and cylinder pins at the newest sample."""
+        shape = outline(self.plan, self.live, self._work.position)
+        return Outline(shape, self._undeflected.at(self.angles), self.live.pins.copy())
+
+    def prediction(self, stamp: int, drawn: Outline | None = None) -> Prediction:
+        """What the newest sample gave, with an outline if there is one."""
+        row, at = self._row.copy(), self.places
         tip = row[at.tip].reshape(3, 3)
         angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
         position = tip[0, :2]
@@ -165,9 +179,9 @@ class BoomPredictor:
             joints=row[at.joints],
             strokes=row[at.strokes],
             cylinder_forces=row[at.cylinder_forces],
-            shape=outline(self.plan, self.live, self._work.position) if shaped else None,
-            undeflected=self._undeflected.at(self.angles) if shaped else None,
-            pins=self.live.pins.copy() if shaped else None,
+            shape=None if drawn is None else drawn.shape,
+            undeflected=None if drawn is None else drawn.undeflected,
+            pins=None if drawn is None else drawn.pins,
             clearances=row[at.pins].reshape(-1, PIN),
-            moments=self._bending @ self.live.z,
+            moments=self.compiled.bending @ self.live.z,
         )

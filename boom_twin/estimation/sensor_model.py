@@ -10,12 +10,12 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import UsageError
+from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
 from ..types import Array, Mount
 
-TURN = 2.0 * np.pi
 
-
+@inner
 def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
     """What an accelerometer reads along two axes, m/s^2; of numbers or of arrays of one shape.
 
@@ -55,36 +55,19 @@ class Mounting:
         mounts = mounts or [None] * plan.joints
         if len(mounts) != plan.joints:
             raise UsageError(f"mounts has {len(mounts)} entries, not {plan.joints}. Give one for each joint, or none.")
-        self._has_any = any(mounts)
+        self.has_any = any(mounts)
         kinds = plan.tables.operations.kind
         roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
         heads = np.append(roots[1:] - 1, len(kinds))
-        self._frames = np.where([mount == "head" for mount in mounts], heads, roots)
-        self._absolute = np.array([mount is not None for mount in mounts])
+        self.frames = np.where([mount == "head" for mount in mounts], heads, roots)
+        self.absolute = np.array([mount is not None for mount in mounts])
         self._inclination = inclination
 
     def expected(self, joints: Array, live: State) -> Array:
         """What the sensors should read, rad, shape (n,), while the joint angles are `joints` and the boom is as `live`."""
-        if not self._has_any:
+        if not self.has_any:
             return joints
-        return np.where(self._absolute, live.frames[self._frames, FRAME_ANGLE] + self._inclination, joints)
-
-    def deviations(self, joint_sigmas: Array, variance: float) -> Array:
-        """Deviations expected of the readings, rad, shape (n,), from those of the joints' angles.
-
-        What stroke noise does to the joints inboard is added up as if all of it came from one mode, which is the most that it
-        can be; the sensor's own noise, of `variance` (rad^2), counts once.
-        """
-        if not self._has_any:
-            return joint_sigmas
-        shaken = np.sqrt(np.maximum(joint_sigmas**2 - variance, 0.0))
-        return np.where(self._absolute, np.sqrt(variance + np.cumsum(shaken) ** 2), joint_sigmas)
-
-    def unwound(self, difference: Array) -> Array:
-        """Measured minus expected, rad, shape (n,); of inclinometers the smallest of all whole turns."""
-        if not self._has_any:
-            return difference
-        return difference - np.where(self._absolute, TURN * np.round(difference / TURN), 0.0)
+        return np.where(self.absolute, live.frames[self.frames, FRAME_ANGLE] + self._inclination, joints)
 
 
 class Reading:

@@ -9,9 +9,9 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
+from ..types import NANO, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import Baseline
-from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, means, stacked
+from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, Compared, Followed, means
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import SensorCheck, SensorMonitor
 
@@ -70,26 +70,32 @@ class HealthMonitor:
             self._ended.append(ended)
         self.residuals.begin()
 
-    def predicted(
-        self, prediction: Prediction, strokes: Array, variances: Array, noise: StrokeNoise | None, tip: Array
-    ) -> None:
-        """A prediction, with the strokes (m) as measured, the variances (m^2) of their estimates, the modes there.
+    def predicted(self, followed: Followed) -> None:
+        """Predictions, at least one."""
+        self._blocks.predicted(followed)
 
-        And with the deviation (m) of the tip (2,) that a start from rest leaves.
+    def measured(self, stream: Stream, compared: Compared) -> None:
+        """Samples of one stream with their residuals, at least one; only angles and IMU matter."""
+        if stream in (Stream.ANGLES, Stream.IMU):
+            self._blocks.measured(stream, compared)
+
+    def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
+        """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
+
+        Parameters
+        ----------
+        variances : ndarray, shape (n,)
+            Of the strokes' estimates, m^2.
+        noise : StrokeNoise or None
+            With the modes at the present posture.
+        tip : ndarray, shape (2,)
+            Deviation (m) of the tip that a start from rest leaves.
         """
-        self._blocks.predicted(prediction, strokes)
         self._variances, self._noise, self._tip = variances, noise, tip
-
-    def measured(self, residuals: Residuals, values: Array) -> None:
-        """Residuals of a sample with its values (rad, m/s^2)."""
-        self._blocks.measured(residuals, values)
-
-    def judge(self, stamp: int) -> Health | None:
-        """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell."""
         news: list[Alarm] = []
         done = self._blocks.close(stamp)
         for block in done:
-            if block.predictions:
+            if block.followed:
                 news += self._judge(block)
         news += self._ended
         self._ended = []
@@ -103,41 +109,37 @@ class HealthMonitor:
         return Health(self._told, (*ended, *lasting), self.names, self.residuals.levels, self._tip_sigmas())
 
     def _judge(self, block: Block) -> list[Alarm]:
-        n, start = self._n, block.number * BLOCK
-        stamps, raw, left = stacked(block.angles, n)
+        start, predictions = block.number * BLOCK, block.predictions()
+        stamps, raw, left = block.readings(Stream.ANGLES, self._n)
         before = self._angle_watch.masked
-        news = self._angle_watch.take(self._angles.look(stamps, raw, raw - left, block.end * NANO), start, block.end)
+        news = self._angle_watch.take(self._angles.look(stamps * NANO, raw, raw - left, block.end * NANO), start, block.end)
         if (self._angle_watch.masked & ~before).any():
             self.residuals.forget()
-        stroke_stamps = np.array([prediction.stamp for prediction in block.predictions]) * NANO
-        readings = np.array(block.strokes)
-        strokes = self._strokes.look(stroke_stamps, readings, np.zeros_like(readings), block.end * NANO)
+        readings = predictions.measured
+        strokes = self._strokes.look(predictions.stamps * NANO, readings, np.zeros_like(readings), block.end * NANO)
         news += self._stroke_watch.take(strokes, start, block.end)
         if self._stroke_watch.masked.any() or self._noise is None:
             ended = self.residuals.close(start)
             self.residuals.begin()
             return news if ended is None else [*news, ended]
-        told = self.residuals.take(self._means(block, left), self._noise)
+        told = self.residuals.take(self._means(block, predictions, left), self._noise)
         return news if told is None else [*news, told]
 
-    def _means(self, block: Block, left: Array) -> BlockMeans:
-        settings, predictions = self._settings, block.predictions
-        _, _, forces = stacked(block.forces, 2)
+    def _means(self, block: Block, predictions: Followed, left: Array) -> BlockMeans:
+        settings, stamps = self._settings, predictions.stamps
         angle, angle_count = means(left, settings.angle_variance**0.5)
         angle[self._angle_watch.masked] = np.nan
-        force, force_count = means(forces, settings.imu_sigma)
-        first, last = predictions[0], predictions[-1]
-        span = (last.stamp - first.stamp) * NANO
-        rates = (last.joints - first.joints) / span if span > 0.0 else np.zeros(self._n)
-        accelerations = np.array([prediction.tip_acceleration for prediction in predictions])
+        force, force_count = means(block.readings(Stream.IMU, 2).left, settings.imu_sigma)
+        span = int(stamps[-1] - stamps[0]) * NANO
+        rates = (predictions.joints[-1] - predictions.joints[0]) / span if span > 0.0 else np.zeros(self._n)
         return BlockMeans(
             start=block.number * BLOCK,
             left=np.concatenate([angle, force]),
             counts=np.concatenate([angle_count, force_count]),
-            strokes=predictions[len(predictions) // 2].strokes,
+            strokes=predictions.strokes[len(stamps) // 2],
             variances=self._variances,
             rates=rates,
-            shaking=float((accelerations**2).sum(axis=1).mean()),
+            shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
         )
 
     def _tip_sigmas(self) -> Array:

@@ -34,7 +34,7 @@ def history_of(recording: Recording, scene: Scene) -> History:
     stamps = _seconds([prediction.stamp for prediction in predictions], first)
     acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
     gravity = gravity_in_base(scene)
-    felt = np.array([tip_specific_force(prediction, gravity) for prediction in predictions])
+    felt = tip_specific_force(acceleration, np.array([prediction.tip_angle for prediction in predictions]), gravity)
     names, times, values, sigmas = _channels([angles, force], first)
     return History(
         stamps_s=stamps,

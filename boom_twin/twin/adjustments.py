@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -11,8 +10,8 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..types import SECOND, SENSORS, Array, Change, Stream
-
-KEPT = 16  # sets of zeros that late samples may still need
+from .blocks import CODES
+from .state import COUNT, FIRST, NONE, RECENT, STROKES, ZEROS, Ring, TwinState, zeros_at
 
 
 class SensorZeros:
@@ -20,6 +19,8 @@ class SensorZeros:
 
     Parameters
     ----------
+    state : TwinState
+        Where they are kept; samples of stamps before the newest ones have those that held then.
     channels : dict of Stream to tuple of str
         See `boom_twin.types.channels_of`.
 
@@ -29,34 +30,33 @@ class SensorZeros:
         The newest ones, by channel: m, rad, m/s^2.
     """
 
-    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
-        self._channels = channels
+    def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+        self._state, self._channels = state, channels
         self.values: dict[str, float] = {}
-        self._past: deque[tuple[int, dict[Stream, Array]]] = deque([(0, {})], maxlen=KEPT)
 
     def put(self, stamp: int, values: Mapping[str, float]) -> bool:
         """Others from `stamp` (ns) on; samples of earlier stamps keep what they had. Tells whether those of strokes differ."""
-        before, self.values = self.values, dict(values)
-        rows = {}
-        for stream, names in self._channels.items():
-            row = np.array([self.values.get(name, 0.0) for name in names])
-            if row.any():
-                rows[stream] = row
-        self._past.append((stamp, rows))
+        before, self.values, state = self.values, dict(values), self._state
+        if state.zero_sets[0] == ZEROS:
+            state.zeros[:-1], state.zeros_since[:-1] = state.zeros[1:].copy(), state.zeros_since[1:].copy()
+            state.zeros_since[0] = NONE
+            state.zero_sets[0] -= 1
+        at = int(state.zero_sets[0])
+        state.zeros_since[at] = stamp
+        for row, names in zip(state.zeros[at], self._channels.values(), strict=True):
+            row[: len(names)] = [self.values.get(name, 0.0) for name in names]
+        state.zero_sets[0] += 1
         return any(before.get(name) != values.get(name) for name in self._channels[Stream.STROKES])
 
     def forget_past(self) -> None:
         """The newest zeros hold for every stamp."""
-        rows = self._past[-1][1]
-        self._past.clear()
-        self._past.append((0, rows))
+        state = self._state
+        state.zeros[0], state.zeros_since[0] = state.zeros[state.zero_sets[0] - 1], NONE
+        state.zero_sets[0] = 1
 
-    def of(self, stream: Stream, stamp: int) -> Array | None:
-        """What is to be taken from a sample; None where nothing is."""
-        for since, rows in reversed(self._past):
-            if since <= stamp:
-                return rows.get(stream)
-        return None
+    def of_strokes(self, stamp: int) -> Array:
+        """What is to be taken from strokes, m, shape (n,)."""
+        return self._state.zeros[zeros_at(self._state, stamp), STROKES, : len(self._channels[Stream.STROKES])]
 
 
 SPAN = SECOND  # ns
@@ -70,23 +70,19 @@ class ResidualBuffer:
 
     Parameters
     ----------
+    recent : Ring
+        Of `boom_twin.twin.state.TwinState`, which the update fills.
     channels : dict of Stream to tuple of str
         See `boom_twin.types.channels_of`.
     """
 
-    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
-        self._places = {name: (stream, i) for stream, names in channels.items() for i, name in enumerate(names)}
-        self._past: deque[tuple[int, Stream, Array]] = deque()
-
-    def add(self, stamp: int, stream: Stream, differences: Array) -> None:
-        """Remember, and forget what is too old; stamp in ns."""
-        self._past.append((stamp, stream, differences))
-        while self._past[0][0] < stamp - SPAN:
-            self._past.popleft()
+    def __init__(self, recent: Ring, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+        self._recent = recent
+        self._places = {name: (CODES[stream], i) for stream, names in channels.items() for i, name in enumerate(names)}
 
     def clear(self) -> None:
         """Forget everything."""
-        self._past.clear()
+        self._recent.bounds[:] = 0
 
     def zeros_of(self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]) -> dict[str, float]:
         """The zeros of a sensor, by channel, that the second before `now` (ns) tells.
@@ -118,8 +114,10 @@ class ResidualBuffer:
 
     def _mean(self, channel: str, now: int) -> float:
         own, place = self._places[channel]
-        rows = [row for stamp, stream, row in self._past if stream is own and stamp > now - SPAN]
-        values = [value for row in rows if math.isfinite(value := float(row[place]))]
+        recent, count = self._recent, self._recent.bounds[COUNT]
+        rows = (self._recent.bounds[FIRST] + np.arange(count)) % RECENT
+        rows = rows[(recent.streams[rows] == own) & (recent.stamps[rows] > now - SPAN)]
+        values = [value for value in recent.values[rows, place].tolist() if math.isfinite(value)]
         if len(values) < FEWEST:
             told = f"{channel}: {len(values)} residuals in the last second, {FEWEST} are needed"
             raise UsageError(f"{told}. Let its sensor and the strokes run, then ask again.")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import Array, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..types import Array, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
 
@@ -36,14 +36,6 @@ class SampleBlock(NamedTuple):
     streams: Integers
     stamps: Integers
     values: Array
-
-
-class Outline(NamedTuple):
-    """Of one prediction: ``shape``, ``undeflected`` and ``pins`` of `Prediction`, m."""
-
-    shape: Array
-    undeflected: Array
-    pins: Array
 
 
 class PredictionBlock(NamedTuple):

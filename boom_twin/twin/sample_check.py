@@ -30,7 +30,7 @@ class SampleCheck:
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
         self._count, self._low, self._high = 0, LIMIT, -LIMIT
-        self._is_sure = False
+        self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
         """The sample, its stamp an int and its values float64, shape (channels,): a copy, the caller's may change.
@@ -53,7 +53,7 @@ class SampleCheck:
         else:
             stream = _stream(stream)
             stamp, values = _stamp(stamp), self._values(stream, values)
-        if not self._is_sure and stream is Stream.STROKES:
+        if not self.is_sure and stream is Stream.STROKES:
             self._look(stamp)
         return Sample(stream, stamp, values)
 
@@ -63,8 +63,8 @@ class SampleCheck:
         self._low, self._high = min(self._low, stamp), max(self._high, stamp)
         if self._count < FIRST or self._low == self._high:
             return
-        self._is_sure = self._high - self._low >= self._count * SHORTEST
-        if not self._is_sure:
+        self.is_sure = self._high - self._low >= self._count * SHORTEST
+        if not self.is_sure:
             first, last, count, self._count = self._low, self._high, self._count, 0
             raise UsageError(
                 f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST} ns from one to the next. "

@@ -9,6 +9,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..estimation.boom_predictor import BoomPredictor
 from ..types import SECOND, Array, Sample
+from .state import NONE, TwinState
 from .stroke_check import FAR
 
 STEP = 1.75  # usual intervals; a longer one is looked at
@@ -25,27 +26,60 @@ class StampCheck:
     stray. If they follow the one that is held, time has stepped: it and they are released together. Where stamps were stray
     within the last second there may be two sources, and the other line has to go on alone for longer.
 
+    Parameters
+    ----------
+    settings : Settings
+    state : TwinState
+        Where `newest`, `usual` and the number of `held` samples are kept.
+    stream : int
+        See `boom_twin.twin.blocks.CODES`.
+
     Attributes
     ----------
-    newest : int or None
-        Stamp (ns) of the newest sample that was taken.
-    usual : float
-        Time (ns) from one sample to the next; 0 while unknown.
-    held : list of (Sample, str)
-        The newest samples of the other line, and what each was told to be.
     is_second : bool
         Whether that line had been met before, and the one that is followed went on since: there are two sources.
     """
 
-    def __init__(self, settings: Settings) -> None:
-        self.newest: int | None = None
-        self.usual = 0.0
-        self.held: list[tuple[Sample, str]] = []
+    def __init__(self, settings: Settings, state: TwinState, stream: int) -> None:
+        self._state, self._stream = state, stream
+        self.newest, self.usual, self.held = None, 0.0, []
         self.is_second = False
         self._since = 0
         self._other: int | None = None
         self._strayed: int | None = None
         self.tune(settings)
+
+    @property
+    def newest(self) -> int | None:
+        """Stamp (ns) of the newest sample that was taken; None before the first."""
+        stamp = int(self._state.newest[self._stream])
+        return None if stamp == NONE else stamp
+
+    @newest.setter
+    def newest(self, stamp: int | None) -> None:
+        self._state.newest[self._stream] = NONE if stamp is None else stamp
+
+    @property
+    def usual(self) -> float:
+        """Time (ns) from one sample to the next; 0 while unknown."""
+        return float(self._state.usual[self._stream])
+
+    @usual.setter
+    def usual(self, span: float) -> None:
+        self._state.usual[self._stream] = span
+
+    @property
+    def held(self) -> list[tuple[Sample, str]]:
+        """The newest samples of the other line, and what each was told to be."""
+        return self._held
+
+    @held.setter
+    def held(self, samples: list[tuple[Sample, str]]) -> None:
+        self._held = samples
+        self._note_held()
+
+    def _note_held(self) -> None:
+        self._state.held[self._stream] = len(self._held)
 
     def tune(self, settings: Settings) -> None:
         """Judge by these limits from now on."""
@@ -84,9 +118,10 @@ class StampCheck:
             self.held, self._since, self.is_second = [], sample.stamp, follows
         if self.is_second and event == "leap":
             event = "second source"
-        self.held.append((sample, event))
-        if len(self.held) > KEPT:
-            del self.held[0]
+        self._held.append((sample, event))
+        if len(self._held) > KEPT:
+            del self._held[0]
+        self._note_held()
         return event
 
     def is_confirmed(self, least: float = 0.0) -> bool:

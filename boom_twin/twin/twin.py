@@ -3,31 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from operator import gt, lt
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.equilibrium import SHARE
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem
+from ..health.inference.block_problem import BlockProblem, Compared, Followed
 from ..health.monitor import HealthMonitor
-from ..kernels.tables import OK, SENTENCES
+from ..kernels.result_row import PIN
+from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import LIMIT, NANO, Array, Change, Mount, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, SECOND, Array, Change, Health, Mount, Outline, Report, Residuals, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .expected_readings import Deviations, PredictedBoom, PredictionBuffer, expected_readings
+from .blocks import CODES, STREAMS, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .expected_readings import Deviations
 from .sample_check import SHORTEST, SampleCheck
 from .stamp_check import LASTING, StampCheck, TimeStep, explain, goes_on, is_close, jerk_densities, surprise
+from .state import (
+    BEGINS_SLOT,
+    EPOCH,
+    IN_SLOT,
+    IS_DEFLECTED,
+    NEWEST,
+    NONE,
+    STATUS,
+    STROKES,
+    UNMATCHED,
+    USUAL_STEP,
+    Found,
+    Limits,
+    TwinState,
+    keep_waiting,
+    new_found,
+    new_state,
+)  # fmt: skip
 from .stroke_check import FAR, StrokeCheck
+from .update import AFTER_PAUSE, DONE, FAILED, LOOK, ODD, REFRESH, matched, measure, update
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
@@ -56,37 +78,56 @@ EVENTS = {
 TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""
 
-SMOOTHING = 0.05  # weight of the newest interval in the running mean
-PENDING = 4096  # most samples that wait for a stroke
-SHAPE_PERIOD = 100_000_000  # ns of one slot; one shape is given in each, 10 a second
+CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-@dataclass
 class _Run:
-    """What the twin knows since the boom was last taken to be at rest."""
+    """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
 
-    epoch: int
-    newest: int
-    deviations: Deviations
-    strokes: Array
-    is_again: bool
-    interval: float = 0.0
-    slot: int = -1
-    memory: PredictionBuffer = field(default_factory=PredictionBuffer)
-    plausible: StrokeCheck = field(default_factory=StrokeCheck)
-    prediction: Prediction | None = None
+    def __init__(self, state: TwinState, deviations: Deviations, stamp: int, is_again: bool) -> None:
+        self.deviations, self.is_again, self._state = deviations, is_again, state
+        self.plausible = StrokeCheck(state.clock)
+        self.is_predicted = False
+        state.clock[EPOCH] = state.clock[NEWEST] = stamp
+        state.clock[IN_SLOT] = -1
+        state.pace[:] = 0.0, 0.0, -math.inf
+        state.past.bounds[:] = 0
 
     @property
-    def estimate(self) -> Array | None:
-        """Strokes (m) as estimated at the newest sample, shape (n,); None before the first one."""
-        return None if self.prediction is None else self.prediction.strokes
+    def epoch(self) -> int:
+        """Stamp (ns) of the start."""
+        return int(self._state.clock[EPOCH])
+
+    @property
+    def newest(self) -> int:
+        """Stamp (ns) of the newest strokes that were followed."""
+        return int(self._state.clock[NEWEST])
+
+    @property
+    def interval(self) -> float:
+        """Running mean of the time between strokes, s."""
+        return float(self._state.pace[USUAL_STEP])
+
+    @property
+    def strokes(self) -> Array:
+        """The newest ones less their zeros, m, shape (n,); NaN where missing."""
+        return self._state.strokes
+
+    def strokes_at(self, stamp: int) -> Array | None:
+        """As measured at `stamp` (ns), linear between samples, m, shape (n,); None where that is not remembered."""
+        past = self._state.past
+        row, share = matched(past, stamp)
+        if row < 0:
+            return None
+        old = past.strokes[row - 1]
+        return np.asarray(past.strokes[row] if share == 1.0 else old + share * (past.strokes[row] - old))
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
-        self.epoch += shift
-        self.newest += shift
+        self._state.clock[EPOCH] += shift
+        self._state.clock[NEWEST] += shift
         self.deviations.rebase(shift)
-        self.memory = PredictionBuffer()
+        self._state.past.bounds[:] = 0
 
 
 class Twin:
@@ -136,29 +177,34 @@ class Twin:
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self._build()
-        self._channels = channels_of(self.plan.joints)
-        self._lines = {stream: StampCheck(self.settings) for stream in Stream}
+        self._channels = channels_of(len(scene.joints))
+        self._counts = np.array([len(names) for names in self._channels.values()])
+        self._state = new_state(len(scene.joints), self._counts)
+        self._state.clock[NEWEST] = NONE
         self._beyond = FAR * self.settings.stroke_variance**0.5
-        self._shortest = [-self._beyond] * len(scene.joints)
-        self._longest = [joint.cylinder.max_stroke + self._beyond for joint in scene.joints]
+        self._shortest = np.full(len(scene.joints), -self._beyond)
+        self._longest = np.array([joint.cylinder.max_stroke for joint in scene.joints]) + self._beyond
+        self._build()
         self._edge = SampleCheck(self._channels)
         self._run: _Run | None = None
         self._failed: int | None = None
         self._speeds: Array | None = None
-        self._pending: deque[Sample] = deque()
+        self._lines = self._new_lines()
         self.requests, self._zeros, self._recent = (
             Requests(self.settings),
-            SensorZeros(self._channels),
-            ResidualBuffer(self._channels),
+            SensorZeros(self._state, self._channels),
+            ResidualBuffer(self._state.recent, self._channels),
         )
+
+    def _new_lines(self) -> dict[Stream, StampCheck]:
+        return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}
 
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
         self._speeds = None
-        self._lines = {stream: StampCheck(self.settings) for stream in Stream}
-        self._pending = deque()
+        self._lines = self._new_lines()
+        self._state.waiting.bounds[:] = 0
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
@@ -193,12 +239,43 @@ class Twin:
     def _build(self) -> None:
         """The model under the present load."""
         scene = loaded(self.scene, *self.settings.load)
-        self._boom, self._valid = BoomPredictor(scene, self.settings), SHARE * scene.reach
+        self._boom = BoomPredictor(scene)
         self.plan = self._boom.plan
         self.judge = None
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        self._mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
+        self._limits, width = self._limited(SHARE * scene.reach), self._boom.compiled.row.shape[0]
+        size = len(self._counts), int(self._counts.max())
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, size[1]), np.nan))
+        self._found = new_found(CAPACITY, self.plan.joints, width, len(self._boom.compiled.bending), self._counts)
+        self._news = _News()
+
+    def _limited(self, valid: float) -> Limits:
+        """What the compiled update judges by, under the present settings."""
+        settings, counts = self.settings, self._counts
+        mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
+        tuning = Tuning(
+            settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
+        )
+        return Limits(
+            tuning=tuning,
+            patient=tuning._replace(lag=max(AFTER_PAUSE, settings.lag)),
+            gap=round(settings.gap * SECOND),
+            leap=settings.leap / NANO,
+            far=self._beyond,
+            rate=settings.stroke_rate,
+            shortest=self._shortest,
+            longest=self._longest,
+            valid=valid,
+            angle_variance=settings.angle_variance,
+            gravity=np.array(self.plan.tables.gravity),
+            inclination=self.scene.base.inclination,
+            is_mounted=mounting.has_any,
+            absolute=mounting.absolute,
+            frames=mounting.frames,
+            first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
+            channels=counts,
+        )
 
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -207,6 +284,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
+            self._limits = self._limited(self._limits.valid)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -215,13 +293,15 @@ class Twin:
         if (from_rest or "load" in events) and self._run is not None:
             events += [] if events else ["reset"]
             self._begin_anew()
-            self._pending = deque(sample for sample in self._pending if sample.stamp >= stamp)
+            keep_waiting(self._state, stamp, -NONE)
         if "load" in events:
             self._build()
         return events
 
     def _begin_anew(self) -> None:
         self._run = None
+        self._state.clock[NEWEST] = NONE
+        self._state.past.bounds[:] = 0
         self._zeros.forget_past()
         self._recent.clear()
         if self.judge is not None:
@@ -256,6 +336,62 @@ class Twin:
             channel. Nothing has changed then.
         """
         sample = self._edge.checked(sample)
+        if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
+            return self._look_at(sample)
+        self._fill_one(sample.stream, sample.stamp, sample.values)
+        reason, _ = self._advance(self._one)
+        if reason == DONE:
+            return self._report(sample.stamp, [])
+        return self._fail(sample, []) if reason == FAILED else self._look_at(sample)
+
+    def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
+        """Take the samples of a block in turn, as `update` does each of them.
+
+        Parameters
+        ----------
+        block : SampleBlock
+
+        Returns
+        -------
+        list of ReportBlock or Report
+            In the order of the samples: blocks of those of which nothing out of the ordinary is to be told, and a report of
+            every other sample.
+
+        Raises
+        ------
+        UsageError
+            As `update` does; the samples before have been taken.
+        """
+        found: list[ReportBlock | Report] = []
+        row, size, channels = 0, len(block.stamps), self._counts.tolist()
+        while row < size:
+            if self._run is not None and self._edge.is_sure and not self.requests.due:
+                end = row + CAPACITY
+                part = SampleBlock(block.streams[row:end], block.stamps[row:end], block.values[row:end])
+                reason, done = self._advance(part)
+                if done:
+                    found += self._reports(part.stamps[:done])
+                row += done
+                if reason == DONE:
+                    continue
+                sample = self._sample(block, row, channels)
+                found.append(self._fail(sample, []) if reason == FAILED else self._look_at(sample))
+            else:
+                found.append(self.update(self._sample(block, row, channels)))
+            row += 1
+        return found
+
+    def _sample(self, block: SampleBlock, row: int, channels: list[int]) -> Sample:
+        code = int(block.streams[row])
+        return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : channels[code]].copy())
+
+    def _fill_one(self, stream: Stream, stamp: int, values: Array) -> None:
+        one = self._one
+        one.streams[0], one.stamps[0], one.values[0, : len(values)] = CODES[stream], stamp, values
+
+    def _look_at(self, sample: Sample) -> Report:
+        """Take a sample that may be out of the ordinary."""
+        self._news.clear(self._found)
         complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
@@ -266,6 +402,135 @@ class Twin:
             return self._take_strokes(sample, complete)
         return self._take_measured(sample, complete)
 
+    # -- the compiled update ----------------------------------------------------------------------------------------
+
+    def _advance(self, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
+        """Take samples of a block as long as they are ordinary; why that ended, and how many they were.
+
+        What they caused is in `_found` and `_news`. One sample that is `trusted` was looked at before.
+        """
+        found, news = self._found, self._news
+        news.clear(found)
+        if len(block.stamps) == 1 and block.streams[0] != STROKES:
+            args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
+            reason, row = (DONE, 1) if measure(self._limits, self._state, *args, trusted, found) else (ODD, 0)
+        else:
+            reason, row = self._advance_strokes(block, trusted)
+        self._tell_health()
+        if unmatched := int(self._state.clock[UNMATCHED]):
+            self.counts["unmatched"] += unmatched
+            self._state.clock[UNMATCHED] = 0
+        return reason, row
+
+    def _advance_strokes(self, block: SampleBlock, trusted: bool) -> tuple[int, int]:
+        run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
+        assert run is not None
+        while True:
+            reason, row = update(self._boom.compiled, self._limits, self._state, *block, row, is_resumed, trusted, self._found)
+            if is_resumed := reason == REFRESH:
+                interval = run.interval or self.settings.step
+                run.deviations.refresh(self._boom.prediction(run.newest), interval, self._boom.live, self._boom.angles)
+            elif reason != LOOK:
+                return reason, row
+            else:
+                self._look_around(run, row)
+                row += 1
+                if row == size:
+                    return DONE, row
+
+    def _look_around(self, run: _Run, row: int) -> None:
+        """What a prediction that begins a slot, or left the model's validity, has beside its numbers."""
+        clock, at, news = self._state.clock, int(self._found.counts[0]) - 1, self._news
+        if clock[IS_DEFLECTED]:
+            news.deflected.add(row)
+            self.counts["deflected"] += 1
+        if not clock[BEGINS_SLOT]:
+            return
+        news.outlines[at] = self._boom.outline()
+        if self.judge is not None:
+            self._tell_health()
+            health = self.judge.judge(run.newest, self._boom.variances, run.deviations.noise, run.deviations.tip)
+            if health is not None:
+                news.health[row] = health
+
+    def _tell_health(self) -> None:
+        """Give the health monitor what has come since it was told last."""
+        found, news, at = self._found, self._news, self._boom.places
+        if self.judge is None:
+            return
+        new, last = slice(news.told[0], int(found.counts[0])), slice(news.told[1], int(found.counts[1]))
+        if new.stop > new.start:
+            rows = found.rows[new].copy()
+            acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
+            followed = Followed(
+                found.stamps[new].copy(), found.measured[new].copy(), rows[:, at.strokes], rows[:, at.joints], acceleration
+            )
+            self.judge.predicted(followed)
+        if last.stop > last.start:
+            streams = found.residual_streams[last]
+            for code in np.unique(streams).tolist() if len(streams) > 1 else streams.tolist():
+                own, width = np.flatnonzero(streams == code) + last.start, int(self._counts[code])
+                self.judge.measured(
+                    STREAMS[code], Compared(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
+                )
+        news.told = new.stop, last.stop
+
+    def _residuals(self) -> ResidualBlock:
+        found, own = self._found, slice(0, int(self._found.counts[1]))
+        return ResidualBlock(
+            at=found.residual_at[own].copy(),
+            streams=found.residual_streams[own].copy(),
+            stamps=found.residual_stamps[own].copy(),
+            values=found.values[own].copy(),
+            sigmas=found.sigmas[own].copy(),
+        )
+
+    def _predictions(self) -> PredictionBlock:
+        found, own, at = self._found, slice(0, int(self._found.counts[0])), self._boom.places
+        rows = found.rows[own].copy()
+        tip = rows[:, at.tip].reshape(-1, 3, 3)
+        return PredictionBlock(
+            at=found.at[own].copy(),
+            stamps=found.stamps[own].copy(),
+            tip_position=tip[:, 0, :2],
+            tip_displacement=tip[:, 0, :2] - rows[:, at.rigid_tip],
+            tip_velocity=tip[:, 1, :2],
+            tip_acceleration=tip[:, 2, :2],
+            tip_angle=tip[:, 0, 2],
+            tip_angular_velocity=tip[:, 1, 2],
+            tip_angular_acceleration=tip[:, 2, 2],
+            joints=rows[:, at.joints],
+            strokes=rows[:, at.strokes],
+            cylinder_forces=rows[:, at.cylinder_forces],
+            clearances=rows[:, at.pins].reshape(len(rows), len(self.plan.pins), PIN),
+            moments=found.moments[own].copy(),
+            outlines=dict(self._news.outlines),
+        )
+
+    def _reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
+        """What the compiled update found of samples with these stamps (ns)."""
+        block = ReportBlock(stamps, self._predictions(), self._residuals(), dict(self._news.health))
+        if not self._news.deflected:
+            return [block]
+        reports = enumerate(block.reports(self.plan.joints))
+        return [replace(each, events=("deflected",)) if row in self._news.deflected else each for row, each in reports]
+
+    def _report(self, stamp: int, events: list[str]) -> Report:
+        """What the compiled update found of one sample, of which `events` are to be told too."""
+        found, news, n = self._found, self._news, int(self._found.counts[0])
+        residuals = []
+        for row in range(int(found.counts[1])):
+            stream = STREAMS[found.residual_streams[row]]
+            names = self._channels[stream]
+            values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
+            residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
+        if not n:
+            return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
+        prediction = self._boom.prediction(stamp, news.outlines.get(0))
+        told = (*events, "deflected") if news.deflected else tuple(events)
+        passes = int(found.passes[0])
+        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))
+
     # -- strokes ----------------------------------------------------------------------------------------------------
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
@@ -274,8 +539,7 @@ class Twin:
             return self._follow(sample, values, complete, [])
         span = sample.stamp - run.newest
         if line.is_next(sample.stamp) and span >= SHORTEST:
-            estimate = run.estimate
-            if estimate is not None and run.plausible.is_of_others(sample.stamp - run.epoch, values, estimate, self.settings):
+            if run.plausible.is_of_others(sample.stamp - run.epoch, values, self._boom.estimate, self.settings):
                 self.counts["implausible"] += 1
                 return Report(sample.stamp, True, events=("implausible",))
             return self._follow(sample, values, complete, [])
@@ -284,9 +548,9 @@ class Twin:
             return self._refuse(sample, "duplicate" if same else "second source")
         if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
             return self._follow(sample, values, complete, [])
-        then = run.memory.at(sample.stamp)
+        then = run.strokes_at(sample.stamp)
         back = (run.newest - sample.stamp) * NANO
-        if then is not None and back <= self.settings.jump_back and np.array_equal(then.strokes, values):
+        if then is not None and back <= self.settings.jump_back and np.array_equal(then, values):
             return self._refuse(sample, "late")
         is_late = self._is_late(run, sample.stamp, values)
         event = line.hold(sample, "late" if is_late else "leap", self._is_apart(line, sample))
@@ -311,8 +575,8 @@ class Twin:
         """Whether it is back by little, and its strokes are those of its stamp."""
         if not -self.settings.jump_back <= (stamp - run.newest) * NANO < 0.0:
             return False
-        then = run.memory.at(stamp)
-        return then is None or is_close(values, then.strokes, run.interval, self.settings)
+        then = run.strokes_at(stamp)
+        return then is None or is_close(values, then, run.interval, self.settings)
 
     def _explain(self, run: _Run, line: StampCheck) -> TimeStep:
         """Why the stamps of what is held are not those that were to come."""
@@ -347,8 +611,8 @@ class Twin:
         """State what the model cannot know after a pause that ended with the sample `first`."""
         span = (first.stamp - run.newest) * NANO
         run.deviations.add_pause(first.stamp, span, jerk_densities(self._boom, self._zeroed(first), span, self.settings))
-        if why is TimeStep.EITHER and run.prediction is not None:
-            run.deviations.add_phase(first.stamp, run.prediction)
+        if why is TimeStep.EITHER:
+            run.deviations.add_phase(first.stamp, self._boom.prediction(run.newest))
 
     def _speeds_of(self, held: list[Sample]) -> Array:
         """Of strokes (m/s) around a start from rest: before it as estimated, after it as measured, whichever is larger."""
@@ -373,14 +637,13 @@ class Twin:
         self._zeros.forget_past()
         self._recent.clear()
         if shift < 0:
-            self._pending = deque(sample for sample in self._pending if sample.stamp <= before)
+            keep_waiting(self._state, NONE, before)
         if self.judge is not None:
             self.judge.begin()
 
     def _zeroed(self, sample: Sample) -> Array:
         """Strokes without what their sensors read too much."""
-        zeros = self._zeros.of(Stream.STROKES, sample.stamp)
-        return sample.values if zeros is None else sample.values - zeros
+        return sample.values - self._zeros.of_strokes(sample.stamp)
 
     def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
         """Go on to a stroke sample, whose `values` are without the sensors' zeros; the model starts if it has not."""
@@ -391,10 +654,9 @@ class Twin:
             events += self._take_over(sample.stamp)
             values = self._zeroed(sample)
         told = asked or "clock set" in events
-        if self._are_beyond_travel(values.tolist()):
+        if ((values < self._shortest) | (values > self._longest)).any():
             events.append("out of range")
-        if values is not sample.values:
-            sample = replace(sample, values=values)
+        sample = replace(sample, values=values)
         if self._run is not None:
             report, from_rest = self._step(self._run, sample, events), False
         elif complete and (self._failed is None or asked or abs(sample.stamp - self._failed) >= LASTING):
@@ -405,10 +667,6 @@ class Twin:
             return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
         return report
 
-    def _are_beyond_travel(self, strokes: list[float]) -> bool:
-        """Whether one is where its cylinder cannot stand; those that are missing are not."""
-        return any(map(lt, strokes, self._shortest)) or any(map(gt, strokes, self._longest))
-
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
             self._boom.start(sample.values)
@@ -416,42 +674,30 @@ class Twin:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
-        deviations = Deviations(self.plan, self.settings, sample.stamp, speeds)
-        self._run = _Run(sample.stamp, sample.stamp, deviations, sample.values, speeds is not None)
+        deviations = Deviations(self.plan, self.settings, self._state, sample.stamp, speeds)
+        self._run = _Run(self._state, deviations, sample.stamp, speeds is not None)
         return self._step(self._run, sample, events)
 
     def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
+        """Step the model to strokes that were looked at, their values less the sensors' zeros."""
         self._lines[Stream.STROKES].take(sample.stamp)
-        values, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, run.estimate, self.settings)
+        estimate = self._boom.estimate if run.is_predicted else None
+        taken, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, estimate, self.settings)
+        run.is_predicted = True
         events += oddities
-        status = self._boom.step((sample.stamp - run.epoch) * NANO, values)
-        if status != OK:
-            self.reset()
-            self._failed = sample.stamp
-            return self._refuse(sample, "model", *events, status=SENTENCES[status])
-        span = (sample.stamp - run.newest) * NANO
-        run.interval += SMOOTHING * (span - run.interval) if run.interval else span
-        before, run.newest, run.slot, run.strokes = run.slot, sample.stamp, sample.stamp // SHAPE_PERIOD, sample.values
-        prediction = self._boom.prediction(sample.stamp, shaped=run.slot != before)
-        run.prediction = prediction
-        self._remember(run, prediction)
-        if math.hypot(*prediction.tip_displacement.tolist()) > self._valid:
-            events.append("deflected")
-        if events:
-            self.counts.update(events)
-        if self.judge is not None:
-            self.judge.predicted(prediction, sample.values, self._boom.variances, run.deviations.noise, run.deviations.tip)
-        residuals = self._settle_pending(run)
-        health = None if self.judge is None else self.judge.judge(sample.stamp)
-        return Report(sample.stamp, True, prediction, residuals, tuple(events), passes=self._boom.passes, health=health)
+        self._state.strokes[:], self._state.taken[:] = sample.values, taken
+        self._fill_one(sample.stream, sample.stamp, sample.values)
+        reason, _ = self._advance(self._one, trusted=True)
+        if reason == FAILED:
+            return self._fail(sample, events)
+        self.counts.update(events)
+        return self._report(sample.stamp, events)
 
-    def _remember(self, run: _Run, prediction: Prediction) -> None:
-        """Keep what residuals need."""
-        boom, interval = self._boom, run.interval or self.settings.step
-        joint_sigmas, force_sigmas = run.deviations.at(prediction, interval, boom.variances, boom.live, boom.angles)
-        gravity = self.plan.tables.gravity
-        now = PredictedBoom(prediction, boom.live, gravity, self._mounting, self.settings, joint_sigmas, force_sigmas)
-        run.memory.add(expected_readings(now, run.strokes))
+    def _fail(self, sample: Sample, events: list[str]) -> Report:
+        """The model failed at a stroke sample."""
+        self.reset()
+        self._failed = sample.stamp
+        return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
@@ -476,42 +722,11 @@ class Twin:
         if not complete:
             events = ("partial",)
             self.counts.update(events)
-        if self._run is None or sample.stamp > self._run.newest:
-            if len(self._pending) == PENDING:
-                self._pending.popleft()
-                self.counts["unmatched"] += 1
-            self._pending.append(sample)
-            return Report(sample.stamp, True, events=events)
-        residuals = self._residuals(self._run, sample)
-        if residuals is None:
+        self._fill_one(sample.stream, sample.stamp, sample.values)
+        reason, _ = self._advance(self._one, trusted=True)
+        if reason != DONE:
             return self._refuse(sample, "unmatched", *events)
-        return Report(sample.stamp, True, residuals=(residuals,), events=events)
-
-    def _settle_pending(self, run: _Run) -> tuple[Residuals, ...]:
-        """Residuals of all samples that waited for the newest stroke."""
-        if not self._pending:
-            return ()
-        ready = sorted((s for s in self._pending if s.stamp <= run.newest), key=lambda s: (s.stamp, s.stream.value))
-        self._pending = deque(s for s in self._pending if s.stamp > run.newest)
-        found = [self._residuals(run, sample) for sample in ready]
-        self.counts["unmatched"] += found.count(None)
-        return tuple(residuals for residuals in found if residuals is not None)
-
-    def _residuals(self, run: _Run, sample: Sample) -> Residuals | None:
-        expected = run.memory.at(sample.stamp)
-        if expected is None:
-            return None
-        values, sigmas = sample.values - expected.values[sample.stream], expected.sigmas[sample.stream]
-        if sample.stream is Stream.ANGLES:
-            values = self._mounting.unwound(values)
-        self._recent.add(sample.stamp, sample.stream, values)
-        zeros = self._zeros.of(sample.stream, sample.stamp)
-        if zeros is not None:
-            values = values - zeros
-        residuals = Residuals(sample.stream, sample.stamp, self._channels[sample.stream], values, sigmas)
-        if self.judge is not None:
-            self.judge.measured(residuals, sample.values)
-        return residuals
+        return self._report(sample.stamp, list(events))
 
     def _hold(self, sample: Sample, event: str) -> Report:
         """Taken as a witness of time alone, at first."""
@@ -521,6 +736,25 @@ class Twin:
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)
         return Report(sample.stamp, False, events=events, status=status)
+
+
+class _News:
+    """What one call of the compiled update gives beside numbers.
+
+    outlines by row of a prediction, health by row of a sample, deflected: rows of samples; told: rows of predictions and of
+    residuals that the health monitor knows.
+    """
+
+    def __init__(self) -> None:
+        self.outlines: dict[int, Outline] = {}
+        self.health: dict[int, Health] = {}
+        self.deflected: set[int] = set()
+        self.told = 0, 0
+
+    def clear(self, found: Found) -> None:
+        """Before the next call."""
+        found.counts[:] = 0
+        self.__init__()  # type: ignore[misc]
 
 
 def _are_readings(values: list[float]) -> bool:

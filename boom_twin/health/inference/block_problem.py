@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...scene.schema import Scene
-from ...types import NANO, Array, Mount, Prediction, Residuals, Stream
+from ...types import NANO, Array, Mount, Stream
 from .fault_catalogue import Form, Parameter
 from .innovation_filter import ModalStates, modes_of
 from .sensitivities import Signature, Signatures
@@ -20,7 +22,47 @@ BLOCK = 100_000_000  # ns
 GRACE = 100_000_000  # ns that a block waits for late samples
 
 
-@dataclass(slots=True)
+class Followed(NamedTuple):
+    """Predictions with the strokes that they followed.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (k,)
+        ns.
+    measured, strokes : ndarray, shape (k, n)
+        Strokes as measured and as estimated, m.
+    joints : ndarray, shape (k, n)
+        Predicted angles, rad.
+    accelerations : ndarray, shape (k, 2)
+        Of the tip, m/s^2.
+    """
+
+    stamps: NDArray[np.int64]
+    measured: Array
+    strokes: Array
+    joints: Array
+    accelerations: Array
+
+
+class Compared(NamedTuple):
+    """Measured samples of one stream.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (k,)
+        ns.
+    raw, left : ndarray, shape (k, channels)
+        As measured, and the residuals; in the unit of the sensor.
+    """
+
+    stamps: NDArray[np.int64]
+    raw: Array
+    left: Array
+
+
+Rows = TypeVar("Rows", Followed, Compared)
+
+
 class Block:
     """What came within one block.
 
@@ -28,23 +70,46 @@ class Block:
     ----------
     number : int
         Its stamps over `BLOCK`.
-    predictions : list of Prediction
-    strokes : list of ndarray
-        As measured, m, one for each prediction.
-    angles, forces : list of (Residuals, ndarray)
-        With what was measured (rad, m/s^2).
     """
 
-    number: int
-    predictions: list[Prediction] = field(default_factory=list)
-    strokes: list[Array] = field(default_factory=list)
-    angles: list[tuple[Residuals, Array]] = field(default_factory=list)
-    forces: list[tuple[Residuals, Array]] = field(default_factory=list)
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.followed: list[Followed] = []
+        self.compared: dict[Stream, list[Compared]] = {}
 
     @property
     def end(self) -> int:
         """Stamp (ns) at which it ends."""
         return (self.number + 1) * BLOCK
+
+    def predictions(self) -> Followed:
+        """All of them; there is at least one."""
+        return joined(self.followed)
+
+    def readings(self, stream: Stream, channels: int) -> Compared:
+        """All samples of a stream with so many channels."""
+        rows = self.compared.get(stream)
+        if rows is None:
+            return Compared(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
+        return joined(rows)
+
+
+def joined(parts: list[Rows]) -> Rows:
+    """The rows of all parts, one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    return type(parts[0])(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
+    """The rows of every block that they are of, with its number."""
+    numbers = rows.stamps // BLOCK
+    if numbers[0] == numbers[-1] and (numbers == numbers[0]).all():
+        yield int(numbers[0]), rows
+        return
+    for number in np.unique(numbers).tolist():
+        own = numbers == number
+        yield number, type(rows)(*(column[own] for column in rows))
 
 
 class BlockBuilder:
@@ -54,21 +119,17 @@ class BlockBuilder:
         self._open: deque[Block] = deque()
         self._closed = -1
 
-    def predicted(self, prediction: Prediction, strokes: Array) -> None:
-        """A prediction with the strokes (m) as they were measured."""
-        block = self._at(prediction.stamp)
-        if block is not None:
-            block.predictions.append(prediction)
-            block.strokes.append(strokes)
+    def predicted(self, followed: Followed) -> None:
+        """Predictions, at least one."""
+        for number, rows in by_block(followed):
+            if (block := self._at(number)) is not None:
+                block.followed.append(rows)
 
-    def measured(self, residuals: Residuals, values: Array) -> None:
-        """Residuals of one sample with its values; those of other streams than angles and IMU do not matter."""
-        block = self._at(residuals.stamp)
-        if block is not None:
-            if residuals.stream is Stream.ANGLES:
-                block.angles.append((residuals, values))
-            elif residuals.stream is Stream.IMU:
-                block.forces.append((residuals, values))
+    def measured(self, stream: Stream, compared: Compared) -> None:
+        """Samples of a stream with their residuals, at least one."""
+        for number, rows in by_block(compared):
+            if (block := self._at(number)) is not None:
+                block.compared.setdefault(stream, []).append(rows)
 
     def close(self, stamp: int) -> list[Block]:
         """Blocks that nothing is waited for any more once a stroke has come with `stamp` (ns); they may be empty."""
@@ -78,9 +139,8 @@ class BlockBuilder:
             self._closed = done[-1].number
         return done
 
-    def _at(self, stamp: int) -> Block | None:
-        """The block of a stamp, with those in between opened; None if it is closed already."""
-        number = stamp // BLOCK
+    def _at(self, number: int) -> Block | None:
+        """The block of a number, with those in between opened; None if it is closed already."""
         if number <= self._closed:
             return None
         if not self._open:
@@ -90,14 +150,6 @@ class BlockBuilder:
         while self._open[0].number > number:
             self._open.appendleft(Block(self._open[0].number - 1))
         return self._open[number - self._open[0].number]
-
-
-def stacked(rows: list[tuple[Residuals, Array]], channels: int) -> tuple[Array, Array, Array]:
-    """Stamps (k,) in s, measured and residual values (k, channels)."""
-    if not rows:
-        return np.zeros(0), np.zeros((0, channels)), np.zeros((0, channels))
-    stamps = np.array([residuals.stamp for residuals, _ in rows]) * NANO
-    return stamps, np.array([values for _, values in rows]), np.array([residuals.values for residuals, _ in rows])
 
 
 def means(left: Array, sigma: float) -> tuple[Array, Array]:

@@ -1,0 +1,188 @@
+"""State of the twin as arrays: stamps, expected readings, samples that wait, zeros; and the limits it is updated by."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..estimation.look_ahead import Tuning
+from ..kernels.jit import inner
+from ..types import Array
+
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+STROKES, ANGLES, IMU = 0, 1, 2  # of `boom_twin.twin.blocks.CODES`
+NONE = -(2**62)  # no stamp yet, ns
+KEPT = 16_384  # most expected readings, of the last `SPAN`: 8 kHz
+WAITING = 4096  # most samples that wait for a stroke
+RECENT = 16_384  # differences that the zero of a sensor may be found from
+ZEROS = 16  # sets of zeros that late samples may still need
+SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
+
+EPOCH, NEWEST, SEEN, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(11)  # of `clock`
+USUAL_STEP, STEPPED, PAUSED = range(3)  # of `pace`
+FIRST, COUNT = range(2)  # of a ring
+
+
+class Ring(NamedTuple):
+    """The newest rows of a table: `bounds` has the place of the oldest one, and how many there are."""
+
+    bounds: Integers
+    stamps: Integers
+    streams: Integers
+    values: Array
+    sigmas: Array
+    strokes: Array
+
+
+class TwinState(NamedTuple):
+    """What the twin remembers from sample to sample, beside the boom; s streams of up to w channels, c measured ones in all.
+
+    clock : (11,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
+    pace : (3,) running mean of the time between strokes, times of the newest step and of the newest pause, s.
+    newest : (s,) stamp of the newest sample of every stream, ns; NONE before the first.
+    usual : (s,) time from one sample to the next, ns; 0 while unknown.
+    held : (s,) samples that are held, see `boom_twin.twin.stamp_check`.
+    strokes, taken : (n,) newest strokes less their zeros, and as the model is to take them, m; NaN where missing.
+    past : expected readings (c,), their deviations and the strokes, of the last `SPAN`.
+    waiting : measured samples that wait for a stroke, by stamp and stream.
+    recent : measured less expected, without any zero.
+    zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
+    joints2, slopes2, force : (n,), (n,), (2,) of the deviations, see `boom_twin.twin.expected_readings.Deviations`.
+    """
+
+    clock: Integers
+    pace: Array
+    newest: Integers
+    usual: Array
+    held: Integers
+    strokes: Array
+    taken: Array
+    past: Ring
+    waiting: Ring
+    recent: Ring
+    zeros_since: Integers
+    zeros: Array
+    zero_sets: Integers
+    joints2: Array
+    slopes2: Array
+    force: Array
+
+
+class Limits(NamedTuple):
+    """What `update` judges and steps by.
+
+    tuning, patient : of the estimator, usually and after a pause.
+    gap, leap : ns. far : m, by which a stroke may be off its estimate at once. rate : m/s, of the fastest stroke.
+    shortest, longest : (n,) strokes that its cylinder can have, m.
+    valid : m, how far the tip may be from the undeformed boom's.
+    angle_variance : rad^2. gravity : (2,) m/s^2. inclination : rad.
+    is_mounted : whether any angle sensor is no encoder. absolute, frames : (n,) whether, and in which frame of the chain.
+    first, channels : (s,) first column of every stream among the measured channels, and how many it has.
+    """
+
+    tuning: Tuning
+    patient: Tuning
+    gap: int
+    leap: float
+    far: float
+    rate: float
+    shortest: Array
+    longest: Array
+    valid: float
+    angle_variance: float
+    gravity: Array
+    inclination: float
+    is_mounted: bool
+    absolute: Flags
+    frames: Integers
+    first: Integers
+    channels: Integers
+
+
+class Found(NamedTuple):
+    """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
+
+    rows : results and estimates, see `boom_twin.kernels.result_row`. measured : strokes less their zeros, m. raw : as measured.
+    """
+
+    counts: Integers
+    at: Integers
+    stamps: Integers
+    rows: Array
+    moments: Array
+    measured: Array
+    passes: Integers
+    residual_at: Integers
+    residual_streams: Integers
+    residual_stamps: Integers
+    values: Array
+    sigmas: Array
+    raw: Array
+
+
+def keep_waiting(state: TwinState, first: int, last: int) -> None:
+    """Of the samples that wait, keep those with stamps (ns) from `first` to `last`."""
+    ring = state.waiting
+    count = int(ring.bounds[COUNT])
+    rows = np.flatnonzero((ring.stamps[:count] >= first) & (ring.stamps[:count] <= last))
+    for column in (ring.stamps, ring.streams, ring.values):
+        column[: len(rows)] = column[rows]
+    ring.bounds[COUNT] = len(rows)
+
+
+def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:
+    """An empty ring of `size` rows with so many columns."""
+    return Ring(
+        np.zeros(2, np.int64), np.zeros(size, np.int64), np.zeros(size, np.int64),
+        np.zeros((size, values)), np.zeros((size, sigmas)), np.zeros((size, strokes)),
+    )  # fmt: skip
+
+
+def new_state(joints: int, channels: Integers) -> TwinState:
+    """Of a boom with so many joints, and so many channels in every stream."""
+    streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
+    return TwinState(
+        clock=np.zeros(11, np.int64), pace=np.zeros(3),
+        newest=np.full(streams, NONE), usual=np.zeros(streams), held=np.zeros(streams, np.int64),
+        strokes=np.zeros(joints), taken=np.zeros(joints),
+        past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
+        zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
+        joints2=np.zeros(joints), slopes2=np.zeros(joints), force=np.zeros(2),
+    )  # fmt: skip
+
+
+def new_found(samples: int, joints: int, row: int, moments: int, channels: Integers) -> Found:
+    """Room for what so many samples can cause."""
+    width, residuals = int(channels.max()), samples + WAITING
+    return Found(
+        counts=np.zeros(2, np.int64), at=np.zeros(samples, np.int64), stamps=np.zeros(samples, np.int64),
+        rows=np.zeros((samples, row)), moments=np.zeros((samples, moments)), measured=np.zeros((samples, joints)),
+        passes=np.zeros(samples, np.int64), residual_at=np.zeros(residuals, np.int64),
+        residual_streams=np.zeros(residuals, np.int64), residual_stamps=np.zeros(residuals, np.int64),
+        values=np.full((residuals, width), np.nan), sigmas=np.full((residuals, width), np.nan),
+        raw=np.full((residuals, width), np.nan),
+    )  # fmt: skip
+
+
+@inner
+def new_row(ring):
+    """Place for one more row of a ring; the oldest one goes if there is no room."""
+    size, first, count = ring.stamps.shape[0], ring.bounds[FIRST], ring.bounds[COUNT]
+    if count == size:
+        ring.bounds[FIRST] = (first + 1) % size
+        return first
+    ring.bounds[COUNT] = count + 1
+    return (first + count) % size
+
+
+@inner
+def zeros_at(state, stamp):
+    """Which of the zeros hold at `stamp`."""
+    at = state.zero_sets[0] - 1
+    while at > 0 and state.zeros_since[at] > stamp:
+        at -= 1
+    return at

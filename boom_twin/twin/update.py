@@ -1,0 +1,331 @@
+"""Compiled update of the twin: ordinary samples of all streams, as many as there are, in one call.
+
+What a sample of strokes, angles or accelerations does to the twin while nothing is out of the ordinary is written here, once,
+for the live node (a sample a call) and the replay (many). A sample that is not ordinary ends the call, and
+`boom_twin.twin.twin.Twin` looks at it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..estimation.look_ahead import follow
+from ..kernels.jit import inner, kernel
+from ..kernels.result_row import estimates_in, results_in
+from ..kernels.tables import OK
+from ..types import LIMIT, NANO
+from .expected_readings import INTERVAL, SPAN, write_expected
+from .sample_check import SHORTEST
+from .stamp_check import SMOOTHING, STEP
+from .state import (
+    BEGINS_SLOT,
+    CHECKED,
+    COUNT,
+    EPOCH,
+    FIRST,
+    IN_SLOT,
+    IS_DEFLECTED,
+    KEPT,
+    NEWEST,
+    NONE,
+    OTHERS,
+    PAUSED,
+    SEEN,
+    SLOT,
+    STATUS,
+    STEPPED,
+    STROKES,
+    TRUSTED,
+    UNMATCHED,
+    USUAL_STEP,
+    WAITING,
+    new_row,
+    zeros_at,
+)  # fmt: skip
+
+PAUSE = 0.1  # s without strokes, after which
+AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
+
+DONE, ODD, REFRESH, LOOK, FAILED = range(5)
+"""Why `update` returned: all samples taken; the sample is not ordinary; deviations are to be made anew for the sample, which
+was stepped to; the sample is complete and begins a slot or left the model's validity; the model failed (see `STATUS`)."""
+
+
+@kernel
+def update(boom, limits, state, streams, stamps, values, first, resumed, trusted, found):
+    """Take the samples of a block from row `first` on, as long as they are ordinary.
+
+    Parameters
+    ----------
+    boom : CompiledBoom
+        See `boom_twin.estimation.boom_predictor`.
+    limits : Limits
+    state : TwinState
+        Of a run that has begun.
+    streams, stamps, values : ndarray
+        See `boom_twin.twin.blocks.SampleBlock`.
+    resumed : bool
+        Whether the boom was stepped to row `first` before, see `REFRESH`.
+    trusted : bool
+        Whether row `first`, the only one, was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them.
+    found : Found
+        What it gives is added here.
+
+    Returns
+    -------
+    reason, row : int
+        See `DONE`; the row that it is about.
+    """
+    row = first
+    while row < stamps.shape[0]:
+        stamp = stamps[row]
+        if streams[row] != STROKES:
+            if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
+                return ODD, row
+            row += 1
+            continue
+        if not resumed:
+            if not trusted:
+                if not is_ordinary(boom, limits, state, stamp, values[row]):
+                    return ODD, row
+                note_stamp(state, STROKES, stamp)
+            state.clock[STATUS] = step(boom, limits, state, stamp)
+            if state.clock[STATUS] != OK:
+                return FAILED, row
+            if stamp >= state.clock[SEEN] + INTERVAL:
+                return REFRESH, row
+        resumed = False
+        remember(boom, limits, state, stamp, row, found)
+        settle(limits, state, row, found)
+        row += 1
+        if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
+            return LOOK, row - 1
+    return DONE, row
+
+
+@kernel
+def measure(limits, state, stream, stamp, values, trusted, found):
+    """Take one measured sample, as `update`, which needs the boom too; False, and nothing done, if it is not ordinary.
+
+    One that is `trusted` is refused only if nothing was expected at its stamp.
+    """
+    return compare(limits, state, stream, stamp, values, 0, trusted, found)
+
+
+# -- strokes --------------------------------------------------------------------------------------------------------------
+
+
+@inner
+def is_ordinary(boom, limits, state, stamp, values):
+    """Whether strokes come when they are due, all of them, where their cylinders can be; they are put into `state` then."""
+    span = stamp - state.clock[NEWEST]
+    most = STEP * state.usual[STROKES]
+    if most == 0.0:
+        most = limits.gap
+    since = stamp - state.newest[STROKES]
+    if state.held[STROKES] or span < SHORTEST or state.newest[STROKES] == NONE or not 0 < since <= most:
+        return False
+    zeros = zeros_at(state, stamp)
+    time = stamp - state.clock[EPOCH]
+    limit = limits.far + limits.rate * ((time - state.clock[CHECKED]) * NANO)
+    for i in range(state.strokes.shape[0]):
+        value = values[i] - state.zeros[zeros, STROKES, i]
+        if not abs(values[i]) <= LIMIT or not limits.shortest[i] <= value <= limits.longest[i]:
+            return False
+        if not abs(value - boom.track.x[0, i, 0]) <= limit:
+            return False
+    for i in range(state.strokes.shape[0]):
+        state.strokes[i] = values[i] - state.zeros[zeros, STROKES, i]
+        state.taken[i] = state.strokes[i]
+    state.clock[CHECKED], state.clock[TRUSTED], state.clock[OTHERS] = time, time, 0
+    return True
+
+
+@inner
+def note_stamp(state, stream, stamp):
+    """Go on with a stream's stamp, as `boom_twin.twin.stamp_check.StampCheck.take` does."""
+    if state.newest[stream] != NONE:
+        span, usual = stamp - state.newest[stream], state.usual[stream]
+        if usual != 0.0:
+            state.usual[stream] = usual + SMOOTHING * (min(span, 2.0 * usual) - usual)
+        else:
+            state.usual[stream] = span
+    state.newest[stream] = stamp
+
+
+@inner
+def step(boom, limits, state, stamp):
+    """Step the boom to the strokes in `state`; a status of `boom_twin.kernels.tables`."""
+    time = (stamp - state.clock[EPOCH]) * NANO
+    if time - state.pace[STEPPED] > PAUSE:
+        state.pace[PAUSED] = time
+    state.pace[STEPPED] = time
+    tuning = limits.tuning
+    if time - state.pace[PAUSED] < AFTER_PAUSE:
+        tuning = limits.patient
+    status = follow(boom.tables, boom.anchor, boom.live, boom.work, boom.track, tuning, time, state.taken, boom.row)
+    if status == OK:
+        span = (stamp - state.clock[NEWEST]) * NANO
+        if state.pace[USUAL_STEP] != 0.0:
+            state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
+        else:
+            state.pace[USUAL_STEP] = span
+        slot = stamp // SLOT
+        state.clock[BEGINS_SLOT] = slot != state.clock[IN_SLOT]
+        state.clock[IN_SLOT], state.clock[NEWEST] = slot, stamp
+    return status
+
+
+@inner
+def remember(boom, limits, state, stamp, row, found):
+    """Give the prediction, and keep what residuals need."""
+    n, pins, k = state.strokes.shape[0], boom.tables.clearances.shape[0], found.counts[0]
+    results, estimates = results_in(boom.row, n, pins), estimates_in(boom.row, n, pins)
+    found.at[k], found.stamps[k], found.passes[k] = row, stamp, boom.track.passes[0]
+    for i in range(boom.row.shape[0]):
+        found.rows[k, i] = boom.row[i]
+    for i in range(n):
+        found.measured[k, i] = state.strokes[i]
+    for i in range(found.moments.shape[1]):
+        moment = 0.0
+        for j in range(boom.live.z.shape[0]):
+            moment += boom.bending[i, j] * boom.live.z[j]
+        found.moments[k, i] = moment
+    found.counts[0] = k + 1
+    off = math.hypot(results.tip[0, 0] - estimates.rigid_tip[0], results.tip[0, 1] - estimates.rigid_tip[1])
+    state.clock[IS_DEFLECTED] = off > limits.valid
+    past = state.past
+    while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
+        past.bounds[FIRST] = (past.bounds[FIRST] + 1) % KEPT
+        past.bounds[COUNT] -= 1
+    at = new_row(past)
+    past.stamps[at] = stamp
+    for i in range(n):
+        past.strokes[at, i] = state.strokes[i]
+    write_expected(limits, state, boom.live, results, estimates, past.values[at], past.sigmas[at])
+
+
+# -- measured angles and accelerations --------------------------------------------------------------------------------------
+
+
+@inner
+def compare(limits, state, stream, stamp, values, row, trusted, found):
+    """Residuals of a measured sample, now or when the strokes have come; False, and nothing done, if it is not ordinary."""
+    if not trusted and not is_due(limits, state, stream, stamp, values):
+        return False
+    if stamp > state.clock[NEWEST]:
+        if state.waiting.bounds[COUNT] == WAITING:
+            forget_waiting(state.waiting, 1)
+            state.clock[UNMATCHED] += 1
+        wait(limits, state, stream, stamp, values)
+    elif not give(limits, state, stream, stamp, values, row, found):
+        return False
+    if not trusted:
+        note_stamp(state, stream, stamp)
+    return True
+
+
+@inner
+def is_due(limits, state, stream, stamp, values):
+    """Whether a measured sample comes when it is due, and whole."""
+    most = limits.leap
+    if state.usual[stream] != 0.0:
+        most = max(limits.gap, STEP * state.usual[stream])
+    if state.held[stream] or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most):
+        return False
+    complete = True
+    for i in range(limits.channels[stream]):
+        complete = complete and abs(values[i]) <= LIMIT
+    return complete
+
+
+@inner
+def wait(limits, state, stream, stamp, values):
+    """Keep a measured sample until its stroke has come: behind those that are earlier, or as early and of an earlier stream."""
+    ring = state.waiting
+    at = ring.bounds[COUNT]
+    while at > 0 and (ring.stamps[at - 1] > stamp or (ring.stamps[at - 1] == stamp and ring.streams[at - 1] > stream)):
+        move_row(ring, at - 1, at)
+        at -= 1
+    ring.stamps[at], ring.streams[at] = stamp, stream
+    for i in range(limits.channels[stream]):
+        ring.values[at, i] = values[i]
+    ring.bounds[COUNT] += 1
+
+
+@inner
+def move_row(ring, old, new):
+    """Copy a row of samples that wait."""
+    ring.stamps[new], ring.streams[new] = ring.stamps[old], ring.streams[old]
+    for i in range(ring.values.shape[1]):
+        ring.values[new, i] = ring.values[old, i]
+
+
+@inner
+def settle(limits, state, row, found):
+    """Residuals of all samples that waited for the newest stroke."""
+    ring, done = state.waiting, 0
+    while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
+        if not give(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
+            state.clock[UNMATCHED] += 1
+        done += 1
+    if done > 0:
+        forget_waiting(ring, done)
+
+
+@inner
+def forget_waiting(ring, count):
+    """Drop the first `count` of the samples that wait."""
+    for k in range(count, ring.bounds[COUNT]):
+        move_row(ring, k, k - count)
+    ring.bounds[COUNT] -= count
+
+
+@inner
+def give(limits, state, stream, stamp, values, row, found):
+    """Residuals of one sample against what was expected at its stamp; False if nothing was."""
+    after, share = matched(state.past, stamp)
+    if after < 0:
+        return False
+    zeros = zeros_at(state, stamp)
+    before = (after + KEPT - 1) % KEPT
+    past, at, k = state.past, limits.first[stream], found.counts[1]
+    recent = new_row(state.recent)
+    state.recent.stamps[recent], state.recent.streams[recent] = stamp, stream
+    for i in range(limits.channels[stream]):
+        expected = past.values[after, at + i]
+        if share < 1.0:
+            old = past.values[before, at + i]
+            expected = old + share * (expected - old)
+        value = values[i] - expected
+        if limits.is_mounted and at + i < limits.absolute.shape[0] and limits.absolute[at + i]:
+            value -= 2.0 * math.pi * np.rint(value / (2.0 * math.pi))
+        state.recent.values[recent, i] = value
+        found.values[k, i], found.sigmas[k, i] = value - state.zeros[zeros, stream, i], past.sigmas[after, at + i]
+        found.raw[k, i] = values[i]
+    for i in range(limits.channels[stream], found.values.shape[1]):
+        found.values[k, i] = found.sigmas[k, i] = found.raw[k, i] = math.nan
+    found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
+    found.counts[1] = k + 1
+    return True
+
+
+@kernel
+def matched(past, stamp):
+    """Row of the first expected readings that are not before `stamp`, and where between them and those before it lies.
+
+    The share is 1 at the row itself. A row of -1: there are none around it.
+    """
+    at = -1
+    for back in range(past.bounds[COUNT]):
+        row = (past.bounds[FIRST] + past.bounds[COUNT] - 1 - back) % KEPT
+        if past.stamps[row] == stamp:
+            return row, 1.0
+        if past.stamps[row] < stamp:
+            if at < 0:
+                return -1, 0.0
+            return at, (stamp - past.stamps[row]) / (past.stamps[at] - past.stamps[row])
+        at = row
+    return -1, 0.0
