@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from .main import add_json, add_session_scene, open_session_scene, print_json, w
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
     from ..config.settings import Settings
-    from ..offline.replay import Replay
+    from ..offline.replay import ProgressBar, Replay
     from ..types import Array
 
 
@@ -85,10 +84,10 @@ def _write(
     return files
 
 
-def _progress(messages: Iterator[Any], total: int) -> Iterator[Any]:
+def _progress(total: int) -> ProgressBar:
     from tqdm import tqdm
 
-    return iter(tqdm(messages, total=total, unit="msg", desc="replay", disable=None, mininterval=0.2))
+    return tqdm(total=total, unit="msg", desc="replay", disable=None, mininterval=0.2)
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:

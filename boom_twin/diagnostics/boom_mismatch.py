@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import degrees, radians
 
 import numpy as np
@@ -32,14 +33,18 @@ class OtherBoom:
 
     def took(self, sample: Sample, report: Report) -> str:
         """The twin made `report` of `sample`; gives why the session is of another boom, empty as long as nothing says so."""
+        values = [sample.values] if sample.stream is Stream.ANGLES else []
+        found = [each.values for part in report.all for each in part.residuals if each.stream is Stream.ANGLES]
+        return self.take(sample.stamp, values, found)
+
+    def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
+        """As `took`, of several samples: the newest stamp (ns), and rows of angles and of their residuals (n,) in rad."""
         if self._is_judged:
             return ""
-        if sample.stream is Stream.ANGLES:
-            self._values.append(sample.values)
-        found = [residuals for each in report.all for residuals in each.residuals]
-        self._residuals += [residuals.values for residuals in found if residuals.stream is Stream.ANGLES]
-        self._begin = self._begin or sample.stamp
-        return self.judge() if sample.stamp - self._begin > WINDOW else ""
+        self._values += values
+        self._residuals += residuals
+        self._begin = self._begin or stamp
+        return self.judge() if stamp - self._begin > WINDOW else ""
 
     def judge(self) -> str:
         """Why the session up to now is of another boom; what was judged is forgotten."""

@@ -76,7 +76,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     )  # fmt: skip
 
 
-@kernel
+@inner
 def follow(t, anchor, live, work, track, tuning, time, y, out):
     """Take strokes y (m; NaN = missing) measured at `time` (s) and write the prediction for it.
 

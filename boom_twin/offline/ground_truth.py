@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
-from ..types import NANO, Array, Prediction
+from ..twin.blocks import PredictionBlock
+from ..types import NANO, Array
 
 FILE_NAME = "truth.csv.gz"
 LARGEST = 64 * 2**20
@@ -35,14 +36,12 @@ class TipTruth:
     position: Array
     acceleration: Array
 
-    def errors(self, predictions: list[Prediction]) -> dict[str, float]:
-        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; stamps of one clock."""
-        times = np.array([prediction.stamp - predictions[0].stamp for prediction in predictions]) * NANO + self.times[0]
-        position = np.array([prediction.tip_position for prediction in predictions])
-        acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
+    def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
+        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
+        times = (predictions.stamps[rows] - predictions.stamps[0]) * NANO + self.times[0]
         return {
-            "tip_error_rms_m": _rms(position - self._at(times, self.position)),
-            "tip_acceleration_error_rms_m_s2": _rms(acceleration - self._at(times, self.acceleration)),
+            "tip_error_rms_m": _rms(predictions.tip_position[rows] - self._at(times, self.position)),
+            "tip_acceleration_error_rms_m_s2": _rms(predictions.tip_acceleration[rows] - self._at(times, self.acceleration)),
         }
 
     def _at(self, times: Array, values: Array) -> Array:

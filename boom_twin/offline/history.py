@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
 from ..plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
@@ -12,9 +13,10 @@ from ..plots.history import Orbits
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..twin.expected_readings import tip_specific_force
-from ..types import NANO, Array, Residuals, Stream
+from ..types import NANO, Array, Stream
 from .ground_truth import TipTruth
-from .replay import Recording, Replay
+from .recording import Recording, ResidualRows
+from .replay import Replay
 
 
 def draw(result: Replay, history: History, out: Path) -> list[Path]:
@@ -28,37 +30,34 @@ def draw(result: Replay, history: History, out: Path) -> list[Path]:
 def history_of(recording: Recording, scene: Scene) -> History:
     """Everything a replay predicted, as arrays; times from the first prediction."""
     predictions = recording.predictions
-    first = predictions[0].stamp
-    angles = [residuals for residuals in recording.residuals if residuals.stream is Stream.ANGLES]
-    force = [residuals for residuals in recording.residuals if residuals.stream is Stream.IMU]
-    stamps = _seconds([prediction.stamp for prediction in predictions], first)
-    acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
-    gravity = gravity_in_base(scene)
-    felt = tip_specific_force(acceleration, np.array([prediction.tip_angle for prediction in predictions]), gravity)
-    names, times, values, sigmas = _channels([angles, force], first)
+    first = int(predictions.stamps[0])
+    force = recording.of(Stream.IMU)
+    stamps = _seconds(predictions.stamps, first)
+    felt = tip_specific_force(predictions.tip_acceleration, predictions.tip_angle, gravity_in_base(scene))
+    names, times, values, sigmas = _channels([recording.of(Stream.ANGLES), force], first)
     return History(
         stamps_s=stamps,
-        tip_displacement=np.array([prediction.tip_displacement for prediction in predictions]),
-        tip_position=np.array([prediction.tip_position for prediction in predictions]),
-        tip_acceleration=acceleration,
-        joints=np.array([prediction.joints for prediction in predictions]),
-        cylinder_forces=np.array([prediction.cylinder_forces for prediction in predictions]),
-        strokes=np.array([prediction.strokes for prediction in predictions]),
+        tip_displacement=predictions.tip_displacement,
+        tip_position=predictions.tip_position,
+        tip_acceleration=predictions.tip_acceleration,
+        joints=predictions.joints,
+        cylinder_forces=predictions.cylinder_forces,
+        strokes=predictions.strokes,
         residual_stamps_s=times,
         residual_names=names,
         residual_values=values,
         residual_sigmas=sigmas,
         imu=_imu(force, stamps, felt, first),
-        shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
+        shapes=[(float(stamps[row]), outline.shape) for row, outline in predictions.outlines.items()],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
         alarms=_alarms(recording, first),
-        moments=np.array([prediction.moments for prediction in predictions]),
+        moments=predictions.moments,
         orbits=_orbits(scene, stamps, recording),
     )
 
 
 def _alarms(recording: Recording, first: int) -> list[AlarmSpan]:
-    last = recording.predictions[-1].stamp
+    last = int(recording.predictions.stamps[-1])
     return [
         AlarmSpan(
             alarm.channel,
@@ -74,35 +73,34 @@ def _orbits(scene: Scene, stamps: Array, recording: Recording) -> Orbits | None:
     plan = compile_scene(scene)
     if not plan.pins:
         return None
-    return Orbits(stamps, plan.pins, plan.tables.clearances.gap, recording.clearances(), recording.lost_contacts())
+    return Orbits(stamps, plan.pins, plan.tables.clearances.gap, recording.predictions.clearances, recording.lost_contacts())
 
 
-def _seconds(stamps: list[int], first: int) -> Array:
-    return np.array([(stamp - first) * NANO for stamp in stamps])
+def _seconds(stamps: NDArray[np.int64], first: int) -> Array:
+    return np.asarray((stamps - first) * NANO, float)
 
 
-def _channels(groups: list[list[Residuals]], first: int) -> tuple[tuple[str, ...], Array, Array, Array]:
+def _channels(groups: list[ResidualRows], first: int) -> tuple[tuple[str, ...], Array, Array, Array]:
     """Residuals of several streams in one table, a row per stamp and stream; NaN where a stream has no say."""
-    groups = [group for group in groups if group]
-    names = tuple(name for group in groups for name in group[0].names)
-    rows = sum(len(group) for group in groups)
+    groups = [group for group in groups if len(group.stamps)]
+    names = tuple(name for group in groups for name in group.names)
+    rows = sum(len(group.stamps) for group in groups)
     times, values, sigmas = np.empty(rows), np.full((rows, len(names)), np.nan), np.full((rows, len(names)), np.nan)
     row, column = 0, 0
     for group in groups:
-        block = (slice(row, row + len(group)), slice(column, column + len(group[0].names)))
-        times[block[0]] = _seconds([residuals.stamp for residuals in group], first)
-        values[block] = [residuals.values for residuals in group]
-        sigmas[block] = [residuals.sigmas for residuals in group]
-        row, column = row + len(group), column + len(group[0].names)
+        block = (slice(row, row + len(group.stamps)), slice(column, column + len(group.names)))
+        times[block[0]] = _seconds(group.stamps, first)
+        values[block], sigmas[block] = group.values, group.sigmas
+        row, column = block[0].stop, block[1].stop
     return names, times, values, sigmas
 
 
-def _imu(force: list[Residuals], stamps: Array, felt: Array, first: int) -> ImuTrace | None:
-    if not force:
+def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrace | None:
+    if not len(force.stamps):
         return None
-    times = _seconds([residuals.stamp for residuals in force], first)
+    times = _seconds(force.stamps, first)
     predicted = np.column_stack([np.interp(times, stamps, felt[:, i]) for i in range(2)])
-    return ImuTrace(times, predicted + np.array([residuals.values for residuals in force]), predicted)
+    return ImuTrace(times, predicted + force.values, predicted)
 
 
 def _truth(truth: TipTruth | None, history: History) -> Truth | None:

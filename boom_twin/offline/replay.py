@@ -12,10 +12,9 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,94 +28,37 @@ from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
-from ..health.alarms import Alarms
 from ..health.baseline import Baseline
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
-from ..twin.driver import drive
-from ..types import HELD, NANO, Alarm, Array, Change, Health, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..twin.blocks import CODES, ReportBlock, SampleBlock
+from ..twin.driver import drive_blocks
+from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipTruth, load_truth
 from .reader_process import SampleReader
+from .recording import Recording
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
     from ..twin.twin import Twin
 
 
-Progress = Callable[[Iterator[Any], int], Iterator[Any]]
+class ProgressBar(Protocol):
+    """What is told how far a replay is; ``tqdm`` is one."""
+
+    def update(self, n: int, /) -> object:
+        """So many more messages were taken."""
+
+    def close(self) -> object:
+        """All were."""
+
+
+Progress = Callable[[int], ProgressBar]
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
-
-
-@dataclass
-class Recording:
-    """Everything a replay predicted, in the order of the session."""
-
-    predictions: list[Prediction] = field(default_factory=list)
-    residuals: list[Residuals] = field(default_factory=list)
-    gaps: list[tuple[int, int]] = field(default_factory=list)
-    clock_sets: list[tuple[int, int]] = field(default_factory=list)
-    health: list[Health] = field(default_factory=list)
-    refused: int = 0
-
-    def add(self, report: Report) -> None:
-        """Keep what one sample caused."""
-        self.refused -= len(report.earlier)
-        for each in report.earlier:
-            self.add(each)
-        if not report.accepted or not HELD.isdisjoint(report.events):
-            self.refused += 1
-        if report.prediction is not None:
-            self._note_time(report)
-            self.predictions.append(report.prediction)
-        self.residuals += report.residuals
-        if report.health is not None:
-            self.health.append(report.health)
-
-    def _note_time(self, report: Report) -> None:
-        """Keep where stamps stepped: the one before, and the one after it."""
-        for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
-            if self.predictions and not set(events).isdisjoint(report.events):
-                found.append((self.predictions[-1].stamp, report.stamp))
-
-    @property
-    def duration(self) -> float:
-        """From the first prediction to the last, s, by the model's own time: without what clocks were set by."""
-        span = self.predictions[-1].stamp - self.predictions[0].stamp
-        return (span - sum(after - before for before, after in self.clock_sets)) * NANO
-
-    @property
-    def by_first_clock(self) -> list[Prediction]:
-        """The predictions before a clock was set: their stamps tell the time since the first one."""
-        if not self.clock_sets:
-            return self.predictions
-        step = self.clock_sets[0]
-        pairs = enumerate(pairwise(prediction.stamp for prediction in self.predictions), start=1)
-        return self.predictions[: next(k for k, pair in pairs if pair == step)]
-
-    def of(self, stream: Stream) -> list[Residuals]:
-        """Residuals of one stream."""
-        return [residuals for residuals in self.residuals if residuals.stream is stream]
-
-    def alarms(self) -> list[Alarm]:
-        """All alarms, each once, as it was told last; in the order of their beginning."""
-        found = Alarms()
-        for health in self.health:
-            found.take(health)
-        return sorted(found.all, key=lambda alarm: alarm.since)
-
-    def clearances(self) -> Array:
-        """Of all pins with clearance offset x, y (m), force (N) and contact, shape (predictions, k, 4)."""
-        found = [prediction.clearances for prediction in self.predictions if prediction.clearances is not None]
-        return np.array(found).reshape(len(found), -1, 4)
-
-    def lost_contacts(self) -> NDArray[np.int64]:
-        """How often each pin with clearance touched at one prediction and not at the next, shape (k,)."""
-        parted = np.diff(self.clearances()[:, :, 3], axis=0) < 0.0
-        return np.asarray(parted.sum(axis=0))
 
 
 @dataclass(frozen=True)
@@ -165,7 +107,7 @@ def replay(
     settings : Settings, optional
         Sensors' noise and tuning; the package's own by default.
     progress : callable, optional
-        Wraps the iterator over messages, of which it is told the number.
+        Is given the number of messages, and gives the `ProgressBar` that is told how many were taken.
     mapping : path, optional
         How topics and sensors are named and read, a file like ``msg_config/topics.yaml``; by default the one that the
         session was recorded with, else the package's own.
@@ -213,33 +155,37 @@ def replay_into(
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    recording, other_boom, read = Recording(), OtherBoom(), np.zeros(joints, dtype=bool)
+    recording, other_boom, read = Recording(joints), OtherBoom(), np.zeros(joints, dtype=bool)
     with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
         behind.wait_ready()
-        samples: Iterator[Sample | Change | None] = iter(ahead)
-        if progress is not None:
-            samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
+        samples: Iterator[SampleBlock | Change | None] = iter(ahead)
+        bar = progress(sum(topic.count for name in wanted if (topic := session.find(name)) is not None)) if progress else None
         began = time.perf_counter()
         if not changes:
             samples = (sample for sample in samples if not isinstance(sample, Change))
-        for step in drive(twin, samples):
+        for step in drive_blocks(twin, samples):
             if step is None:
                 recording.refused += 1
                 continue
-            sample, report, _ = step
-            recording.add(report)
-            if not recording.predictions and sample.stream is Stream.STROKES:
-                read |= np.isfinite(sample.values)
-            for each in report.all:
-                behind.put(each)
-            _refuse(session, taken, other_boom.took(sample, report))
+            block, found = step
+            for each in found:
+                recording.add(each)
+                for part in each.all if isinstance(each, Report) else (each,):
+                    behind.put(part)
+            if recording.is_empty:
+                read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
+            _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+            if bar is not None:
+                bar.update(len(block.stamps))
         _refuse(session, taken, other_boom.judge())
         behind.close()
+        if bar is not None:
+            bar.close()
         wall = time.perf_counter() - began
     twin.counts.update(ahead.oddities)
-    if not recording.predictions:
+    if recording.is_empty:
         raise BagError(
             f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
             f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
@@ -256,7 +202,7 @@ def replay_into(
     if session.incomplete:
         summary["session_incomplete"] = session.incomplete
     if truth is not None:
-        summary |= truth.errors(recording.by_first_clock)
+        summary |= truth.errors(recording.predictions, recording.by_first_clock)
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
 
@@ -266,6 +212,18 @@ def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene
     if scene is None:
         return scene_of(session)
     return scene if isinstance(scene, SessionScene) else SessionScene(scene, anew(scene), GIVEN)
+
+
+def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
+    """Angles of a block of samples, and the residuals of angles that it made known, rows of (joints,) in rad."""
+    code, residuals = CODES[Stream.ANGLES], []
+    for each in found:
+        if isinstance(each, Report):
+            rows = (row for part in each.all for row in part.residuals)
+            residuals += [row.values for row in rows if row.stream is Stream.ANGLES]
+        else:
+            residuals += list(each.residuals.values[each.residuals.streams == code, :joints])
+    return block.values[block.streams == code, :joints], residuals
 
 
 def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
@@ -331,13 +289,12 @@ def _told(twin: Twin) -> str:
 
 def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[str, Any]:
     """The contract's numbers of a replay."""
-    first, duration = recording.predictions[0].stamp, recording.duration
-    angles = recording.of(Stream.ANGLES)
-    values = _stacked([residuals.values for residuals in angles], twin.plan.joints)
-    normalised = _stacked([residuals.normalised for residuals in angles], twin.plan.joints)
-    acceleration = np.array([np.hypot(*prediction.tip_acceleration) for prediction in recording.predictions])
+    predictions, duration = recording.predictions, recording.duration
+    first, angles = int(predictions.stamps[0]), recording.of(Stream.ANGLES)
+    values, normalised = angles.values, angles.normalised
+    acceleration = np.hypot(*predictions.tip_acceleration.T)
     return {
-        "samples": len(recording.predictions),
+        "samples": len(predictions.stamps),
         "duration_s": duration,
         "wall_s": wall,
         "realtime_factor": duration / wall,
@@ -389,10 +346,6 @@ def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
     if not twin.plan.pins:
         return {}
     return {"lost_contacts": dict(zip(twin.plan.pins, recording.lost_contacts().tolist(), strict=True))}
-
-
-def _stacked(rows: list[Array], columns: int) -> Array:
-    return np.array(rows).reshape(-1, columns)
 
 
 def _rms(values: Array) -> list[float | None]:

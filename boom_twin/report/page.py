@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..offline.replay import Recording, Replay
+from ..offline.recording import Recording
+from ..offline.replay import Replay
 from ..plots import AlarmSpan, History
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import Scene
@@ -84,7 +85,7 @@ def write_report(subject: Subject, folder: Path) -> Path:
 
 def _head(subject: Subject) -> list[str]:
     summary, recording = subject.result.summary, subject.result.recording
-    begin = datetime.fromtimestamp(recording.predictions[0].stamp // SECOND, UTC)
+    begin = datetime.fromtimestamp(int(recording.predictions.stamps[0]) // SECOND, UTC)
     rows: list[tuple[str, object]] = [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
         ("duration, s", summary["duration_s"]),
@@ -143,7 +144,7 @@ def _alarms(subject: Subject, folder: Path) -> list[str]:
     recording, history = subject.result.recording, subject.history
     if not recording.health:
         return [heading("Alarms"), paragraph(NO_JUDGE)]
-    first = recording.predictions[0].stamp
+    first = int(recording.predictions.stamps[0])
     gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
     stamps = np.array([(health.stamp - first) * NANO for health in recording.health])
     levels = np.array([health.levels for health in recording.health])

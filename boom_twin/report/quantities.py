@@ -16,7 +16,7 @@ from ..analysis.bending_moments import Station, stations
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.baseline import Baseline
-from ..offline.replay import Recording
+from ..offline.recording import Recording
 from ..plots import History
 from ..plots.health import slow_part
 from ..scene.schema import Scene

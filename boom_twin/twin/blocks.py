@@ -168,3 +168,67 @@ def samples_in(block: SampleBlock, joints: int) -> list[Sample]:
     counts = [len(names) for names in channels_of(joints).values()]
     rows = zip(block.streams.tolist(), block.stamps.tolist(), block.values, strict=True)
     return [Sample(STREAMS[code], stamp, values[: counts[code]]) for code, stamp, values in rows]
+
+
+def report_block(reports: list[Report], joints: int) -> ReportBlock:
+    """Reports as a block, of a boom with so many joints; events, changes and status are not kept."""
+    found = [(at, each.prediction) for at, each in enumerate(reports) if each.prediction is not None]
+    known = [(at, each) for at, report in enumerate(reports) for each in report.residuals]
+    channels = channels_of(joints)
+    width = max(len(names) for names in channels.values())
+    values, sigmas = np.full((len(known), width), np.nan), np.full((len(known), width), np.nan)
+    for row, (_, each) in enumerate(known):
+        values[row, : len(each.values)], sigmas[row, : len(each.sigmas)] = each.values, each.sigmas
+
+    def table(name: str, *columns: int) -> Array:
+        rows = [getattr(each, name) for _, each in found]
+        return np.array(rows, float).reshape(len(rows), *columns) if rows else np.zeros((0, *columns))
+
+    pins = 0 if not found or found[0][1].clearances is None else len(found[0][1].clearances)
+    moments = 0 if not found or found[0][1].moments is None else len(found[0][1].moments)
+    predictions = PredictionBlock(
+        at=np.array([at for at, _ in found], np.int64),
+        stamps=np.array([each.stamp for _, each in found], np.int64),
+        **{name: table(name, 2) for name in ("tip_position", "tip_displacement", "tip_velocity", "tip_acceleration")},
+        **{name: table(name) for name in ("tip_angle", "tip_angular_velocity", "tip_angular_acceleration")},
+        **{name: table(name, joints) for name in ("joints", "strokes", "cylinder_forces")},
+        clearances=table("clearances", pins, 4) if pins else np.zeros((len(found), 0, 4)),
+        moments=table("moments", moments) if moments else np.zeros((len(found), 0)),
+        outlines={row: drawn for row, (_, each) in enumerate(found) if (drawn := _outline_of(each)) is not None},
+    )
+    residuals = ResidualBlock(
+        at=np.array([at for at, _ in known], np.int64),
+        streams=np.array([CODES[each.stream] for _, each in known], np.int64),
+        stamps=np.array([each.stamp for _, each in known], np.int64),
+        values=values,
+        sigmas=sigmas,
+    )
+    health = {at: each.health for at, each in enumerate(reports) if each.health is not None}
+    return ReportBlock(np.array([each.stamp for each in reports], np.int64), predictions, residuals, health)
+
+
+def _outline_of(prediction: Prediction) -> Outline | None:
+    if prediction.shape is None or prediction.undeflected is None or prediction.pins is None:
+        return None
+    return Outline(prediction.shape, prediction.undeflected, prediction.pins)
+
+
+def joined(parts: list[ReportBlock]) -> ReportBlock:
+    """Blocks one after the other as one; there is at least one."""
+    samples = np.cumsum([0, *(len(part.stamps) for part in parts)])[:-1].tolist()
+    rows = np.cumsum([0, *(len(part.predictions.stamps) for part in parts)])[:-1].tolist()
+    at = [part.predictions.at + first for part, first in zip(parts, samples, strict=True)]
+    fields = zip(*(part.predictions[1:-1] for part in parts), strict=True)
+    outlines = {
+        first + row: outline
+        for part, first in zip(parts, rows, strict=True)
+        for row, outline in part.predictions.outlines.items()
+    }
+    residuals_at = [part.residuals.at + first for part, first in zip(parts, samples, strict=True)]
+    others = zip(*(part.residuals[1:] for part in parts), strict=True)
+    return ReportBlock(
+        np.concatenate([part.stamps for part in parts]),
+        PredictionBlock(np.concatenate(at), *map(np.concatenate, fields), outlines),
+        ResidualBlock(np.concatenate(residuals_at), *map(np.concatenate, others)),
+        {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
+    )

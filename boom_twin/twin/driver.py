@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 from ..types import Change, Report, Sample
+from .blocks import ReportBlock, SampleBlock
 
 if TYPE_CHECKING:  # a replay imports this before it starts its other processes, and the model's modules beside them
     from .twin import Twin
@@ -56,3 +57,16 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step 
             began = perf_counter()
             report = twin.update(item)
             yield Step(item, report, perf_counter() - began)
+
+
+def drive_blocks(
+    twin: Twin, items: Iterable[SampleBlock | Change | None]
+) -> Iterator[tuple[SampleBlock, list[ReportBlock | Report]] | None]:
+    """As `drive`, block by block: the samples of a block and what they caused, see `Twin.update_block`."""
+    for item in items:
+        if isinstance(item, Change):
+            twin.requests.repeat(item)
+        elif item is None:
+            yield None
+        else:
+            yield item, twin.update_block(item)

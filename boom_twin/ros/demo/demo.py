@@ -199,7 +199,8 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
 
 def _equal(card: DemoResult, again: Replay) -> int:
     """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
-    replayed = {prediction.stamp: tuple(prediction.tip_position.tolist()) for prediction in again.recording.predictions}
+    rows = again.recording.predictions
+    replayed = dict(zip(rows.stamps.tolist(), map(tuple, rows.tip_position.tolist()), strict=True))
     return sum(replayed.get(stamp) == position for stamp, position in card.positions.items())
 
 
