@@ -218,7 +218,7 @@ def replay_into(
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
         behind.wait_ready()
-        samples: Iterator[Sample | Change | None] = iter(ahead)
+        samples: Iterator[Sample | Change | None] = ahead.samples()
         if progress is not None:
             samples = progress(samples, sum(topic.count for name in wanted if (topic := session.find(name)) is not None))
         began = time.perf_counter()
