@@ -1,10 +1,11 @@
-"""Read the records of an .mcap file within memory limits, every checksum verified, in file or log-time order."""
+"""Read the records of an .mcap file within memory limits, every checksum verified, in the order of the file."""
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from operator import attrgetter
 from pathlib import Path
@@ -119,8 +120,8 @@ def unpack_start(chunk: Chunk, budget: UnpackBudget) -> bytes:
     return budget.unpack(chunk, chunk.uncompressed_size + 1)
 
 
-def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and body of every record in the content of a chunk; McapError at one that is not whole."""
+def bounds(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Opcode of every record in the content of a chunk, and where its body begins and ends; McapError at one not whole."""
     place, size = 0, len(content)
     while place < size:
         start = place + PREFIX.size
@@ -132,15 +133,20 @@ def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
         place = start + length
         if place > size:
             raise McapError(f"record of {length} bytes at byte {start - PREFIX.size} of a chunk ends after the chunk")
-        yield opcode, content[start:place]
+        yield opcode, start, place
+
+
+def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Opcode and body of every record in the content of a chunk; McapError at one that is not whole."""
+    return ((opcode, content[start:end]) for opcode, start, end in bounds(content))
 
 
 def whole_parts(content: bytes) -> bytes:
     """The start of `content` up to where its last whole record ends."""
     end = 0
     try:
-        for _, body in parts(content):
-            end += PREFIX.size + len(body)
+        for _, _, place in bounds(content):
+            end = place
     except McapError:
         pass
     return content[:end]
@@ -169,50 +175,20 @@ def definition_of(opcode: int, body: bytes) -> Channel | Schema | None:
     return record
 
 
-TOGETHER = 2**30
-"""Bytes of messages that are held together, where the file does not keep them in order, at most."""
-MOST_TOGETHER = 2**22
-"""Messages, likewise: an empty one takes ten times its bytes."""
-
-
 def records(path: Path) -> Iterator[McapRecord]:
     """All records in the order of the file; those inside a chunk follow it."""
     budget = UnpackBudget()
+    for record in outer_records(path):
+        yield record
+        if isinstance(record, Chunk):
+            yield from _content(record, budget)
+
+
+def outer_records(path: Path) -> Iterator[McapRecord]:
+    """All records in the order of the file but those inside chunks."""
     with open_received(path) as file:
         limit = min(LARGEST, path.stat().st_size)
-        for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
-            yield record
-            if isinstance(record, Chunk):
-                yield from _content(record, budget)
-
-
-def messages(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message]:
-    """All messages by log time; at equal times in the order of the file.
-
-    Only chunks that overlap in time are held together; without an index of chunks, the whole file is.
-    """
-    by_time = attrgetter("log_time")
-    if not chunks:
-        yield from sorted(_held(records(path)), key=by_time)
-        return
-    budget = UnpackBudget()
-    with open_received(path) as file:
-        for group in _overlapping(chunks):
-            if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
-                raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
-            content = (record for index in group for record in _content(chunk_at(file, index), budget))
-            yield from sorted(_held(content), key=by_time)
-
-
-def _held(found: Iterable[McapRecord]) -> Iterator[Message]:
-    """The messages in the order of the file, as long as they may be held together."""
-    size = count = 0
-    for record in found:
-        if isinstance(record, Message):
-            size, count = size + len(record.data), count + 1
-            if size > TOGETHER or count > MOST_TOGETHER:
-                raise McapError(f"more than {TOGETHER} bytes or {MOST_TOGETHER} messages are out of order, or without an index")
-            yield record
+        yield from StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records
 
 
 def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, bytes]]:
@@ -243,27 +219,22 @@ def chunk_at(file: BinaryIO, index: ChunkIndex) -> Chunk:
     return chunk
 
 
-def _overlapping(chunks: Sequence[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
-    """Groups of chunks, each later than the one before; within a group in the order of the file."""
-    group: list[ChunkIndex] = []
-    end = 0
-    for index in sorted(chunks, key=attrgetter("message_start_time", "chunk_start_offset")):
-        if group and index.message_start_time >= end:
-            yield sorted(group, key=attrgetter("chunk_start_offset"))
-            group = []
-        group.append(index)
-        end = max(end, index.message_end_time)
-    yield sorted(group, key=attrgetter("chunk_start_offset"))
-
-
 def _content(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
     """The messages and definitions inside a chunk, its checksum verified."""
+    with fault_named_by_times(chunk):
+        return [record for opcode, body in parts(unpack(chunk, budget)) if (record := record_of(opcode, body)) is not None]
+
+
+@contextmanager
+def fault_named_by_times(chunk: Chunk) -> Iterator[None]:
+    """Turn what the content of a chunk is at fault with into a McapError that names the chunk by its log times."""
     try:
-        return [record for opcode, body in parts(unpack(chunk, budget)) if (record := _record(opcode, body)) is not None]
+        yield
     except STUMBLES as error:
         span = f"{chunk.message_start_time} to {chunk.message_end_time} ns"
         raise McapError(f"chunk with log times {span}: {error}") from error
 
 
-def _record(opcode: int, body: bytes) -> McapRecord | None:
+def record_of(opcode: int, body: bytes) -> McapRecord | None:
+    """A message, a channel or a schema from the body of its record; None for any other record."""
     return message_of(body) if opcode == Opcode.MESSAGE else definition_of(opcode, body)

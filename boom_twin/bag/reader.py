@@ -5,13 +5,11 @@ A session is a rosbag2 directory, a directory of .mcap files without ``metadata.
 
 from __future__ import annotations
 
-import heapq
 import re
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +18,12 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import TypesysError, get_types_from_msg
 
 from ..errors import BagError
-from ..messages.type_store import decode, jazzy
+from ..messages.type_store import jazzy
 from ..system.received_files import holds_file
-from .integrity import RESCUE, STUMBLES, as_bag_error, compare_counts
-from .mcap_records import messages
+from .integrity import compare_counts
 from .mcap_summary import McapFile, summarise
 from .metadata import FILE_NAME, BagMetadata, read_metadata
+from .session_blocks import SessionBlocks
 from .session_sheet import incompleteness
 
 
@@ -224,13 +222,24 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
 
 def read_both(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
     """As `read`, with the encoded message before the decoded one, which is None for a type that Jazzy does not have."""
+    return _one_by_one(read_blocks(session, wanted))
+
+
+def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
+    for block in blocks:
+        times = block.log_times.tolist()
+        for row, source in enumerate(block.sources.tolist()):
+            yield blocks.sources[source].name, times[row], block.data(row), blocks.decoded(block, row)
+
+
+def read_blocks(session: Session, wanted: Mapping[str, str]) -> SessionBlocks:
+    """As `read`, many messages at a time, not decoded yet."""
     asked: dict[str, str] = {}
     for name, type_name in wanted.items():
         asked[check_topic(session, name, type_name).name] = name
     for file in session.files:
         check_encoding(file, asked)
-    streams = [_decoded(file, asked) for file in session.files]
-    return heapq.merge(*streams, key=itemgetter(1))
+    return SessionBlocks(session.files, asked)
 
 
 def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
@@ -263,24 +272,3 @@ def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     if topic.count == 0:
         raise BagError(f"{session.path}: topic {topic.name} has no messages. Check that its publisher was running.")
     return topic
-
-
-def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
-    """The wanted messages of one file; all others are counted."""
-    known = jazzy().types
-    channels = file.channels
-    seen: Counter[int] = Counter()
-    with as_bag_error(file.path):
-        for message in messages(file.path, file.chunks):
-            channel = channels[message.channel_id]
-            seen[message.channel_id] += 1
-            if (name := asked.get(channel.topic)) is None:
-                continue
-            kind = file.schemas[channel.schema_id].name
-            try:
-                decoded = decode(message.data, kind) if kind in known else None
-            except STUMBLES as error:
-                place = f"{file.path}: topic {channel.topic} at log time {message.log_time} ns"
-                raise BagError(f"{place}: {error} {RESCUE}") from error
-            yield name, message.log_time, message.data, decoded
-        compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))

@@ -112,7 +112,7 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
     found: dict[Stream, list[Sample]] = {stream: [] for stream in Stream}
     changed = False
     samples.wait_ready()
-    for sample in samples:
+    for sample in samples.samples():
         if isinstance(sample, Change):
             changed |= any(sample.zeros.values()) or max(sample.settings.get(load, -1.0) for load in LOADS) >= 0.0
         elif sample is not None:

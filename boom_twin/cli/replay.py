@@ -87,7 +87,8 @@ def _write(
 def _progress(total: int) -> ProgressBar:
     from tqdm import tqdm
 
-    return tqdm(total=total, unit="msg", desc="replay", disable=None, mininterval=0.2)
+    bar: ProgressBar = tqdm(total=total, unit="msg", desc="replay", disable=None, mininterval=0.2)
+    return bar
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:

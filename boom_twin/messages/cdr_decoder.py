@@ -9,9 +9,12 @@ import struct
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from mcap.records import Schema
+from numpy.typing import NDArray
 
-from ..types import SECOND, Stream
+from ..types import SECOND, Array, Stream
+from .message_block import Integers, MessageBlock
 from .topic_table import TYPES
 from .type_store import decode
 
@@ -95,7 +98,7 @@ class Force(NamedTuple):
     linear_acceleration_covariance: tuple[float]
 
 
-class _Layout(NamedTuple):
+class Layout(NamedTuple):
     """How a message was laid out that was decoded; the next one may be as that one was."""
 
     size: int
@@ -111,6 +114,28 @@ class _Layout(NamedTuple):
         is_alike = len(data) == self.size and data[:2] == _LITTLE and data[_ORIGIN + _TIME : self.end] == self.head
         return is_alike and all(data[at : at + 4] == length for at, length in self.later)
 
+    def read(self, data: bytes) -> Joints | Force:
+        """The message in `data`, which is laid out like this."""
+        return self.make(self.numbers.unpack_from(data, self.at))
+
+    def are_of(self, block: MessageBlock, rows: Integers) -> NDArray[np.bool_]:
+        """Whether each of some messages of a block is laid out like this, shape (rows,)."""
+        alike = block.ends[rows] - block.starts[rows] == self.size
+        rows = rows[alike]
+        parts = [(0, _LITTLE), (_ORIGIN + _TIME, self.head), *self.later]
+        fits = [(block.cut(rows, at, len(part)) == np.frombuffer(part, np.uint8)).all(axis=1) for at, part in parts]
+        alike[alike] = np.logical_and.reduce(fits)
+        return np.asarray(alike)
+
+    def stamps_in(self, block: MessageBlock, rows: Integers) -> Integers:
+        """``header.stamp`` of messages that are laid out like this, ns, shape (rows,)."""
+        stamps = block.cut(rows, _ORIGIN, _TIME).view([("sec", "<i4"), ("nanosec", "<u4")])[:, 0]
+        return np.asarray(stamps["sec"].astype(np.int64) * SECOND + stamps["nanosec"])
+
+    def numbers_in(self, block: MessageBlock, rows: Integers) -> Array:
+        """The numbers of messages that are laid out like this, shape (rows, numbers)."""
+        return block.cut(rows, self.at, self.numbers.size).view("<f8")
+
 
 class CdrDecoder:
     """Reads the messages of one topic.
@@ -124,9 +149,8 @@ class CdrDecoder:
     """
 
     def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode) -> None:
-        self._learn = _force_layout if type_name == TYPES[Stream.IMU] else _joints_layout
         self._type, self._decode = type_name, decode
-        self._layout: _Layout | None = None
+        self._layout: Layout | None = None
 
     def read(self, data: bytes) -> tuple[int, Any]:
         """Stamp (ns) and message, which has the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
@@ -138,17 +162,24 @@ class CdrDecoder:
         """
         layout = self._layout
         if layout is not None and layout.is_of(data):
-            msg: Any = layout.make(layout.numbers.unpack_from(data, layout.at))
+            msg: Any = layout.read(data)
         else:
             msg = self._decode(data, self._type)
-            self._layout = self._learn(data) if data[:2] == _LITTLE else None
+            self._layout = layout_of(data, self._type)
         stamp = stamp_in(data)
         if stamp is None:
             raise ValueError("the message is too short for a header")
         return stamp, msg
 
 
-def _joints_layout(data: bytes) -> _Layout:
+def layout_of(data: bytes, type_name: str) -> Layout | None:
+    """How a message is laid out that could be decoded, of a type that `CdrDecoder` reads; None if it is big-endian."""
+    if data[:2] != _LITTLE:
+        return None
+    return _force_layout(data) if type_name == TYPES[Stream.IMU] else _joints_layout(data)
+
+
+def _joints_layout(data: bytes) -> Layout:
     """Of a JointState: header, names, and the number of positions come before these."""
     names, place = names_in(data)
     end = place + -(place - _ORIGIN) % 4 + 4
@@ -162,14 +193,14 @@ def _joints_layout(data: bytes) -> _Layout:
         place += 4
         place += -(place - _ORIGIN) % 8 + 8 * size if size else 0
     head, numbers = data[_ORIGIN + _TIME : end], struct.Struct(f"<{count}d")
-    return _Layout(len(data), head, end, at, numbers, tuple(later), lambda row: Joints(names, row))
+    return Layout(len(data), head, end, at, numbers, tuple(later), lambda row: Joints(names, row))
 
 
-def _force_layout(data: bytes) -> _Layout:
+def _force_layout(data: bytes) -> Layout:
     """Of an Imu: after the header all has its place."""
     end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
     at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
-    return _Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), (), _force)
+    return Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), (), _force)
 
 
 def _force(row: tuple[float, ...]) -> Force:

@@ -12,14 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from ..types import LIMIT, SECOND, SENSORS, Sample, Stream
-from .topic_table import Topics, factor, load_topics
+from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
+from .topic_table import AXES, Topics, factor, load_topics
 
 LATEST = 2**31 * SECOND
 """Stamps (ns) from here on have no place in a message."""
 
 LONGEST = 1000
 """Most names that are looked through; a machine has some tens of them."""
+
+NO_MEASUREMENT = -1.0
+"""First element of a covariance where the quantity is not measured (REP-145)."""
 
 _ABSENT = float("nan")
 """Known by identity: stands for a channel that the message does not have, unlike one that reads NaN."""
@@ -37,7 +40,7 @@ class _Channels:
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
         self.names = [sensor.name for sensor in sensors.values()]
-        self._scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
+        self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
         self._topics, self._stream = topics, stream
         self._seen: Sequence[str] = ()
         self._places = [-1] * len(self.names)
@@ -53,7 +56,7 @@ class _Channels:
 
     def quantities(self, readings: list[float]) -> list[float]:
         """Readings in SI units; what is absent stays so."""
-        pairs = zip(readings, self._scales, strict=True)
+        pairs = zip(readings, self.scales, strict=True)
         return [value if value is _ABSENT else (value - zero) * scale for value, (zero, scale) in pairs]
 
 
@@ -142,33 +145,53 @@ class SampleDecoder:
             return None
         return Sample(stream, stamp_ns, np.array(values, dtype=np.float64))
 
-    def _positions(self, msg: Any, stream: Stream) -> list[float] | None:
-        """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
-        names, positions = msg.name, msg.position
-        if len(names) > LONGEST:
-            self.oddities["too many names"] += 1
-            return None
+    def places(self, stream: Stream, msg: Any) -> tuple[list[int] | None, list[str]]:
+        """Where the channels of a stream stand among the readings of a message, and what is odd about that.
+
+        Any other message with these names and as many positions gives the same.
+
+        Returns
+        -------
+        list of int, or None
+            Places in ``position``, or in x, y, z of ``linear_acceleration``; -1 for a channel without a reading. None if
+            the message is not of this stream.
+        list of str
+            Keys of `oddities`.
+        """
         channels = self._channels[stream]
+        if stream in self._by_axis:
+            return [AXES.index(name) for name in channels.names], []
+        names, end = msg.name, len(msg.position)
+        if len(names) > LONGEST:
+            return None, ["too many names"]
         places = channels.places(names)
         if channels.beyond:
-            self.oddities["names of another boom"] += 1
             self.strangers[stream] = channels.beyond
-            return None
+            return None, ["names of another boom"]
         if max(places) < 0:
             beside = self._beside.get(stream)
-            if beside is None or max(self._channels[beside].places(names)) < 0:
-                self.oddities["unknown names only"] += 1
-            return None
-        if len(positions) != len(names):
-            self.oddities["unequal arrays"] += 1
+            is_unknown = beside is None or max(self._channels[beside].places(names)) < 0
+            return None, ["unknown names only"] if is_unknown else []
+        odd = ["unequal arrays"] if end != len(names) else []
         if -1 in places:
-            self.oddities["missing names"] += 1
-        end = len(positions)
-        return [float(positions[place]) if 0 <= place < end else _ABSENT for place in places]
+            odd.append("missing names")
+        return [place if place < end else -1 for place in places], odd
+
+    def scales(self, stream: Stream) -> Array:
+        """What is taken off a reading, and by what it is then multiplied, shape (2, channels)."""
+        return np.array(self._channels[stream].scales).T
+
+    def _positions(self, msg: Any, stream: Stream) -> list[float] | None:
+        """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
+        places, odd = self.places(stream, msg)
+        for name in odd:
+            self.oddities[name] += 1
+        positions = msg.position
+        return None if places is None else [float(positions[place]) if place >= 0 else _ABSENT for place in places]
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:
         """Specific force along the axes that are taken for the tip's x and z."""
-        if msg.linear_acceleration_covariance[0] == -1.0:
+        if msg.linear_acceleration_covariance[0] == NO_MEASUREMENT:
             self.oddities["no measurement"] += 1
             return None
         return [float(getattr(msg.linear_acceleration, axis)) for axis in self._channels[stream].names]

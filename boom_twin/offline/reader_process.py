@@ -6,16 +6,20 @@ import pickle
 import sys
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
 
-from ..bag.reader import Session, read, scan
+from ..bag.reader import Session, read, read_blocks, scan
 from ..errors import BoomTwinError
+from ..messages.block_decoder import BlockDecoder, DecodedBlock, together
+from ..messages.message_block import MessageBlock
 from ..messages.report_encoder import decode_changes
-from ..messages.sample_decoder import SampleDecoder, stamp_of
 from ..messages.topic_table import Output, Topics
-from ..types import Change, Sample, Stream
+from ..messages.type_store import jazzy
+from ..twin.blocks import SampleBlock, samples_in
+from ..types import SENSORS, Change, Sample, Stream
 from .process_pipe import END, Pipe, post, say_ready
 
 NEAR = 2_000_000_000
@@ -47,6 +51,11 @@ class Changes:
             yield self._waiting.popleft()[1]
         self._before = stamp
 
+    @property
+    def are_left(self) -> bool:
+        """Whether any has not begun yet."""
+        return bool(self._waiting)
+
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
         if abs(log - logged) > NEAR:
             return log > logged
@@ -68,12 +77,14 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
-BATCH = 400  # samples in one pickle
-Packed = tuple[str, int, bytes] | Change | None
+BATCH = 400
+"""Messages in one block up the pipe, at least."""
+MOST = 1200
+"""Messages that are decoded at once, at most."""
 
 
 class SampleReader:
-    """The samples of a session; iterate once.
+    """The samples of a session, many at a time; iterate once.
 
     Parameters
     ----------
@@ -95,56 +106,109 @@ class SampleReader:
     def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int) -> None:
         self._pipe = Pipe(__name__)
         self._pipe.send((path, topics, wanted, joints))
+        self._joints = joints
         self.oddities: Counter[str] = Counter()
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
         self._pipe.wait_ready()
 
-    def __iter__(self) -> Iterator[Sample | Change | None]:
-        """Samples in the order of log times, changes before theirs; None for a message without any usable value."""
-        streams = {stream.value: stream for stream in Stream}
-        for batch in self._pipe.receive():
-            if isinstance(batch, Counter):
-                self.oddities = batch
-                continue
-            for packed in batch:
-                if packed is None or isinstance(packed, Change):
-                    yield packed
-                else:
-                    yield Sample(streams[packed[0]], packed[1], np.frombuffer(packed[2]))
+    def __iter__(self) -> Iterator[SampleBlock | Change | None]:
+        """Samples in the order of log times, changes before theirs.
+
+        After a block comes a None for every message among its own that had no usable value.
+        """
+        for item in self._pipe.receive():
+            if isinstance(item, Counter):
+                self.oddities = item
+            elif isinstance(item, int):
+                yield from repeat(None, item)
+            else:
+                yield item
         self._pipe.finish()
+
+    def samples(self) -> Iterator[Sample | Change | None]:
+        """The same, one sample at a time."""
+        for item in self:
+            if isinstance(item, SampleBlock):
+                yield from samples_in(item, self._joints)
+            else:
+                yield item
 
     def stop(self) -> None:
         """End the process."""
         self._pipe.stop()
 
 
+class _Outbox:
+    """Puts samples together on their way up the pipe."""
+
+    def __init__(self) -> None:
+        self._waiting: list[SampleBlock] = []
+        self._messages = self._without = 0
+
+    def put(self, found: DecodedBlock) -> None:
+        """Samples, and how many messages had none, in their turn."""
+        self._waiting.append(found.samples)
+        self._messages += len(found.stamps)
+        self._without += found.without
+        if self._messages >= BATCH:
+            self.empty()
+
+    def empty(self) -> None:
+        """Send what is there."""
+        if self._messages:
+            post([together(self._waiting), self._without])
+        self._waiting, self._messages, self._without = [], 0, 0
+
+
+def _in_turn(block: MessageBlock, found: DecodedBlock, changes: Changes, strokes: list[int]) -> Iterator[DecodedBlock | Change]:
+    """What was found in a block, its messages from `strokes` being those that changes begin with."""
+    done = 0
+    for row in np.flatnonzero(np.isin(block.sources, strokes)).tolist() if changes.are_left else ():
+        due = tuple(changes.due(int(block.log_times[row]), int(found.stamps[row])))
+        if due:
+            yield found.part(done, row)
+            yield from due
+            done = row
+    yield found.part(done, len(block))
+
+
+def _send(path: Path, topics: Topics, wanted: list[str], joints: int) -> None:
+    """The samples of a session, then what was odd, up the pipe."""
+    heard: dict[str, list[Stream]] = topics.heard
+    session = scan(path)
+    changes = recorded_changes(session, topics)
+    blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted})
+    streams = [heard[source.name] for source in blocks.sources]
+    strokes = [number for number, group in enumerate(streams) if Stream.STROKES in group]
+    decoder, outbox = BlockDecoder(joints, topics, streams, blocks.decoded), _Outbox()
+    for block in blocks:
+        for first in range(0, len(block), MOST):
+            part = block.chosen(slice(first, first + MOST))
+            for found in _in_turn(part, decoder.decode(part), changes, strokes):
+                if isinstance(found, Change):
+                    outbox.empty()
+                    post([found])
+                else:
+                    outbox.put(found)
+    outbox.empty()
+    post([decoder.oddities, END])
+
+
 def main() -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
-    path, topics, wanted, joints = pickle.load(sys.stdin.buffer)
-    heard: dict[str, list[Stream]] = topics.heard
-    decoder = SampleDecoder(joints, topics)
+    task = pickle.load(sys.stdin.buffer)
+    for kind in SENSORS.values():
+        jazzy().get_msgdef(kind.message)  # compiles its decoder
     say_ready()
-    batch: list[Packed] = []
     try:
-        session = scan(path)
-        changes = recorded_changes(session, topics)
-        for name, log, message in read(session, {name: topics.inputs[heard[name][0]].type for name in wanted}):
-            stamp = stamp_of(message)
-            if Stream.STROKES in heard[name]:
-                batch += changes.due(log, stamp)
-            found = decoder.samples(heard[name], stamp, message)
-            batch += [(sample.stream.value, stamp, sample.values.tobytes()) for sample in found] or [None]
-            if len(batch) >= BATCH:
-                post([batch])
-                batch = []
+        _send(*task)
     except BrokenPipeError:
         return 0
     except BoomTwinError as error:
         print(error, file=sys.stderr)
         return 1
-    post([batch, decoder.oddities, END])
     return 0
 
 

@@ -170,6 +170,8 @@ def replay_into(
                 recording.refused += 1
                 continue
             block, found = step
+            if not len(block.stamps):
+                continue
             for each in found:
                 recording.add(each)
                 for part in each.all if isinstance(each, Report) else (each,):

@@ -156,7 +156,7 @@ def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], jo
     ahead = SampleReader(session.path, topics, wanted, joints)
     try:
         ahead.wait_ready()
-        for step in drive(twin.twin, ahead):
+        for step in drive(twin.twin, ahead.samples()):
             if step is not None:
                 twin.took(step)
             yield

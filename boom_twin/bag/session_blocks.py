@@ -1,0 +1,111 @@
+"""Blocks of the messages of some topics, from all files of a session, in the order of their log times."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from ..errors import BagError
+from ..messages.message_block import MessageBlock, joined
+from ..messages.type_store import decode, jazzy
+from .chunk_reader import message_blocks
+from .integrity import RESCUE, STUMBLES, as_bag_error, compare_counts
+from .mcap_summary import McapFile
+
+
+class Source(NamedTuple):
+    """Where messages are from: a file and a topic of it, what that was asked for as, and its type."""
+
+    file: Path
+    topic: str
+    name: str
+    type: str
+
+
+class SessionBlocks:
+    """The messages of some topics by log time, those of equal times in the order of the files; iterate for blocks.
+
+    Parameters
+    ----------
+    files : sequence of McapFile
+    asked : mapping of str to str
+        As what each topic is asked for, by its name in the files.
+
+    Attributes
+    ----------
+    sources : list of Source
+        What the sources of the blocks stand for.
+
+    Raises
+    ------
+    BagError
+        While iterating: a checksum does not fit; at the end: the files did not hold what their statistics say.
+    """
+
+    def __init__(self, files: Sequence[McapFile], asked: Mapping[str, str]) -> None:
+        self.sources: list[Source] = []
+        self._files = [(file, self._numbers(file, asked)) for file in files]
+
+    def _numbers(self, file: McapFile, asked: Mapping[str, str]) -> dict[int, int]:
+        """Places in `sources` by channel; -1 for what was not asked for."""
+        numbers = dict.fromkeys(file.channels, -1)
+        for channel in file.channels.values():
+            if channel.topic in asked:
+                numbers[channel.id] = len(self.sources)
+                kind = file.schemas[channel.schema_id].name
+                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], kind))
+        return numbers
+
+    def __iter__(self) -> Iterator[MessageBlock]:
+        return _merged([_wanted(file, numbers) for file, numbers in self._files])
+
+    def decoded(self, block: MessageBlock, row: int) -> Any:
+        """One message of rosbags, None for a type that Jazzy does not have; BagError if it cannot be decoded."""
+        source = self.sources[block.sources[row]]
+        try:
+            return decode(block.data(row), source.type) if source.type in jazzy().types else None
+        except STUMBLES as error:
+            place = f"{source.file}: topic {source.topic} at log time {block.log_times[row]} ns"
+            raise BagError(f"{place}: {error} {RESCUE}") from error
+
+
+def _wanted(file: McapFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
+    """The messages of one file whose channels have a number of 0 or more, their source; all are counted."""
+    seen: Counter[int] = Counter()
+    with as_bag_error(file.path):
+        for block in message_blocks(file.path, file.chunks):
+            counts = np.bincount(block.sources)
+            channels = np.flatnonzero(counts).tolist()
+            seen.update({channel: int(counts[channel]) for channel in channels})
+            unknown = [channel for channel in channels if channel not in numbers]
+            end = int(np.isin(block.sources, unknown).argmax()) if unknown else len(block)
+            source_of = np.full(len(counts), -1)
+            source_of[channels] = [numbers.get(channel, -1) for channel in channels]
+            sources = source_of[block.sources]
+            rows = np.flatnonzero(sources[:end] >= 0)
+            if len(rows):
+                yield replace(block.chosen(rows), sources=sources[rows])
+            if end < len(block):
+                raise KeyError(int(block.sources[end]))
+        compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))
+
+
+def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
+    """The blocks of all files by log time; at equal times in the order of the files."""
+    waiting = [next(file, None) for file in files]
+    while filled := [(number, block) for number, block in enumerate(waiting) if block is not None]:
+        last, first = min((block.log_times[-1], number) for number, block in filled)
+        due = []
+        for number, block in filled:
+            if block.log_times[0] <= last:
+                side: Literal["left", "right"] = "right" if number <= first else "left"
+                end = int(np.searchsorted(block.log_times, last, side))
+                due.append(block.chosen(slice(0, end)))
+                waiting[number] = block.chosen(slice(end, None))
+        yield joined([block for block in due if len(block)])
+        waiting[first] = next(files[first], None)
