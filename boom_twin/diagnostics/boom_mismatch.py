@@ -41,8 +41,8 @@ class OtherBoom:
         """As `took`, of several samples: the newest stamp (ns), and rows of angles and of their residuals (n,) in rad."""
         if self._is_judged:
             return ""
-        self._values += values
-        self._residuals += residuals
+        self._values.extend(values)
+        self._residuals.extend(residuals)
         self._begin = self._begin or stamp
         return self.judge() if stamp - self._begin > WINDOW else ""
 

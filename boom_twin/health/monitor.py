@@ -111,12 +111,13 @@ class HealthMonitor:
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions = block.number * BLOCK, block.predictions()
         stamps, raw, left = block.readings(Stream.ANGLES, self._n)
+        times, stroke_times = np.asarray(stamps * NANO, float), np.asarray(predictions.stamps * NANO, float)
         before = self._angle_watch.masked
-        news = self._angle_watch.take(self._angles.look(stamps * NANO, raw, raw - left, block.end * NANO), start, block.end)
+        news = self._angle_watch.take(self._angles.look(times, raw, raw - left, block.end * NANO), start, block.end)
         if (self._angle_watch.masked & ~before).any():
             self.residuals.forget()
         readings = predictions.measured
-        strokes = self._strokes.look(predictions.stamps * NANO, readings, np.zeros_like(readings), block.end * NANO)
+        strokes = self._strokes.look(stroke_times, readings, np.zeros_like(readings), block.end * NANO)
         news += self._stroke_watch.take(strokes, start, block.end)
         if self._stroke_watch.masked.any() or self._noise is None:
             ended = self.residuals.close(start)

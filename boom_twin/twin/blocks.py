@@ -228,7 +228,7 @@ def joined(parts: list[ReportBlock]) -> ReportBlock:
     others = zip(*(part.residuals[1:] for part in parts), strict=True)
     return ReportBlock(
         np.concatenate([part.stamps for part in parts]),
-        PredictionBlock(np.concatenate(at), *map(np.concatenate, fields), outlines),
-        ResidualBlock(np.concatenate(residuals_at), *map(np.concatenate, others)),
+        PredictionBlock._make([np.concatenate(at), *map(np.concatenate, fields), outlines]),
+        ResidualBlock._make([np.concatenate(residuals_at), *map(np.concatenate, others)]),
         {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
     )
