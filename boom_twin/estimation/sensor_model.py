@@ -14,6 +14,8 @@ from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
 from ..types import Array, Mount
 
+TURN = 2.0 * np.pi
+
 
 @inner
 def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..estimation.look_ahead import follow
+from ..estimation.sensor_model import TURN
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
@@ -301,7 +302,7 @@ def give(limits, state, stream, stamp, values, row, found):
             expected = old + share * (expected - old)
         value = values[i] - expected
         if limits.is_mounted and at + i < limits.absolute.shape[0] and limits.absolute[at + i]:
-            value -= 2.0 * math.pi * np.rint(value / (2.0 * math.pi))
+            value -= TURN * np.rint(value / TURN)
         state.recent.values[recent, i] = value
         found.values[k, i], found.sigmas[k, i] = value - state.zeros[zeros, stream, i], past.sigmas[after, at + i]
         found.raw[k, i] = values[i]

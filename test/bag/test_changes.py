@@ -88,8 +88,8 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
                 bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
     predictions, residuals = result.recording.predictions, result.recording.of(Stream.ANGLES)
-    assert predictions[49].tip_position[1] - predictions[50].tip_position[1] > 0.01
-    assert residuals[49].values[0] - residuals[50].values[0] > 0.015
+    assert predictions.tip_position[49, 1] - predictions.tip_position[50, 1] > 0.01
+    assert residuals.values[49, 0] - residuals.values[50, 0] > 0.015
     events = json.loads((tmp_path / "out" / "summary.json").read_text())["events"]
     assert events == {"load": 1, "zero": 1}
     unchanged = replay(tmp_path / "bag", scene, tmp_path / "other", changes=False)

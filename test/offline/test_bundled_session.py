@@ -39,7 +39,7 @@ def test_residuals_are_what_is_expected(first):
     spread = np.array(summary["joint_residual_normalised_std"])
     assert np.all((spread > 0.85) & (spread < 1.15))
     assert np.all(np.abs(summary["joint_residual_normalised_mean"]) < 0.3)
-    sigmas = np.array([residuals.sigmas for residuals in recording.of(Stream.ANGLES)])
+    sigmas = recording.of(Stream.ANGLES).sigmas
     assert np.all(sigmas >= SENSOR) and np.all(sigmas <= 2 * SENSOR)
 
 

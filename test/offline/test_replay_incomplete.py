@@ -167,14 +167,20 @@ def test_a_process_of_a_replay_that_dies_is_an_error(
 
     monkeypatch.setattr(Pipe, "__init__", kept)
 
-    def killing(samples: Any, total: int) -> Any:
-        for number, sample in enumerate(samples):
-            if number == 500:
+    class Killing:
+        def __init__(self, total: int) -> None:
+            self.count = 0
+
+        def update(self, n: int) -> None:
+            self.count += n
+            if self.count - n < 500 <= self.count:
                 os.kill(started[which]._process.pid, signal.SIGKILL)
-            yield sample
+
+        def close(self) -> None:
+            pass
 
     with pytest.raises(BagError, match="ended from outside"):
-        replay(session, load_scene(), tmp_path / "out", progress=killing, health=False)
+        replay(session, load_scene(), tmp_path / "out", progress=Killing, health=False)
     assert not any(tmp_path.iterdir())
 
 

@@ -88,7 +88,8 @@ def test_live_and_replayed_alike(
     live = published(tmp_path / "bag")
     found = replay(tmp_path / "bag", load_scene(), tmp_path / "out")
     assert found.summary["mapping"].endswith("session.yaml, mapping") and found.summary["dropped"] == 0
-    assert len(found.recording.predictions) == ROWS and len(found.recording.residuals) == ROWS // 4
+    angles = found.recording.of(Stream.ANGLES)
+    assert len(found.recording.predictions.stamps) == ROWS and len(angles.stamps) == ROWS // 4
     assert len(live) == ROWS + ROWS // 4
     assert published(tmp_path / "out" / "bag") == live
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings
+from boom_twin.twin.state import new_state
 from boom_twin.twin.stroke_check import FAR, MOST, SILENT, StrokeCheck
 
 MS, SETTINGS = 1_000_000, Settings()
@@ -16,7 +17,7 @@ class Run:
     """Readings every 5 ms; the estimate is the last that was taken, as the model's own nearly is."""
 
     def __init__(self) -> None:
-        self.plausible, self.stamp, self.estimate = StrokeCheck(), 0, None
+        self.plausible, self.stamp, self.estimate = StrokeCheck(new_state(2, np.array([2, 2, 2])).clock), 0, None
         self.take(0.3, 0.4)
 
     def take(self, *values: float):

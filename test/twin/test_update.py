@@ -1,0 +1,103 @@
+"""Samples in blocks cause what they cause one by one, whatever is odd about them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.config.settings import Settings
+from boom_twin.health.baseline import load_baseline
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.twin.blocks import ReportBlock, block_of, joined, report_block, samples_in
+from boom_twin.types import Report
+
+MS, N = 1_000_000, 4
+START = 1_700_000_000_000 * MS
+
+
+def stream(seed: int, count: int = 900, strange: float = 0.02) -> list[Sample]:
+    """Strokes, angles and accelerations at 200 Hz of a boom that moves: late, missing, doubled, far off, of other times."""
+    rng, scene = np.random.default_rng(seed), load_scene()
+    still = strokes_of_posture(scene, "arch")
+    twin, found, shift = Twin(scene), [], 0
+    for k in range(count):
+        stamp = START + 5 * k * MS + int(rng.normal() * 0.05 * MS)
+        strokes = still + 0.01 * np.sin(0.004 * k) * np.array([1.0, 0.0, 1.0, 0.5]) + rng.normal(size=N) * 2e-5
+        prediction = twin.update(Sample(Stream.STROKES, stamp, strokes)).prediction
+        joints = prediction.joints + rng.normal(size=N) * 2e-4
+        own = [(Stream.STROKES, strokes), (Stream.ANGLES, joints), (Stream.IMU, rng.normal(size=2) * 0.05 + (0.0, 9.8))]
+        for kind, values in own:
+            if rng.random() < strange:
+                values = values.copy()
+                values[rng.integers(len(values))] = rng.choice([np.nan, np.inf, 1e9, values[0] + 0.3])
+            if rng.random() < strange / 10:
+                shift += int(rng.choice([-900, -3, 250, 700, 7000])) * MS
+            if rng.random() > strange / 4:
+                found.append(Sample(kind, stamp + shift + int(rng.random() < strange / 4) * 300 * MS, values))
+    for k in rng.integers(0, len(found) - 40, size=int(strange * len(found))).tolist():
+        other = k + int(rng.integers(1, 40))
+        found[k], found[other] = found[other], found[k]
+    return found
+
+
+def told(reports: list[Report]) -> list[tuple[object, ...]]:
+    """Everything in reports but the Newton passes, which blocks do not give."""
+    found: list[tuple[object, ...]] = []
+    for report in reports:
+        p, health = report.prediction, report.health
+        numbers = () if p is None else (
+            p.stamp, p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration,
+            *(None if each is None else each.tobytes() for each in (
+                p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, p.joints, p.strokes,
+                p.cylinder_forces, p.shape, p.undeflected, p.pins, p.clearances)),
+        )  # fmt: skip
+        residuals = [(r.stream, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
+        level = None if health is None else (health.stamp, health.alarms, health.levels.tobytes(), health.tip_sigmas.tobytes())
+        found.append((report.stamp, report.accepted, report.events, report.status, numbers, residuals, level, report.change))
+        found += told(list(report.earlier))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_blocks_of_any_size_give_what_single_samples_give(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    samples = stream(seed, strange=0.0 if seed == 0 else 0.02)
+    mounts = ("root", None, "head", "root") if seed == 1 else ()
+    usual = load_baseline() if seed < 3 else None
+    one, many = (Twin(load_scene(), Settings(), mounts, usual) for _ in range(2))
+    first, blocks = 0, 0
+    while first < len(samples):
+        part = samples[first : first + int(rng.integers(1, 500))]
+        if rng.random() < 0.2:
+            asked = {"payload": float(rng.integers(0, 60))}
+            one.requests.tune(asked)
+            many.requests.tune(asked)
+        found = many.update_block(block_of(part, N))
+        reports = [each for item in found for each in (item.reports(N) if isinstance(item, ReportBlock) else [item])]
+        assert told(reports) == told([one.update(sample) for sample in part])
+        blocks += sum(isinstance(item, ReportBlock) for item in found)
+        first += len(part)
+    assert one.counts == many.counts and blocks
+    assert seed == 0 or len(one.counts) > 5
+
+
+def test_blocks_keep_samples_and_reports_as_they_are() -> None:
+    samples = stream(9, 100, 0.0)
+    again = samples_in(block_of(samples, N), N)
+    assert [(s.stream, s.stamp, s.values.tobytes()) for s in again] == [(s.stream, s.stamp, s.values.tobytes()) for s in samples]
+    twin = Twin(load_scene())
+    reports = [twin.update(sample) for sample in samples]
+    whole = report_block(reports, N)
+    assert told(whole.reports(N))[1:] == told(reports)[1:]  # the first one tells of a change
+    parts = [report_block(reports[:50], N), report_block(reports[50:], N)]
+    assert told(joined(parts).reports(N)) == told(whole.reports(N))
+
+
+def test_a_block_is_taken_in_one_piece_where_nothing_is_odd() -> None:
+    samples, twin = stream(0, 600, 0.0), Twin(load_scene())
+    for sample in samples[:400]:
+        twin.update(sample)
+    (block,) = twin.update_block(block_of(samples[400:], N))
+    assert isinstance(block, ReportBlock) and len(block.stamps) == len(samples) - 400
+    assert len(block.predictions.outlines) >= 6
