@@ -12,15 +12,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from mcap.writer import CompressionType, Writer
+import numpy as np
+from mcap.writer import CompressionType
 
 from ..errors import BagError
+from ..messages.encoded_block import EncodedBlock
 from ..messages.topic_table import Topic
 from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
+from ..twin.blocks import Integers
 from . import metadata as bagmeta
 from .mcap_records import BYTES_PER_BYTE, LARGEST
 from .mcap_summary import NOTES, PROFILE
+from .mcap_writer import McapWriter
 from .metadata import Recorded, file_information, metadata_of
 
 
@@ -121,18 +125,44 @@ class BagWriter:
         Where so much has packed so well (blank pictures) that this file could not be read with more of it, the next
         one begins, and nothing is packed any more.
         """
-        if self._compression != CompressionType.NONE and self._excess + self._pending + len(data) > LARGEST_MESSAGE:
+        if not self._has_room(len(data)):
             self._compression = CompressionType.NONE
             self.split()
         self.counts[key] += 1
-        first, last, count = self._span or (log_time, log_time, 0)
-        self._span = min(first, log_time), max(last, log_time), count + 1
+        self._extend_span(log_time, log_time, 1)
         published = log_time if publish_time is None else publish_time
         try:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
         self._weigh(len(data))
+
+    def write_block(self, keys: Integers, block: EncodedBlock) -> None:
+        """Append many messages to the topics with these keys, numbered; the same bytes as by `write` of each of them."""
+        if not len(keys):
+            return
+        if not self._has_room(sum(rows.data.size for rows in block.rows)):
+            for key, log_time, data in zip(keys.tolist(), block.log_times.tolist(), block.data(), strict=True):
+                self.write(key, log_time, data, sequence=self.counts[key] + 1)
+            return
+        sequences = np.empty_like(keys)
+        for key in set(keys.tolist()):
+            own = np.flatnonzero(keys == key)
+            sequences[own] = self.counts[key] + np.arange(1, len(own) + 1)
+            self.counts[key] += len(own)
+        self._extend_span(int(block.log_times.min()), int(block.log_times.max()), len(keys))
+        with self._told():
+            for size in self._writer.add_block(np.array(self._channels)[keys], sequences, block):
+                self._weigh(size)
+
+    def _has_room(self, size: int) -> bool:
+        """Whether the open file can be read with so many bytes more, however well they pack."""
+        return self._compression == CompressionType.NONE or self._excess + self._pending + size <= LARGEST_MESSAGE
+
+    def _extend_span(self, start: int, end: int, count: int) -> None:
+        """So many messages more, between these log times (ns)."""
+        first, last, before = self._span or (start, end, 0)
+        self._span = min(first, start), max(last, end), before + count
 
     def _weigh(self, size: int) -> None:
         """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
@@ -147,7 +177,7 @@ class BagWriter:
         They survive the loss of power once ``os.fsync`` has put that file on the disk.
         """
         with self._told():
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._writer.flush()
         return self._raw.fileno()
 
     @property
@@ -194,8 +224,7 @@ class BagWriter:
         with self._told():
             self._raw = self.file.open("xb", buffering=0)
             self._buffered = BufferedWriter(self._raw)
-            self._writer = Writer(self._buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
-            self._writer.start(profile=PROFILE, library=LIBRARY)
+            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, CHUNK_SIZE, self._compression)
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
@@ -210,7 +239,7 @@ class BagWriter:
                 self._schemas[schema] = self._writer.register_schema(*schema)
         for each in topics:
             number = self._schemas[each.type, each.definition_encoding, each.definition]
-            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, dict(each.details)))
+            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, each.details))
 
     def _write_metadata(self) -> None:
         metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
@@ -218,7 +247,7 @@ class BagWriter:
 
     def _finish(self) -> None:
         """Complete the open file."""
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         self.sync(self.flush())
         self._completed += self.size
         self._raw.close()
@@ -285,7 +314,6 @@ class SessionWriter:
         compression: CompressionType = CompressionType.ZSTD,
     ) -> None:
         self._topics = dict(topics)
-        self._counts: Counter[str] = Counter()
         self._encode = jazzy().serialize_cdr
         self._bag = BagWriter(directory, notes, compression)
         self._keys = dict(zip(topics, self._bag.add(*map(recorded, topics.values())), strict=True))
@@ -296,8 +324,15 @@ class SessionWriter:
 
     def write_encoded(self, key: str, stamp_ns: int, data: bytes) -> None:
         """Append a message that is CDR already."""
-        self._counts[key] += 1
-        self._bag.write(self._keys[key], stamp_ns, data, sequence=self._counts[key])
+        number = self._keys[key]
+        self._bag.write(number, stamp_ns, data, sequence=self._bag.counts[number] + 1)
+
+    def write_block(self, block: EncodedBlock) -> None:
+        """Append many messages by the keys of their topics; the same bytes as of `write_encoded` for each of them."""
+        keys = np.empty(len(block.log_times), np.int64)
+        for rows in block.rows:
+            keys[rows.places] = self._keys[rows.key]
+        self._bag.write_block(keys, block)
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..twin.blocks import Integers
 from ..types import SECOND, Array
+from .encoded_block import Bytes
 from .message_fields import fill_header
 from .type_store import jazzy
 
@@ -77,6 +79,16 @@ class Template:
         if singles:
             self._singles[self._single_places] = singles
         return bytes(self._data)
+
+    def fill_rows(self, stamps: Integers, doubles: Array | Sequence[Array]) -> Bytes:
+        """Many messages, a row of bytes each, with stamps, shape (k,), and numbers, shape (d, k); see `fill`."""
+        rows = np.empty((len(stamps), len(self._data)), np.uint8)
+        rows[:] = np.frombuffer(self._data, np.uint8)
+        rows[:, ORIGIN : ORIGIN + self._doubles.nbytes].view("<f8")[:, self._double_places] = np.transpose(doubles)
+        times = np.column_stack(np.divmod(stamps, SECOND))
+        for place in self._stamps:
+            rows[:, place : place + _TIME.size].view("<i4")[:] = times
+        return rows
 
 
 def stamped(header: Any) -> None:

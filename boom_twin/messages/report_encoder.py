@@ -5,7 +5,7 @@ The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a posi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import nan
 from typing import Any, NamedTuple
 
@@ -16,8 +16,10 @@ from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals
+from ..twin.blocks import STREAMS, Integers, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
+from .encoded_block import BlockBuilder, Bytes, EncodedBlock
 from .marker_encoder import ShapeMarkers
 from .message_fields import fill_header, fill_xz
 from .sample_decoder import stamp_of
@@ -94,11 +96,12 @@ class PredictedOutput(NamedTuple):
     """An output that every prediction gives one message of: what is put into an empty message, and with which numbers.
 
     ``put`` gets the message and the holes, which it places where numbers stand; ``numbers`` gives these in the same order.
+    Of a block of predictions each of them is a column of it: transpose what has a row for every prediction.
     """
 
     output: Output
     put: Callable[[Any, NumberFields], None]
-    numbers: Callable[[Prediction], Array | Sequence[float]]
+    numbers: Callable[[Prediction | PredictionBlock], Array | Sequence[Any]]
 
 
 def _put_vector(msg: Any, holes: NumberFields) -> None:
@@ -115,9 +118,9 @@ def _put_acceleration(msg: Any, holes: NumberFields) -> None:
 
 
 PREDICTED = (
-    PredictedOutput(Output.TIP_DISPLACEMENT, _put_vector, lambda p: p.tip_displacement),
-    PredictedOutput(Output.TIP_POSITION, _put_point, lambda p: p.tip_position),
-    PredictedOutput(Output.TIP_ACCELERATION, _put_acceleration, lambda p: [*p.tip_acceleration, -p.tip_angular_acceleration]),
+    PredictedOutput(Output.TIP_DISPLACEMENT, _put_vector, lambda p: p.tip_displacement.T),
+    PredictedOutput(Output.TIP_POSITION, _put_point, lambda p: p.tip_position.T),
+    PredictedOutput(Output.TIP_ACCELERATION, _put_acceleration, lambda p: [*p.tip_acceleration.T, -p.tip_angular_acceleration]),
 )
 """In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
 
@@ -144,8 +147,11 @@ class ReportEncoder:
         self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _put_vector)
         self._joints = self._joint_states(names, count, 0)
         self._all_joints = self._joint_states([*names, *self._passive.names], count, len(self._passive.names))
+        self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale)
+        for output in Output:  # their encoders are compiled here, not when the first message waits
+            jazzy().get_msgdef(TYPES[output])
 
     def fill(self, report: Report) -> Messages:
         """The messages of one report.
@@ -163,12 +169,30 @@ class ReportEncoder:
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
             messages.append((Output.CHANGES, encode_changes(report.change)))
-        if (health := report.health) is not None:
-            messages.append((Output.HEALTH, encode_health(health)))
-            messages.append((Output.TIP_UNCERTAINTY, self._uncertainty.fill(health.stamp, health.tip_sigmas)))
+        if report.health is not None:
+            messages += self._fill_health(report.health)
         if p is not None and p.shape is not None:
             messages.append((Output.SHAPE, self._markers.fill(p)))
         return messages
+
+    def fill_block(self, block: ReportBlock) -> EncodedBlock:
+        """The messages of many reports: those that `fill` gives of one after the other."""
+        p, residuals, found = block.predictions, block.residuals, BlockBuilder()
+        turn = len(self._predicted)  # of joint_states among the messages of one sample; residuals follow
+        last = turn + 1 + len(residuals.at)  # of health; shape follows
+        if len(p.at):
+            for number, (output, template, numbers) in enumerate(self._predicted):
+                found.add(output, p.at, number, template.fill_rows(p.stamps, numbers(p)))
+            for rows, data in self._joint_states_rows(p):
+                found.add(Output.JOINT_STATES, p.at[rows], turn, data)
+        for rows, data in self._residual_rows(residuals):
+            found.add(Output.RESIDUALS, residuals.at[rows], turn + 1 + rows, data)
+        for row, health in block.health.items():
+            for number, (output, message) in enumerate(self._fill_health(health), start=last):
+                found.add_one(output, row, number, message)
+        for row in sorted(p.outlines):
+            found.add_one(Output.SHAPE, int(p.at[row]), last + 2, self._markers.fill(p.one(row)))
+        return found.block(block.stamps)
 
     def _template(self, key: Output, put: Callable[[Any, NumberFields], None]) -> Template:
         msg, holes = self._types.make(TYPES[key]), NumberFields()
@@ -180,27 +204,59 @@ class ReportEncoder:
         """Joints first, cylinders after them, passive joints last; only cylinders have an effort."""
 
         def put(msg: Any, holes: NumberFields) -> None:
-            msg.name, msg.position = names, self._types.doubles(holes.row(2 * count + passive))
-            msg.effort = self._types.doubles([nan] * count + holes.row(count) + [nan] * passive)
+            own, efforts, others = (holes.row(number) for number in (2 * count, count, passive))
+            msg.name, msg.position = names, self._types.doubles(own + others)
+            msg.effort = self._types.doubles([nan] * count + efforts + [nan] * passive)
 
         return self._template(Output.JOINT_STATES, put)
 
     def _fill_joint_states(self, p: Prediction) -> bytes:
         """With the passive joints where there is a shape."""
         if p.shape is None:
-            return self._joints.fill(p.stamp, np.concatenate([p.joints, p.strokes, p.cylinder_forces]))
-        passive = self._passive.positions(p.joints)
-        return self._all_joints.fill(p.stamp, np.concatenate([p.joints, p.strokes, passive, p.cylinder_forces]))
+            return self._joints.fill(p.stamp, _joint_numbers(p))
+        return self._all_joints.fill(p.stamp, [*_joint_numbers(p), *self._passive.positions(p.joints)])
+
+    def _joint_states_rows(self, p: PredictionBlock) -> Iterator[tuple[Integers, Bytes]]:
+        """Of all predictions, by rows of the block; those with a shape apart."""
+        numbers, has_shape = _joint_numbers(p), np.zeros(len(p.at), bool)
+        has_shape[list(p.outlines)] = True
+        bare, shaped = np.flatnonzero(~has_shape), np.flatnonzero(has_shape)
+        yield bare, self._joints.fill_rows(p.stamps[bare], numbers[:, bare])
+        passive = np.array([self._passive.positions(joints) for joints in p.joints[shaped]])
+        columns = passive.reshape(len(shaped), len(self._passive.names)).T
+        yield shaped, self._all_joints.fill_rows(p.stamps[shaped], np.concatenate([numbers[:, shaped], columns]))
 
     def _fill_residuals(self, residuals: Residuals) -> bytes:
         """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
+        template = self._residual_template(residuals.names)
+        return template.fill(residuals.stamp, _residual_numbers(residuals.values, residuals.sigmas))
 
+    def _residual_rows(self, residuals: ResidualBlock) -> Iterator[tuple[Integers, Bytes]]:
+        """Of all residuals, by rows of the block, each stream apart."""
+        for code in set(residuals.streams.tolist()):
+            rows, names = np.flatnonzero(residuals.streams == code), self._channels[STREAMS[code]]
+            values, sigmas = (array[rows, : len(names)] for array in (residuals.values, residuals.sigmas))
+            yield rows, self._residual_template(names).fill_rows(residuals.stamps[rows], _residual_numbers(values, sigmas))
+
+    def _residual_template(self, names: tuple[str, ...]) -> Template:
         def put(msg: Any, holes: NumberFields) -> None:
-            msg.name = list(residuals.names)
-            msg.position, msg.velocity, msg.effort = (self._types.doubles(holes.row(len(msg.name))) for _ in range(3))
+            msg.name = list(names)
+            msg.position, msg.velocity, msg.effort = (self._types.doubles(holes.row(len(names))) for _ in range(3))
 
-        template = self._residuals.get(residuals.names)
-        if template is None:
-            template = self._residuals[residuals.names] = self._template(Output.RESIDUALS, put)
-        numbers = np.concatenate([residuals.values, residuals.normalised, residuals.sigmas])
-        return template.fill(residuals.stamp, numbers)
+        if names not in self._residuals:
+            self._residuals[names] = self._template(Output.RESIDUALS, put)
+        return self._residuals[names]
+
+    def _fill_health(self, health: Health) -> Messages:
+        uncertainty = self._uncertainty.fill(health.stamp, health.tip_sigmas)
+        return [(Output.HEALTH, encode_health(health)), (Output.TIP_UNCERTAINTY, uncertainty)]
+
+
+def _joint_numbers(p: Prediction | PredictionBlock) -> Array:
+    """What ``joint_states`` tells of joints and cylinders; of a block a column for every prediction."""
+    return np.concatenate([p.joints.T, p.strokes.T, p.cylinder_forces.T])
+
+
+def _residual_numbers(values: Array, sigmas: Array) -> Array:
+    """Residual, normalised residual, standard deviation of all channels; of many residuals a column for each."""
+    return np.concatenate([values.T, (values / sigmas).T, sigmas.T])

@@ -6,6 +6,7 @@ writer, so order and bytes are those of doing it all in one place.
 
 from __future__ import annotations
 
+import gc
 import pickle
 import subprocess
 import sys
@@ -100,7 +101,8 @@ def received(stream: IO[bytes]) -> Iterator[Any]:
 
 
 def say_ready() -> None:
-    """Called by the process."""
+    """Called by the process, once it has all that lasts to its end: the garbage collector passes that by, also at the exit."""
+    gc.freeze()
     post([READY])
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
-from operator import attrgetter
+from collections.abc import Iterable, Mapping
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -15,53 +15,50 @@ from ..errors import BoomTwinError
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
-from ..types import Change, Health, Prediction, Report, Residuals, Stream
+from ..twin.blocks import CODES, Outline, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import Report
 from .process_pipe import END, Pipe, received, say_ready
 
-BATCH = 200  # reports in one pickle
-Rows = list[tuple[str, int, tuple[str, ...], bytes, bytes]]
-Rare = tuple[Change | None, Health | None]
-Numbers = tuple[float, ...]
-Arrays = list[bytes | None]
-Packed = tuple[int, Numbers | None, Arrays, Rows, Rare]
-
-NUMBERS = ("tip_angle", "tip_angular_velocity", "tip_angular_acceleration")
-ARRAYS = (
-    "tip_position", "tip_displacement", "tip_velocity", "tip_acceleration", "joints", "strokes", "cylinder_forces", "shape",
-    "undeflected", "pins", "clearances", "moments",
-)  # fmt: skip
-COLUMNS = {"shape": 2, "undeflected": 2, "pins": 4, "clearances": 4}
-"""Of the arrays of a prediction that are tables."""
-_numbers_of, _arrays_of = attrgetter(*NUMBERS), attrgetter(*ARRAYS)
+BATCH = 200  # single reports in one pickle
+Packed = ReportBlock | Report
 
 
-def pack(report: Report) -> Packed:
-    """A report as plain numbers and bytes; events and status are not written to a bag, and left out."""
-    residuals = [(r.stream.value, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
-    p, rare = report.prediction, (report.change, report.health)
-    if p is None:
-        return report.stamp, None, [], residuals, rare
-    arrays = [None if array is None else array.tobytes() for array in _arrays_of(p)]
-    return report.stamp, _numbers_of(p), arrays, residuals, rare
+def pack(reports: Iterable[Report]) -> list[Packed]:
+    """Reports as blocks, less what is not written to a bag: events, status. One with a change stays by itself."""
+    packed: list[Packed] = []
+    for has_change, run in groupby(reports, lambda report: report.change is not None):
+        found = list(run)
+        packed += found if has_change else [_block(found)]
+    return packed
 
 
-def unpack(packed: Packed) -> Report:
-    """What `pack` was given, less what it leaves out."""
-    stamp, numbers, arrays, rows, (change, health) = packed
-    residuals = tuple(
-        Residuals(Stream(stream), at, names, np.frombuffer(values), np.frombuffer(sigmas))
-        for stream, at, names, values, sigmas in rows
-    )
-    prediction = None if numbers is None else _prediction(stamp, numbers, arrays)
-    return Report(stamp, True, prediction, residuals, change=change, health=health)
+def _block(reports: list[Report]) -> ReportBlock:
+    stamps = np.array([report.stamp for report in reports], np.int64)
+    health = {row: report.health for row, report in enumerate(reports) if report.health is not None}
+    return ReportBlock(stamps, _predictions(reports), _residuals(reports), health)
 
 
-def _prediction(stamp: int, numbers: Numbers, arrays: Arrays) -> Prediction:
-    found = {name: None if data is None else np.frombuffer(data) for name, data in zip(ARRAYS, arrays, strict=True)}
-    for name, columns in COLUMNS.items():
-        if (flat := found[name]) is not None:
-            found[name] = flat.reshape(-1, columns)
-    return Prediction(stamp=stamp, **dict(zip(NUMBERS, numbers, strict=True)), **found)  # type: ignore[arg-type]
+def _predictions(reports: list[Report]) -> PredictionBlock:
+    found = [report.prediction for report in reports if report.prediction is not None]
+    at = np.flatnonzero([report.prediction is not None for report in reports])
+    stamps = np.array([p.stamp for p in found], np.int64)
+    columns = [np.array([getattr(p, name) for p in found]) for name in PredictionBlock._fields[2:-1]]
+    outlines = {
+        row: Outline(p.shape, p.undeflected, p.pins)
+        for row, p in enumerate(found)
+        if p.shape is not None and p.undeflected is not None and p.pins is not None
+    }
+    return PredictionBlock._make([at, stamps, *columns, outlines])
+
+
+def _residuals(reports: list[Report]) -> ResidualBlock:
+    rows = [(row, residuals) for row, report in enumerate(reports) for residuals in report.residuals]
+    values, sigmas = np.full((2, len(rows), max((len(r.names) for _, r in rows), default=0)), np.nan)
+    for own_values, own_sigmas, (_, residuals) in zip(values, sigmas, rows, strict=True):
+        own_values[: len(residuals.names)] = residuals.values
+        own_sigmas[: len(residuals.names)] = residuals.sigmas
+    at, streams, stamps = np.array([(row, CODES[r.stream], r.stamp) for row, r in rows], np.int64).reshape(-1, 3).T
+    return ResidualBlock(at, streams, stamps, values, sigmas)
 
 
 class ReportWriter:
@@ -91,7 +88,7 @@ class ReportWriter:
     def __init__(
         self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings, lock: int
     ) -> None:
-        self._batch: list[Packed] = []
+        self._reports: list[Report] = []
         self._pipe = Pipe(__name__, str(directory), inherited=[lock])
         self._pipe.send((dict(notes), topics.outputs, scene, settings))
 
@@ -99,20 +96,26 @@ class ReportWriter:
         """Until the process can begin."""
         self._pipe.wait_ready()
 
-    def put(self, report: Report) -> None:
-        """Write what `report` holds, in its turn; its stamp becomes the log time."""
-        if report.prediction is None and not report.residuals and report.change is None:
-            return
-        self._batch.append(pack(report))
-        if len(self._batch) == BATCH:
-            self._pipe.send(self._batch)
-            self._batch = []
+    def put(self, item: ReportBlock | Report) -> None:
+        """Write what `item` holds, in its turn; the stamps of the samples become the log times."""
+        if isinstance(item, Report):
+            self._reports.append(item)
+            if len(self._reports) == BATCH:
+                self._send_reports()
+        else:
+            self._send_reports()
+            self._pipe.send([item])
 
     def close(self) -> None:
         """Send the rest; returns when the bag is complete."""
-        self._pipe.send(self._batch)
+        self._send_reports()
         self._pipe.send(END)
         self._pipe.finish()
+
+    def _send_reports(self) -> None:
+        if self._reports:
+            self._pipe.send(pack(self._reports))
+            self._reports.clear()
 
     def stop(self) -> None:
         """End the process; the bag stays incomplete."""
@@ -132,16 +135,22 @@ def main(directory: Path) -> int:
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             for batch in items:
-                for packed in batch:
-                    report = unpack(packed)
-                    for key, data in encoder.fill(report):
-                        writer.write_encoded(key, report.stamp, data)
+                for item in batch:
+                    _write(item, encoder, writer)
         return 0
     except BoomTwinError as error:
         print(error, file=sys.stderr)
     except OSError as error:
         print(f"{directory}: {error.strerror or error}. Free some space, or give another folder.", file=sys.stderr)
     return 1
+
+
+def _write(item: Packed, encoder: ReportEncoder, writer: SessionWriter) -> None:
+    if isinstance(item, Report):
+        for key, data in encoder.fill(item):
+            writer.write_encoded(key, item.stamp, data)
+    else:
+        writer.write_block(encoder.fill_block(item))
 
 
 if __name__ == "__main__":

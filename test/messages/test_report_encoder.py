@@ -13,7 +13,6 @@ from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import RosbagsTypes, jazzy
-from boom_twin.offline.writer_process import pack, unpack
 from boom_twin.scene import load_scene
 from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
 
@@ -169,11 +168,6 @@ def test_how_far_off_the_tip_may_be() -> None:
     assert (vector.x, vector.y, vector.z) == (0.001, 0.0, 0.004)
     assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
     assert not found[Output.HEALTH].status
-
-
-def test_a_report_passes_between_processes_whole() -> None:
-    own, other = encoder(), encoder()
-    assert own.fill(unpack(pack(judged(ALARM)))) == other.fill(judged(ALARM))
 
 
 def test_every_message_has_the_stamp_of_its_cause(filled: dict[Output, Any]) -> None:

@@ -1,20 +1,35 @@
-"""What goes down the pipe to the writer comes out of it: every number of a prediction, whatever it has."""
+"""What goes down the pipe to the writer comes out of it: every number of a prediction; the same bag from blocks and reports."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+import os
+import pickle
+import time
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
+import pytest
+from mcap.reader import make_reader
+from messages.random_reports import Told, boom, random_reports
+from rosbags.highlevel import AnyReader
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.offline.writer_process import ARRAYS, NUMBERS, pack, unpack
+from boom_twin.bag.writer import FILE_NAME, SessionWriter
+from boom_twin.config.settings import Settings
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.topic_table import Output, load_topics
+from boom_twin.offline.writer_process import ReportWriter, pack
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
+from boom_twin.twin.blocks import PredictionBlock, ReportBlock
 from boom_twin.types import Prediction, Report
 
 
 def test_every_field_of_a_prediction_has_its_place() -> None:
-    assert sorted(["stamp", *NUMBERS, *ARRAYS]) == sorted(field.name for field in fields(Prediction))
+    fields_of_block = set(PredictionBlock._fields) - {"at", "stamps", "outlines"}
+    assert fields_of_block | {"stamp", "shape", "undeflected", "pins"} == {field.name for field in fields(Prediction)}
 
 
 def test_a_prediction_with_clearance_comes_through_whole() -> None:
@@ -22,16 +37,76 @@ def test_a_prediction_with_clearance_comes_through_whole() -> None:
     scene = load_scene()
     worn = Pin(at="cylinder_1.rod", pin_radius=0.025, radial_clearance=1e-4)
     scene = scene.model_copy(update={"clearance": Clearance(pins=(worn,))})
-    twin, strokes, shapes = Twin(scene), strokes_of_posture(scene, "arch"), 0
-    for k in range(30):
-        given = twin.update(Sample(Stream.STROKES, k * 5_000_000, strokes)).prediction
-        assert given is not None and given.clearances is not None and given.moments is not None
-        assert given.clearances.shape == (1, 4) and given.moments.size > 0
-        got = unpack(pack(Report(given.stamp, True, given))).prediction
-        assert got is not None
-        shapes += got.shape is not None
+    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
+    given = [twin.update(Sample(Stream.STROKES, k * 5_000_000, strokes)) for k in range(30)]
+    (block,) = pickle.loads(pickle.dumps(pack([replace(report, change=None) for report in given])))
+    assert isinstance(block, ReportBlock)
+    got = block.reports(len(scene.joints))
+    assert sum(report.prediction is not None and report.prediction.shape is not None for report in got) == 2
+    for one, other in ((a.prediction, b.prediction) for a, b in zip(given, got, strict=True)):
+        assert one is not None and other is not None
+        assert one.clearances is not None and one.clearances.shape == (1, 4) and one.moments is not None and one.moments.size
         for name in (field.name for field in fields(Prediction)):
-            one, other = getattr(given, name), getattr(got, name)
-            assert (one is None) == (other is None), name
-            assert one is None or (np.shape(one) == np.shape(other) and np.array_equal(one, other)), name
-    assert shapes == 2
+            left, right = getattr(one, name), getattr(other, name)
+            assert (left is None) == (right is None), name
+            assert left is None or (np.shape(left) == np.shape(right) and np.array_equal(left, right)), name
+
+
+@pytest.mark.parametrize("size", [0, 37, 400])
+def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size: int) -> None:
+    """From reports (0), and from blocks of so many with single reports of changes between them."""
+    reports = random_reports(size, 1500, Told(3, pins=1, changes=0.01))
+    scene, notes = boom(3), {"origin": "synthetic, a test"}
+    outputs = {key: topic for key, topic in load_topics().outputs.items() if key is not Output.DIAGNOSTICS}
+    encoder = ReportEncoder(scene, Settings())
+    with SessionWriter(tmp_path / "expected", outputs, notes) as expected:
+        for report in reports:
+            for key, data in encoder.fill(report):
+                expected.write_encoded(key, report.stamp, data)
+    with (tmp_path / "lock").open("w") as lock:
+        writer = ReportWriter(tmp_path / "bag", notes, load_topics(), scene, Settings(), lock.fileno())
+        writer.wait_ready()
+        for item in _items(reports, size):
+            writer.put(item)
+        writer.close()
+    for name in (FILE_NAME, "metadata.yaml"):
+        assert (tmp_path / "bag" / name).read_bytes() == (tmp_path / "expected" / name).read_bytes()
+    with (tmp_path / "bag" / FILE_NAME).open("rb") as file:
+        summary = make_reader(file, validate_crcs=True).get_summary()
+        assert summary is not None and summary.statistics is not None and summary.statistics.chunk_count > 5
+    with AnyReader([tmp_path / "bag"]) as reader:
+        decoded = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    assert len(decoded) == summary.statistics.message_count > 3000
+    assert os.listdir(tmp_path / "bag") == os.listdir(tmp_path / "expected")
+
+
+def test_blocks_cost_less(tmp_path: Path) -> None:
+    """About a fifth of the processor's time for encoding and writing; less than half of it is asked for."""
+    reports = random_reports(4, 5000, Told(4, health=0.0, outlines=0.0))
+    blocks, encoder = pack(reports), ReportEncoder(boom(4), Settings())
+    outputs = load_topics().outputs
+
+    def seconds(name: str, write: Callable[[SessionWriter], None]) -> float:
+        with SessionWriter(tmp_path / name, outputs) as writer:
+            began = time.process_time()
+            write(writer)
+            return time.process_time() - began
+
+    def one_by_one(writer: SessionWriter) -> None:
+        for report in reports:
+            for key, data in encoder.fill(report):
+                writer.write_encoded(key, report.stamp, data)
+
+    def in_blocks(writer: SessionWriter) -> None:
+        for block in blocks:
+            assert isinstance(block, ReportBlock)
+            writer.write_block(encoder.fill_block(block))
+
+    slow, fast = (min(seconds(f"{write.__name__}_{k}", write) for k in range(3)) for write in (one_by_one, in_blocks))
+    assert fast < 0.5 * slow, (fast, slow)
+
+
+def _items(reports: list[Report], size: int) -> list[ReportBlock | Report]:
+    if size == 0:
+        return list(reports)
+    return [item for first in range(0, len(reports), size) for item in pack(reports[first : first + size])]

@@ -1,0 +1,281 @@
+"""Write an .mcap file: messages one by one or many at once as arrays, in chunks with an index each, a summary at its end.
+
+The bytes are those of `mcap.writer.Writer`, which takes messages one by one only.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import BinaryIO
+
+import numpy as np
+from lz4.frame import compress as lz4_compress
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC, CompressionType
+from zstandard import ZstdCompressor
+
+from ..messages.encoded_block import Bytes, EncodedBlock
+from ..twin.blocks import Integers
+from .mcap_records import MESSAGE_HEAD, PREFIX
+
+Pack = Callable[[bytearray], bytes]
+
+_INDEX_HEAD = struct.Struct("<HI")  # of the messages of one channel in one chunk: channel, bytes of entries
+_INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
+_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
+"""`PREFIX` and `MESSAGE_HEAD` of many messages."""
+
+
+class McapWriter:
+    """Writes one file; its end and its summary come with `finish`.
+
+    Parameters
+    ----------
+    stream : BinaryIO
+        Empty; from now on only written to here, and not closed.
+    profile, library : str
+        Of the file's header.
+    chunk_size : int
+        Bytes of records beyond which a chunk is complete.
+    compression : CompressionType
+        Of the chunks.
+
+    Raises
+    ------
+    OSError
+        From any method, where the stream does.
+    """
+
+    def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int, compression: CompressionType) -> None:
+        self._stream, self._chunk_size = stream, chunk_size
+        self._compression, self._pack = _codec(compression)
+        self._chunk = _OpenChunk()
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._chunks: list[ChunkIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        stream.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write a metadata record; outside chunks, so it comes before messages that wait for their chunk."""
+        record, start = _encoded(Metadata(name, dict(values))), self._stream.tell()
+        self._stream.write(record)
+        self._metadata.append(MetadataIndex(start, len(record), name))
+
+    def register_schema(self, name: str, encoding: str, definition: bytes) -> int:
+        """Add a message type; gives its number."""
+        self._schemas.append(Schema(id=len(self._schemas) + 1, data=definition, encoding=encoding, name=name))
+        self._chunk.content += _encoded(self._schemas[-1])
+        self._finish_full_chunk()
+        return len(self._schemas)
+
+    def register_channel(self, topic: str, encoding: str, schema: int, details: Mapping[str, str]) -> int:
+        """Add a topic, of the message type with that number; gives its own."""
+        number = len(self._channels) + 1
+        self._channels.append(Channel(number, topic, encoding, dict(details), schema))
+        self._chunk.content += _encoded(self._channels[-1])
+        self._finish_full_chunk()
+        return number
+
+    def add_message(self, channel: int, log_time: int, data: bytes, publish_time: int, sequence: int) -> None:
+        """Append a message to the channel with that number; times in ns."""
+        head = MESSAGE_HEAD.pack(channel, sequence, log_time, publish_time)
+        self._chunk.add(channel, log_time, PREFIX.pack(Opcode.MESSAGE, len(head) + len(data)) + head + data)
+        self._finish_full_chunk()
+
+    def add_block(self, channels: Integers, sequences: Integers, block: EncodedBlock) -> Iterator[int]:
+        """Append many messages, see `add_message`, of so many channels and sequence numbers; the publish time is the log time.
+
+        Yields
+        ------
+        int
+            Bytes of data that went into a chunk, after it was written if it is full.
+        """
+        lengths = np.empty(len(channels), np.int64)
+        for rows in block.rows:
+            lengths[rows.places] = rows.data.shape[1]
+        ends = np.cumsum(lengths + _HEADS.itemsize)
+        starts = ends - lengths - _HEADS.itemsize
+        content = np.empty(ends[-1], np.uint8)
+        _scatter(_heads(channels, sequences, block.log_times, lengths), content, starts)
+        for rows in block.rows:
+            _scatter(rows.data, content, starts[rows.places] + _HEADS.itemsize)
+        records, first, begin = content.data, 0, 0
+        while first < len(ends):
+            room = self._chunk_size - len(self._chunk.content)
+            part = slice(first, int(np.searchsorted(ends, begin + room, side="right")) + 1)
+            end = int(ends[part][-1])
+            self._chunk.add_block(channels[part], block.log_times[part], starts[part] - begin, records[begin:end])
+            self._finish_full_chunk()
+            yield int(lengths[part].sum())
+            first, begin = part.stop, end
+
+    def flush(self) -> None:
+        """Complete the chunk, and give all to the system; a chunk without messages waits on."""
+        self._finish_chunk()
+        self._stream.flush()
+
+    def finish(self) -> None:
+        """Write the end of the file: summary, where its parts are, footer."""
+        self._finish_chunk()
+        self._stream.write(_encoded(DataEnd(0)))
+        start, summary, offsets = self._stream.tell(), b"", []
+        groups: tuple[tuple[Opcode, Sequence[McapRecord]], ...] = (
+            (Opcode.SCHEMA, self._schemas),
+            (Opcode.CHANNEL, self._channels),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.ATTACHMENT_INDEX, []),
+            (Opcode.METADATA_INDEX, self._metadata),
+        )
+        for opcode, group in groups:
+            records = _encoded(*group)
+            offsets.append(SummaryOffset(opcode, start + len(summary), len(records)))
+            summary += records
+        footer = Footer(start, start + len(summary), 0)
+        summary += _encoded(*offsets)
+        footer.summary_crc = zlib.crc32(summary + _encoded(footer)[:-4])  # of all but itself
+        self._stream.write(summary + _encoded(footer) + MCAP0_MAGIC)
+
+    def _statistics(self) -> Statistics:
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=self._counts.total(),
+            message_end_time=max((index.message_end_time for index in self._chunks), default=0),
+            message_start_time=min((index.message_start_time for index in self._chunks), default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+    def _finish_full_chunk(self) -> None:
+        if len(self._chunk.content) > self._chunk_size:
+            self._finish_chunk()
+
+    def _finish_chunk(self) -> None:
+        """Write the chunk and the index of each of its channels, if it has messages."""
+        if not self._chunk.entries:
+            return
+        chunk, self._chunk = self._chunk, _OpenChunk()
+        packed, start = self._pack(chunk.content), self._stream.tell()
+        written = bytearray(
+            _encoded(
+                Chunk(
+                    compression=self._compression,
+                    data=packed,
+                    message_start_time=chunk.start,
+                    message_end_time=chunk.end,
+                    uncompressed_crc=zlib.crc32(chunk.content),
+                    uncompressed_size=len(chunk.content),
+                )
+            )
+        )
+        length, offsets = len(written), {}
+        for channel, entries in chunk.entries.items():
+            offsets[channel] = start + len(written)
+            size = len(entries) * _INDEX_ENTRY.size
+            written += PREFIX.pack(Opcode.MESSAGE_INDEX, _INDEX_HEAD.size + size) + _INDEX_HEAD.pack(channel, size)
+            written += b"".join(entries)
+            self._counts[channel] += len(entries)
+        self._stream.write(written)
+        self._chunks.append(
+            ChunkIndex(
+                message_start_time=chunk.start,
+                message_end_time=chunk.end,
+                chunk_start_offset=start,
+                chunk_length=length,
+                message_index_offsets=offsets,
+                message_index_length=len(written) - length,
+                compression=self._compression,
+                compressed_size=len(packed),
+                uncompressed_size=len(chunk.content),
+            )
+        )
+
+
+class _OpenChunk:
+    """Records that wait to be packed.
+
+    Attributes
+    ----------
+    content : bytearray
+        The records.
+    entries : dict of int to list of bytes
+        By channel, in the order of their first messages: log time and place of every message, as the index has them.
+    start, end : int
+        First and last log time, ns.
+    """
+
+    def __init__(self) -> None:
+        self.content = bytearray()
+        self.entries: dict[int, list[bytes]] = {}
+        self.start = self.end = 0
+
+    def add(self, channel: int, log_time: int, record: bytes) -> None:
+        """Append one message."""
+        self._extend_span(log_time, log_time)
+        self.entries.setdefault(channel, []).append(_INDEX_ENTRY.pack(log_time, len(self.content)))
+        self.content += record
+
+    def add_block(self, channels: Integers, log_times: Integers, places: Integers, records: memoryview) -> None:
+        """Append messages whose records begin at `places` in `records`; at least one."""
+        self._extend_span(int(log_times.min()), int(log_times.max()))
+        entries = np.column_stack([log_times, places + len(self.content)]).astype("<u8").view(f"V{_INDEX_ENTRY.size}")
+        for channel, entry in zip(channels.tolist(), entries[:, 0].tolist(), strict=True):
+            self.entries.setdefault(channel, []).append(entry)
+        self.content += records
+
+    def _extend_span(self, start: int, end: int) -> None:
+        self.start = min(self.start, start) if self.entries else start
+        self.end = max(self.end, end)
+
+
+def _heads(channels: Integers, sequences: Integers, log_times: Integers, lengths: Integers) -> Bytes:
+    """What stands before the data, of so many bytes, of each message, a row each."""
+    heads = np.empty(len(channels), _HEADS)
+    columns = (Opcode.MESSAGE, lengths + MESSAGE_HEAD.size, channels, sequences, log_times, log_times)
+    for name, column in zip(_HEADS.names or (), columns, strict=True):
+        heads[name] = column
+    return heads.view(np.uint8).reshape(-1, _HEADS.itemsize)
+
+
+def _scatter(rows: Bytes, target: Bytes, starts: Integers) -> None:
+    """Copy every row to where it begins in `target`."""
+    kind = np.dtype((np.void, rows.shape[1]))  # so a row is one element, and copied as a whole
+    places = np.ndarray(len(target) - kind.itemsize + 1, kind, target, strides=(1,))
+    places[starts] = rows.view(kind)[:, 0]
+
+
+def _encoded(*records: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]
+
+
+def _codec(compression: CompressionType) -> tuple[str, Pack]:
+    """Name and function of a compression, at the level that its library has by default."""
+    if compression is CompressionType.ZSTD:
+        return "zstd", ZstdCompressor().compress
+    return ("lz4", lz4_compress) if compression is CompressionType.LZ4 else ("", bytes)

@@ -1,0 +1,80 @@
+"""Encoded messages, many of them at once, as arrays of bytes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..twin.blocks import Integers
+
+Bytes = NDArray[np.uint8]
+
+
+class EncodedRows(NamedTuple):
+    """Messages of one topic and one length.
+
+    Attributes
+    ----------
+    key : str
+        Of the topic.
+    places : ndarray of int64, shape (k,)
+        Where in the block each of them stands.
+    data : ndarray of uint8, shape (k, length)
+        Contiguous, not empty.
+    """
+
+    key: str
+    places: Integers
+    data: Bytes
+
+
+class EncodedBlock(NamedTuple):
+    """Messages in the order in which they are to be written.
+
+    Attributes
+    ----------
+    log_times : ndarray of int64, shape (n,)
+        Nanoseconds.
+    rows : list of EncodedRows
+        Every place from 0 to n - 1 stands in one of them.
+    """
+
+    log_times: Integers
+    rows: list[EncodedRows]
+
+    def data(self) -> list[bytes]:
+        """The data of each message; there must be one."""
+        places = np.concatenate([rows.places for rows in self.rows])
+        found = [data.tobytes() for rows in self.rows for data in rows.data]
+        return [found[row] for row in np.argsort(places)]
+
+
+class BlockBuilder:
+    """Brings groups of encoded messages into the order of the samples that caused them."""
+
+    def __init__(self) -> None:
+        self._groups: list[tuple[str, Integers, Integers, Bytes]] = []
+
+    def add(self, key: str, at: Integers, turns: Integers | int, data: Bytes) -> None:
+        """Messages of one topic and one length, of the samples in the rows `at`; `turns` is their order within a sample."""
+        if len(at):
+            self._groups.append((key, at, np.full(len(at), turns), data))
+
+    def add_one(self, key: str, at: int, turn: int, data: bytes) -> None:
+        """A single message."""
+        self.add(key, np.array([at]), turn, np.frombuffer(data, np.uint8)[np.newaxis])
+
+    def block(self, stamps: Integers) -> EncodedBlock:
+        """All of them; the log times are the stamps (ns) of the samples."""
+        if not self._groups:
+            return EncodedBlock(stamps[:0], [])
+        at, turns = (np.concatenate([group[column] for group in self._groups]) for column in (1, 2))
+        order = np.lexsort((turns, at))
+        places = np.empty(len(order), np.int64)
+        places[order] = np.arange(len(order))
+        ends = np.cumsum([len(group[1]) for group in self._groups])
+        parts = np.split(places, ends[:-1])
+        rows = [EncodedRows(group[0], part, group[3]) for group, part in zip(self._groups, parts, strict=True)]
+        return EncodedBlock(stamps[at[order]], rows)

@@ -1,0 +1,198 @@
+"""The writer of .mcap files against the library's: the same bytes, message by message and in blocks."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import Counter
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from rosbags.highlevel import AnyReader
+
+from boom_twin.bag.mcap_writer import McapWriter
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.writer import FILE_NAME, BagWriter, SessionWriter, recorded
+from boom_twin.messages.encoded_block import EncodedBlock, EncodedRows
+from boom_twin.messages.topic_table import Qos, Topic
+
+CHUNK = 2000
+Message = tuple[int, int, int, bytes]
+"""Channel, log time, sequence, data."""
+
+
+def random_messages(seed: int) -> list[Message]:
+    """Of three channels and lengths of all kinds, also beyond a chunk; times go back too, some are 0."""
+    random = np.random.default_rng(seed)
+    lengths = random.choice([1, 52, 76, 300, 2100, 9000], 600, p=[0.1, 0.3, 0.3, 0.27, 0.02, 0.01])
+    times = np.maximum(0, np.cumsum(random.integers(-3, 9, 600)) - 20)
+    rows = zip(random.choice([2, 1, 3], 600), times, lengths, strict=True)
+    return [(int(channel), int(time), k, random.bytes(size // 3) * 3 or b"x") for k, (channel, time, size) in enumerate(rows)]
+
+
+def block_of(messages: list[Message]) -> EncodedBlock:
+    """By channel and length; only the places and the data of its rows matter here."""
+    groups: dict[tuple[int, int], list[int]] = {}
+    for place, (channel, _, _, data) in enumerate(messages):
+        groups.setdefault((channel, len(data)), []).append(place)
+    rows = [
+        EncodedRows(str(channel), np.array(places), np.array([np.frombuffer(messages[k][3], np.uint8) for k in places]))
+        for (channel, _), places in groups.items()
+    ]
+    return EncodedBlock(np.array([time for _, time, _, _ in messages]), rows)
+
+
+def definition(flushed: set[int]) -> bytes:
+    """Of a message type; where the chunk is flushed in between, it is longer than that."""
+    return b"int32 value\n" * (200 if flushed else 40)
+
+
+def by_the_library(messages: list[Message], compression: CompressionType, flushed: set[int]) -> bytes:
+    with BytesIO() as file:
+        writer = Writer(file, chunk_size=CHUNK, compression=compression)
+        writer.start("ros2", "test")
+        writer.add_metadata("notes", {"origin": "synthetic", "": "ä"})
+        for name in ("pkg/msg/A", "pkg/msg/B"):
+            writer.register_schema(name, "ros2msg", definition(flushed))
+        for number in range(3):
+            writer.register_channel(f"/{number}", "cdr", 1 + number % 2, {"offered_qos_profiles": "- x"})
+        for place, (channel, time, sequence, data) in enumerate(messages):
+            if place in flushed:
+                writer.flush()
+            writer.add_message(channel, time, data, time, sequence)
+        writer.register_channel("/late", "cdr", 1, {})
+        writer.finish()
+        return file.getvalue()
+
+
+def by_the_package(messages: list[Message], compression: CompressionType, flushed: set[int], size: int) -> bytes:
+    """In blocks of so many, and one by one where that is 0."""
+    file = BytesIO()
+    writer = McapWriter(file, "ros2", "test", CHUNK, compression)
+    writer.add_metadata("notes", {"origin": "synthetic", "": "ä"})
+    for name in ("pkg/msg/A", "pkg/msg/B"):
+        writer.register_schema(name, "ros2msg", definition(flushed))
+    for number in range(3):
+        writer.register_channel(f"/{number}", "cdr", 1 + number % 2, {"offered_qos_profiles": "- x"})
+    ends = sorted({0, *flushed, len(messages), *(range(0, len(messages), size) if size else ())})
+    for first, end in pairwise(ends):
+        if first in flushed:
+            writer.flush()
+        part = messages[first:end]
+        if size:
+            channels, _, sequences, _ = zip(*part, strict=True)
+            data = list(writer.add_block(np.array(channels), np.array(sequences), block_of(part)))
+            assert sum(data) == sum(len(data) for *_, data in part)
+        else:
+            for channel, time, sequence, each in part:
+                writer.add_message(channel, time, each, time, sequence)
+    writer.register_channel("/late", "cdr", 1, {})
+    writer.finish()
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("size", [0, 1, 7, 150, 600])
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_the_bytes_are_those_of_the_library(compression: CompressionType, size: int) -> None:
+    for seed, flushed in enumerate([set(), {0, 100, 101, 333}]):
+        messages = random_messages(seed)
+        expected = by_the_library(messages, compression, flushed)
+        assert by_the_package(messages, compression, flushed, size) == expected
+    with BytesIO(expected) as file:
+        found = [message for *_, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)]
+    assert [(each.channel_id, each.log_time, each.sequence, each.data) for each in found] == messages
+
+
+def test_a_file_without_messages() -> None:
+    none = CompressionType.ZSTD
+    assert by_the_package([], none, set(), 0) == by_the_library([], none, set())
+
+
+TOPICS = {
+    name: Topic(
+        name=f"/topic_{name}",
+        type="std_msgs/msg/String",
+        qos=Qos(reliability="reliable", durability="volatile", depth=1),
+        unit="-",
+        meaning="a text",
+    )
+    for name in ("1", "2", "3")
+}
+
+
+def test_a_bag_in_blocks(tmp_path: Path) -> None:
+    """Counts, numbers of messages, spans and metadata too; the other libraries read it."""
+    messages = random_messages(5) * 4
+    with SessionWriter(tmp_path / "one", TOPICS, {"origin": "synthetic"}) as one:
+        for channel, time, _, data in messages:
+            one.write_encoded(str(channel), time, data)
+    with SessionWriter(tmp_path / "other", TOPICS, {"origin": "synthetic"}) as other:
+        for first in range(0, len(messages), 700):
+            other.write_block(block_of(messages[first : first + 700]))
+        other.write_block(EncodedBlock(np.empty(0, np.int64), []))
+    for name in (FILE_NAME, "metadata.yaml"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+    counts = Counter(f"/topic_{channel}" for channel, *_ in messages)
+    with (tmp_path / "other" / FILE_NAME).open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None and summary.statistics is not None and summary.statistics.chunk_count > 2
+        found = list(make_reader(file).iter_messages(["/topic_2"], log_time_order=False))
+    numbers = [message.sequence for *_, message in found]
+    assert numbers == list(range(1, counts["/topic_2"] + 1))
+    with AnyReader([tmp_path / "other"]) as reader:
+        assert {connection.topic: connection.msgcount for connection in reader.connections} == counts
+        assert sorted(bytes(data) for _, _, data in reader.messages()) == sorted(data for *_, data in messages)
+
+
+def blank(count: int) -> EncodedBlock:
+    """Messages that pack better than any reader allows."""
+    return EncodedBlock(np.arange(count), [EncodedRows("1", np.arange(count), np.zeros((count, 4_000_000), np.uint8))])
+
+
+def test_blank_pictures_in_blocks(tmp_path: Path) -> None:
+    """The next file begins at the same message, and is not packed either."""
+    one, other = (BagWriter(tmp_path / name) for name in ("one", "other"))
+    for bag in (one, other):
+        bag.add(recorded(TOPICS["1"]))
+    for number in range(20):
+        one.write(0, number % 4, bytes(4_000_000), sequence=number + 1)
+    for _ in range(5):
+        other.write_block(np.zeros(4, np.int64), blank(4))
+    for bag in (one, other):
+        bag.close()
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert names == ["metadata.yaml", "session_0.mcap", "session_1.mcap"]
+    for name in names:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+FULL = """
+import resource, sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from bag.test_mcap_writer import TOPICS, block_of, random_messages
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.errors import BagError
+try:
+    with SessionWriter(Path({bag!r}), TOPICS) as writer:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+        for number in range(100):
+            writer.write_block(block_of(random_messages(number)))
+except BagError as error:
+    print(error, flush=True)
+    sys.exit(1)
+"""
+
+
+def test_a_disk_that_fills_up_under_a_block(tmp_path: Path) -> None:
+    """The limit on the size of a file stands for the disk's."""
+    program = FULL.format(tests=str(Path(__file__).parents[1]), bag=str(tmp_path / "bag"))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and done.stderr == ""
+    assert "session_0.mcap: cannot be written (File too large). Make room" in done.stdout and done.stdout.count("\n") == 1
+    assert recover(tmp_path / "bag", tmp_path / "out").saved.total() > 300

@@ -1,0 +1,94 @@
+"""Many messages at once: the same bytes in the same order as one report after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from messages.random_reports import Told, boom, random_reports
+
+from boom_twin.config.settings import Settings
+from boom_twin.messages.encoded_block import EncodedBlock
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.topic_table import Output
+from boom_twin.offline.writer_process import pack
+from boom_twin.twin.blocks import ReportBlock
+from boom_twin.types import Report
+
+Messages = list[tuple[str, int, bytes]]
+
+
+def one_by_one(encoder: ReportEncoder, reports: list[Report]) -> Messages:
+    """Key, log time, data."""
+    return [(key, report.stamp, data) for report in reports for key, data in encoder.fill(report)]
+
+
+def told(block: EncodedBlock) -> Messages:
+    """The same of a block."""
+    keys = {place: rows.key for rows in block.rows for place in rows.places.tolist()}
+    return list(zip((keys[k] for k in range(len(keys))), block.log_times.tolist(), block.data() if keys else [], strict=True))
+
+
+def in_blocks(encoder: ReportEncoder, reports: list[Report], size: int) -> Messages:
+    found: Messages = []
+    for first in range(0, len(reports), size):
+        (block,) = pack(reports[first : first + size])
+        assert isinstance(block, ReportBlock)
+        found += told(encoder.fill_block(block))
+    return found
+
+
+@pytest.mark.parametrize("size", [1, 3, 64, 500])
+@pytest.mark.parametrize("rig", [Told(2, health=0.0), Told(3, imu=False, pins=2, health=0.1), Told(4, pins=1)])
+def test_a_block_gives_the_messages_of_its_reports(rig: Told, size: int) -> None:
+    reports = random_reports(size + rig.joints, 500, rig)
+    one, many = (ReportEncoder(boom(rig.joints), Settings()) for _ in range(2))
+    expected = one_by_one(one, reports)
+    assert {key for key, _, _ in expected} >= {Output.SHAPE, Output.RESIDUALS, Output.TIP_ACCELERATION}
+    assert in_blocks(many, reports, size) == expected
+
+
+def test_blocks_and_reports_in_turn() -> None:
+    """The trace of the tip goes on from one to the other."""
+    reports = random_reports(1, 400, Told(3))
+    one, other = (ReportEncoder(boom(3), Settings()) for _ in range(2))
+    found = []
+    for first in range(0, 400, 40):
+        part = reports[first : first + 40]
+        found += in_blocks(other, part, 40) if first % 80 else one_by_one(other, part)
+    assert found == one_by_one(one, reports)
+
+
+def test_a_block_without_messages() -> None:
+    (block,) = pack([Report(5, True), Report(6, True)])
+    assert isinstance(block, ReportBlock)
+    encoded = ReportEncoder(boom(3), Settings()).fill_block(block)
+    assert encoded.rows == [] and len(encoded.log_times) == 0
+
+
+def test_a_block_says_the_same_as_its_reports() -> None:
+    """Less events and status, which are not written."""
+    reports = random_reports(2, 300, Told(3, pins=2, health=0.1))
+    (block,) = pack([replace(report, events=("deflected",), status="no") for report in reports])
+    assert isinstance(block, ReportBlock)
+    encoder, other = (ReportEncoder(boom(3), Settings()) for _ in range(2))
+    back = block.reports(3)
+    assert one_by_one(encoder, back) == one_by_one(other, reports)
+    for given, got in zip(reports, back, strict=True):
+        if given.prediction is not None and got.prediction is not None:
+            for name in ("clearances", "moments", "tip_velocity", "tip_angle"):
+                np.testing.assert_array_equal(getattr(given.prediction, name), getattr(got.prediction, name))
+        assert (given.prediction is None) == (got.prediction is None)
+
+
+def test_a_report_with_a_change_stays_by_itself() -> None:
+    reports = random_reports(3, 200, Told(2, changes=0.05))
+    packed = pack(reports)
+    changed = [report for report in reports if report.change is not None]
+    assert len(changed) > 3 and [each for each in packed if isinstance(each, Report)] == changed
+    one, other = (ReportEncoder(boom(2), Settings()) for _ in range(2))
+    found: Messages = []
+    for each in packed:
+        found += one_by_one(other, [each]) if isinstance(each, Report) else told(other.fill_block(each))
+    assert found == one_by_one(one, reports)
