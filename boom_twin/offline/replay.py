@@ -175,8 +175,7 @@ def replay_into(
             for each in found:
                 recording.add(each)
                 for part in each.all if isinstance(each, Report) else (each,):
-                    for one in (part,) if isinstance(part, Report) else part.reports(joints):
-                        behind.put(one)
+                    behind.put(part)
             if recording.is_empty:
                 read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
             _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
