@@ -20,10 +20,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several processes share th
 from made_once import MadeOnce
 
 
+FIRST = (
+    "health/test_health_twin", "oracle/test_segments", "oracle/test_twin_against_rig", "report/test_compare",
+    "ros/test_ros_demo", "ros/test_ros_lifecycle", "ros/test_ros_page", "ros/test_ros_robust", "offline/test_replay_errors",
+    "plots/test_replay_pictures", "validation/rig/test_rig_play", "validation/study/test_need",
+)  # fmt: skip
+"""Files that take longest: begun first, or one process is left with one of them when the others are done."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mix the files where several processes share the tests, so that not all of them wait for a ROS node at a time."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: crc32(item.location[0].encode()))
+        first = {f"test/{name}.py" for name in FIRST}
+        items.sort(key=lambda item: (item.location[0] not in first, crc32(item.location[0].encode())))
 
 
 @pytest.fixture(scope="session")

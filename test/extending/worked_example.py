@@ -60,9 +60,9 @@ class WorkedExample:
         return sorted({*self.new_files, *TOUCHED.findall(self.patch)})
 
     def apply(self, copy: Path) -> None:
-        """Copy the package to the folder `copy` and put the example on it."""
+        """Copy the package, with the byte code of what does not change, to the folder `copy` and put the example on it."""
         for part in PACKAGE:
-            shutil.copytree(ROOT / part, copy / part, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / part, copy / part, symlinks=True)
         for path, text in self.new_files.items():
             assert not (copy / path).exists(), f"{path} is no new file"
             (copy / path).write_text(text)

@@ -94,6 +94,7 @@ def test_healthy_sessions_give_no_alarm():
     assert np.all(healthy().health[-1].tip_sigmas > 1e-5) and np.all(healthy().health[-1].tip_sigmas < 0.05)
 
 
+@pytest.mark.slow  # 60 s of session, against 12 s of all others
 def test_innovations_of_a_right_model_are_white():
     """The bundled session with nothing learnt: model errors that could be there are not, so their variance is below 1."""
     twin, found = Twin(load_scene(), baseline=Baseline()), []
