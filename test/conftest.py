@@ -19,7 +19,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several processes share th
 
 from made_once import MadeOnce
 
-
 FIRST = (
     "health/test_health_twin", "oracle/test_segments", "oracle/test_twin_against_rig", "report/test_compare",
     "ros/test_ros_demo", "ros/test_ros_lifecycle", "ros/test_ros_page", "ros/test_ros_robust", "offline/test_replay_errors",
