@@ -1,4 +1,4 @@
-"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; who runs what; the ROS domain."""
+"""Common to all tests: makes this folder importable, for the witnesses in ``oracle``; who runs what; what is shared."""
 
 from __future__ import annotations
 
@@ -15,12 +15,30 @@ if TYPE_CHECKING:
     from boom_twin.ros.isolation import Isolation
 
 sys.path.insert(0, str(Path(__file__).parent))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several processes share the tests: its threads only wait for one another
+
+from made_once import MadeOnce
+
+FIRST = (
+    "health/test_health_twin", "oracle/test_segments", "oracle/test_twin_against_rig", "report/test_compare",
+    "ros/test_ros_demo", "ros/test_ros_lifecycle", "ros/test_ros_page", "ros/test_ros_robust", "offline/test_replay_errors",
+    "plots/test_replay_pictures", "validation/rig/test_rig_play", "validation/study/test_need",
+)  # fmt: skip
+"""Files that take longest: begun first, or one process is left with one of them when the others are done."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mix the files where several processes share the tests, so that not all of them wait for a ROS node at a time."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: crc32(item.location[0].encode()))
+        first = {f"test/{name}.py" for name in FIRST}
+        items.sort(key=lambda item: (item.location[0] not in first, crc32(item.location[0].encode())))
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """What is made once for all processes of this run; in a folder that only this run has."""
+    own = tmp_path_factory.getbasetemp()
+    return MadeOnce((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "made_once")
 
 
 @pytest.fixture(scope="session")

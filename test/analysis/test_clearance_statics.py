@@ -1,89 +1,146 @@
-"""A boom at rest on pins with clearance: how far its tip hangs lower, which side each pin lies on, how it vibrates."""
+"""A boom at rest on pins with clearance: levers and the oracle's pin forces give the tip's shift, rest is the oracle's."""
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
+from analysis.resting import resting
 from oracle import booms
 from oracle.clearance import rigid
-from oracle.clearance.scenes import PINS, RODS, with_pins
+from oracle.clearance.free_play import lengthening, tip_shift
+from oracle.clearance.scenes import LINKS, PINS, RADII, RODS, with_pins
 
-from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact
+from boom_twin.validation.reference.worn_pin.contact import Contact, stiffness
 from boom_twin.validation.reference.worn_pin.motion import freed
 
-POSTURES = ("horizontal", "arch", "high", "low")
+POSTURES = ["horizontal", "arch", "high", "low"]
+DOCUMENT = booms.document()
 LOAD = 0.5  # kg, of payload, for the change of a pin's force with the load
+BARRELS = tuple(f"cylinder_{i}.barrel" for i in range(1, 5))
+IDEAL = booms.scene_of(DOCUMENT)
 
 
-def at_rest(scene, posture):
-    """Tip (2,) in m; offsets and forces of all pins with clearance, (k, 2) in m and N."""
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes_of_posture(scene, posture), posture_angles(scene, posture))
-    offsets, forces = np.zeros((len(plan.pins), 2)), np.zeros((len(plan.pins), 2))
-    for k, row in enumerate(plan.tables.clearances):
-        offsets[k] = state.z[row.z : row.z + 2]
-        r = np.sqrt(np.sum(offsets[k] ** 2) + SMOOTH**2)
-        d = 0.5 * (r - row.gap + np.hypot(r - row.gap, SMOOTH))
-        forces[k] = row.stiffness * d**row.exponent * offsets[k] / r
-    return state.frames[-1, :2].copy(), offsets, forces
+def bush(pin, clearance):
+    """The oracle's contact at `pin`, with the model's smoothing and cap of the stiffness."""
+    k = stiffness(RADII.get(pin, 0.025), max(clearance, LEAST_GAP), 2.06e11, 0.3)
+    return Contact(k, 0.0, clearance, smoothing=SMOOTH)
+
+
+def held(document, headings, index, tension):
+    """Axis of cylinder `index` (complex, m) and force of the bush on its rod's and on its barrel's pin (complex, N)."""
+    oil = freed(document, headings, index, None).cylinder
+    barrel, rod = geometry.pins(document, headings, index)
+    axis, gravity = rod - barrel, geometry.gravity(document)
+    on_rod = oil.holding(abs(axis), np.angle(axis), tension, gravity)
+    return axis, on_rod, -on_rod - (oil.barrel_mass + oil.rod_mass) * gravity
+
+
+def loaded_lever(posture, index, step=1e-5):
+    """How the resting tip of the ideal boom moves by the length of a drive: complex, m/m."""
+    one = step * (np.arange(4) == index)
+    return (resting(IDEAL, posture, one).tip - resting(IDEAL, posture, -one).tip) / (2.0 * step)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+@pytest.mark.parametrize("pin", RODS + BARRELS)
+def test_tip_shift_is_lever_times_clearance_and_penetration(posture, pin):
+    """Levers of the boom under its load: its beams and its oil give way as the play moves it."""
+    index, ideal = int(pin[9]) - 1, resting(IDEAL, posture)
+    axis, on_rod, on_barrel = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
+    force, axis = (on_rod, axis) if pin.endswith("rod") else (on_barrel, -axis)
+    shift = resting(with_pins(DOCUMENT, [pin]), posture).tip - ideal.tip
+    play, lever = lengthening(bush(pin, 1e-4), force, axis), loaded_lever(posture, index)
+    assert abs(lever * play - shift) < 0.01 * abs(shift)
+    if abs((force * axis.conjugate()).real) > 0.99 * abs(force * axis):  # along the cylinder: it carries more than itself
+        rigid_lever = geometry.levers(DOCUMENT, np.cumsum(ideal.joints))[index]
+        assert abs(rigid_lever) == pytest.approx(abs(lever), rel=0.06)
+
+
+@pytest.mark.parametrize("posture, index", [*product(POSTURES, range(4))])
+def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
+    """Tip, force and offset of a rod's pin in a boom with one oil spring; levers of its geometry give the shift within 2 %."""
+    document, contact = rigid.document(4, index), bush(RODS[index], 1e-4)
+    headings, pin = np.radians(document["postures"][posture]), f"cylinder_{index + 1}.rod"
+    found, ideal = resting(with_pins(document, [pin]), posture), resting(booms.scene_of(document), posture)
+    drive = geometry.cylinder_length(document, headings, index)
+    expected = freed(document, headings, index, contact).rest(drive, headings[index])
+    smoothed = 0.5 * SMOOTH**2 / 1e-4  # r = sqrt(|delta|^2 + s^2) is longer than |delta| by this
+    off = found.offsets[0] - expected.offset
+    assert max(abs(off.real), abs(off.imag)) < 1.2 * smoothed
+    assert abs(found.tip - expected.tip) < 60.0 * smoothed
+    assert found.tension[index] == pytest.approx(expected.tension, rel=1e-5, abs=0.1)
+    assert abs(found.forces[0] + expected.force) < 1e-4 * abs(expected.force) + 1.0
+    if (posture, index) != ("low", 3):  # it carries little but its own cylinder
+        shift = found.tip - ideal.tip
+        estimate = tip_shift(document, np.cumsum(ideal.joints), index, contact, expected.force)
+        assert abs(estimate - shift) < 0.02 * abs(shift)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_the_shift_falls_linearly_down_to_the_switch_to_the_ideal_pin(index):
+    """And jumps there by lever x (1 um + penetration): the penetration stays, for the stiffness is capped."""
+    pin, posture, ideal = RODS[index], "horizontal", resting(IDEAL, "horizontal")
+    axis, force, _ = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
+    lever, clearances = loaded_lever(posture, index), (2e-4, 1e-4, 5e-5, 3e-5, 1e-5, 3e-6, IDEAL_BELOW)
+    for clearance in clearances:
+        shift = resting(with_pins(DOCUMENT, [pin], clearance), posture).tip - ideal.tip
+        play = lengthening(bush(pin, clearance), force, axis)
+        assert abs(lever * play - shift) < 0.02 * abs(shift), clearance
+    beyond = resting(with_pins(DOCUMENT, [pin], 0.99 * IDEAL_BELOW), posture)
+    assert beyond.tip == ideal.tip and not len(beyond.forces)
+    depth = (abs(force) / bush(pin, IDEAL_BELOW).stiffness) ** (2.0 / 3.0)
+    assert abs(shift) == pytest.approx(abs(lever) * (IDEAL_BELOW + depth), rel=0.02)
+
+
+@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("boom, share", [("flexible", 0.05), ("rigid", 0.05), ("rigid", 1.0)])
+def test_a_reversed_force_moves_the_tip_by_the_free_play(index, boom, share):
+    """A share of the weight, up instead of down: twice the clearance and both penetrations, through the lever."""
+    tips, depths, pins = [], [], [RODS[index]]
+    document = DOCUMENT if boom == "flexible" else rigid.document(4, index if share == 1.0 else 0)
+    for weight in (-share, share):
+        loaded = document | {"gravity": [0.0, 9.81 * weight]}
+        one, other = resting(with_pins(loaded, pins), "horizontal"), resting(booms.scene_of(loaded), "horizontal")
+        tips.append(one.tip - other.tip)
+        depths.append(abs(one.offsets[0]) - 1e-4)
+    lever = abs(geometry.levers(document, np.zeros(4))[index])
+    assert abs(tips[1] - tips[0]) == pytest.approx(lever * (2e-4 + sum(depths)), rel=0.02)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_play_in_a_joint_moves_no_other_joint(index):
+    """Rigid sections on incompressible cylinders: the other joints follow from their own strokes alone."""
+    document = rigid.document(4, 4)
+    own = [pin for pin in RODS + BARRELS + LINKS if f"_{index + 1}." in pin]
+    found, ideal = (resting(scene, "arch") for scene in (with_pins(document, own), booms.scene_of(document)))
+    moved = np.abs(found.joints - ideal.joints) > 1e-11
+    assert list(moved) == [i == index for i in range(4)]
 
 
 @pytest.mark.parametrize("posture", POSTURES[:2])
 @pytest.mark.parametrize("pin", PINS)
 def test_the_tip_sinks_by_the_work_of_a_unit_load(pin, posture):
     """Betti: tip shift = change of the pin's force per load at the tip, times the offset. Every pin that can have clearance."""
-    ideal = at_rest(booms.scene_of(booms.document()), posture)[0]
-    tip, offsets, forces = at_rest(with_pins(booms.document(), [pin]), posture)
-    loaded = at_rest(with_pins(booms.document() | {"tip": {"payload": LOAD}}, [pin]), posture)
-    lever = (loaded[2] - forces) / (LOAD * 9.81)
-    assert (tip - ideal)[1] == pytest.approx(-np.sum(lever * offsets), rel=0.01, abs=2e-6)
-    assert np.hypot(*offsets[0]) > 1e-4 - 2e-6
-
-
-@pytest.mark.parametrize("posture", POSTURES)
-@pytest.mark.parametrize("index", range(4))
-def test_the_shift_is_lever_times_clearance_and_penetration(index, posture):
-    """Levers by the oracle's own geometry, at the angles at which the boom rests; one pin hardly carries anything."""
-    spec = booms.document()
-    ideal = statics(booms.scene_of(spec), posture=posture, modes=1)
-    tip, offsets, forces = at_rest(with_pins(spec, [RODS[index]]), posture)
-    stiff = statics(booms.scene_of(spec), strokes=_longer(ideal.strokes, index, 1e-4), modes=1)
-    lever = (stiff.tip - ideal.tip) / 1e-4  # by a longer drive, loads and bending included
-    sign = np.sign(ideal.cylinder_forces[index])
-    expected = np.linalg.norm(lever) * np.hypot(*offsets[0])
-    along = abs(forces[0] @ _axis(spec, posture, index)) / np.hypot(*forces[0])
-    if along > 0.99:  # the force is along the cylinder, not its own weight
-        assert np.dot(tip - ideal.tip, lever) / np.linalg.norm(lever) == pytest.approx(sign * expected, rel=0.02)
-        own = geometry.levers(spec, np.cumsum(ideal.joints))[index]
-        assert abs(own) == pytest.approx(np.linalg.norm(lever), rel=0.06)  # rigid sections and unloaded
-
-
-def _longer(strokes, index, by):
-    strokes = strokes.copy()
-    strokes[index] += by
-    return strokes
-
-
-def _axis(spec, posture, index):
-    barrel, rod = geometry.pins(spec, np.radians(spec["postures"][posture]), index)
-    axis = (rod - barrel) / abs(rod - barrel)
-    return np.array([axis.real, axis.imag])
+    found, loaded = (resting(with_pins(each, [pin]), posture) for each in (DOCUMENT, DOCUMENT | {"tip": {"payload": LOAD}}))
+    lever = (loaded.forces[0] - found.forces[0]) / (LOAD * 9.81)
+    work = (lever * found.offsets[0].conjugate()).real
+    assert (found.tip - resting(IDEAL, posture).tip).imag == pytest.approx(-work, rel=0.01, abs=2e-6)
+    assert abs(found.offsets[0]) > 1e-4 - 2e-6
 
 
 def test_the_shift_falls_in_proportion_to_the_clearance_down_to_the_switch():
     """And jumps there by the lever times what is left: the clearance of the switch and the penetration."""
-    spec, ideal = booms.document(), at_rest(booms.scene_of(booms.document()), "arch")[0]
-    found = {}
+    ideal, found = resting(IDEAL, "arch"), {}
     for clearance in (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, IDEAL_BELOW, 0.99 * IDEAL_BELOW):
-        tip, offsets, _ = at_rest(with_pins(spec, RODS[1:2], clearance), "arch")
-        found[clearance] = np.linalg.norm(tip - ideal), (np.hypot(*offsets[0]) if len(offsets) else 0.0)
+        own = resting(with_pins(DOCUMENT, RODS[1:2], clearance), "arch")
+        found[clearance] = abs(own.tip - ideal.tip), (abs(own.offsets[0]) if len(own.offsets) else 0.0)
     shifts = np.array([shift / offset for shift, offset in found.values() if offset])
     assert shifts == pytest.approx(np.full(len(shifts), shifts[-1]), rel=0.02)
     assert found[0.99 * IDEAL_BELOW] == (0.0, 0.0)
@@ -102,56 +159,23 @@ def test_listing_no_pin_changes_nothing(block):
 
 
 def test_a_pin_at_one_joint_leaves_the_others_forces():
-    ideal = statics(booms.scene_of(booms.document()), posture="horizontal", modes=1)
-    worn = statics(with_pins(booms.document(), ["joint_3.Q"]), posture="horizontal", modes=1)
+    ideal = statics(IDEAL, posture="horizontal", modes=1)
+    worn = statics(with_pins(DOCUMENT, ["joint_3.Q"]), posture="horizontal", modes=1)
     assert worn.cylinder_forces[[0, 3]] == pytest.approx(ideal.cylinder_forces[[0, 3]], rel=1e-3)
     assert worn.joints[2] < ideal.joints[2] - 1e-4
     assert worn.joints[[0, 3]] == pytest.approx(ideal.joints[[0, 3]], abs=2e-5)
 
 
-@pytest.mark.parametrize("index", range(4))
-def test_rest_is_where_the_oracle_has_it(index):
-    """Rigid sections, one cylinder with oil: own geometry, own equations, root finding.
-
-    The model's distance of the journal is smoothed, s^2/(2 r) = 5 nm.
-    """
-    spec = rigid.document(4, index)
-    headings = np.radians(spec["postures"]["horizontal"])
-    scene = with_pins(spec, [RODS[index]])
-    tip, offsets, _ = at_rest(scene, "horizontal")
-    row = compile_scene(scene).tables.clearances[0]
-    contact = Contact(row.stiffness, HYSTERESIS["lankarani-nikravesh"](0.9), row.gap, smoothing=SMOOTH)
-    found = freed(spec, headings, index, contact).rest(geometry.cylinder_length(spec, headings, index), headings[index])
-    assert [found.tip.real, found.tip.imag] == pytest.approx(tip, abs=60.0 * 5e-9)
-    assert [found.offset.real, found.offset.imag] == pytest.approx(offsets[0], abs=6e-9)
-
-
-def test_free_play_shows_when_the_force_of_a_pin_turns_round():
-    """Gravity turned round: against ideal pins under the same loads the tip moves by both offsets through the lever."""
-    for index in range(4):
-        moved, offsets = [], []
-        for gravity in (-9.81, 9.81):
-            spec = rigid.document(4, index) | {"gravity": [0.0, gravity]}
-            ideal = at_rest(booms.scene_of(spec), "horizontal")[0]
-            tip, offset, _ = at_rest(with_pins(spec, [RODS[index]]), "horizontal")
-            moved.append(tip - ideal)
-            offsets.append(offset[0])
-        lever = geometry.levers(rigid.document(4, index), np.zeros(4))[index]
-        play = np.linalg.norm(moved[0] - moved[1])
-        assert play == pytest.approx(abs(lever) * np.linalg.norm(offsets[0] - offsets[1]), rel=0.02)
-        assert np.linalg.norm(offsets[0] - offsets[1]) > 2e-4
-
-
 def test_vibration_about_a_pressed_pin_feels_its_tangent():
     """Lower than with ideal pins, by about the tangent's compliance; the linearised pin vibrates as the contact does."""
-    ideal = statics(booms.scene_of(booms.document()), posture="horizontal", modes=3).frequencies
-    contact = statics(with_pins(booms.document(), RODS), posture="horizontal", modes=3).frequencies
-    linear = statics(with_pins(booms.document(), RODS, treatment="spring-damper"), posture="horizontal", modes=3).frequencies
+    ideal = statics(IDEAL, posture="horizontal", modes=3).frequencies
+    contact = statics(with_pins(DOCUMENT, RODS), posture="horizontal", modes=3).frequencies
+    linear = statics(with_pins(DOCUMENT, RODS, treatment="spring-damper"), posture="horizontal", modes=3).frequencies
     assert np.all(contact < ideal) and np.all(contact > 0.99 * ideal)
     assert linear == pytest.approx(contact, rel=5e-4)
 
 
 def test_all_pins_at_once():
-    tip, offsets, forces = at_rest(with_pins(booms.document(), PINS), "high")
-    assert np.isfinite(tip).all()
-    assert np.all(np.hypot(*offsets.T) < 2e-4) and np.all(np.hypot(*forces.T) > 0.0)
+    found = resting(with_pins(DOCUMENT, PINS), "high")
+    assert np.isfinite(found.tip) and len(found.offsets) == len(PINS)
+    assert np.all(np.abs(found.offsets) < 2e-4) and np.all(np.abs(found.forces) > 0.0)

@@ -88,7 +88,8 @@ def rescue(tmp_path: Path, data: bytes, **options: Any) -> tuple[Recovery, Path]
     return outcome, out
 
 
-@pytest.mark.parametrize("seed", range(3))
+# 0 is cut, 1 has flipped bits; 2 has both
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2])
 def test_the_bundled_session_cut_and_with_flipped_bits(real: tuple[bytes, list[Row]], tmp_path: Path, seed: int) -> None:
     random = np.random.default_rng(seed)
     data = bytearray(real[0])

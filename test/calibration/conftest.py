@@ -1,4 +1,4 @@
-"""Motions of the virtual rig for the tests of calibration; simulated once for all of them."""
+"""Motions of the virtual rig for the tests of calibration; simulated once for all processes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import pytest
 pytest.importorskip("exudyn")
 
 from calibration.sessions import Made, cut_to, made, off
+from made_once import MadeOnce
 
 from boom_twin import load_scene
 from boom_twin.scene.schema import Scene
 
 
 @pytest.fixture(scope="session")
-def wrong_boom() -> Made:
+def wrong_boom(made_once: MadeOnce) -> Made:
     """60 s of the default boom with other stiffnesses and 15 kg at the tip."""
-    return made(off(load_scene(), 1.1, 0.9, 1.08, 0.92, **{"tip.payload": 15.0}), "arch", 60.0, 1)
+    truth = off(load_scene(), 1.1, 0.9, 1.08, 0.92, **{"tip.payload": 15.0})
+    return made_once.value("wrong_boom", lambda: made(truth, "arch", 60.0, 1))
 
 
 @pytest.fixture(scope="session")
@@ -25,6 +27,6 @@ def two_sections() -> Scene:
 
 
 @pytest.fixture(scope="session")
-def short(two_sections) -> Made:
+def short(two_sections: Scene, made_once: MadeOnce) -> Made:
     """30 s of two sections with other stiffnesses."""
-    return made(off(two_sections, 0.92, 1.1), "arch", 30.0, 4)
+    return made_once.value("short", lambda: made(off(two_sections, 0.92, 1.1), "arch", 30.0, 4))

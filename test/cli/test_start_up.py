@@ -66,6 +66,13 @@ def test_what_a_bag_holds_is_told_without_a_compiler() -> None:
     assert imported_by("info", str(BAG)) == (0, {"rosbags"})
 
 
+def test_the_twin_loads_no_package_of_statistics() -> None:
+    """``scipy.stats`` takes a third of a second; every node and every replay would spend it."""
+    code = "import json, sys, boom_twin.twin.twin; print(json.dumps(sorted(sys.modules)))"
+    modules = json.loads(subprocess.check_output([sys.executable, "-c", code], text=True, timeout=300))
+    assert not {"scipy.stats", "matplotlib", "rosbags", "numba"} & set(modules)
+
+
 INTERRUPTED = """
 import os, signal, sys
 class Finder:

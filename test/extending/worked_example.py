@@ -17,6 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 EXAMPLES = Path(__file__).parent
 PACKAGE = ("boom_twin", "msg_config")
+BEING_WRITTEN = shutil.ignore_patterns("*.pyc.*")  # byte code, by another process
 TOUCHED = re.compile(r"^\+\+\+ b/(\S+)$", re.MULTILINE)
 
 RUN = """
@@ -60,9 +61,9 @@ class WorkedExample:
         return sorted({*self.new_files, *TOUCHED.findall(self.patch)})
 
     def apply(self, copy: Path) -> None:
-        """Copy the package to the folder `copy` and put the example on it."""
+        """Copy the package, with the byte code of what does not change, to the folder `copy` and put the example on it."""
         for part in PACKAGE:
-            shutil.copytree(ROOT / part, copy / part, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / part, copy / part, symlinks=True, ignore=BEING_WRITTEN)
         for path, text in self.new_files.items():
             assert not (copy / path).exists(), f"{path} is no new file"
             (copy / path).write_text(text)

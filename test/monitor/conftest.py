@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_once import MadeOnce
 
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
@@ -27,23 +28,25 @@ DRIFT = 5e-4  # rad/s
 
 
 @pytest.fixture(scope="session")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def faulty(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
 
     def jump(time: Any, joints: Any) -> None:
         joints[time >= WRONG_FROM, 2] += OFFSET
 
-    return spoilt(tmp_path_factory.mktemp("faulty") / "faulty_session", jump)
+    to = tmp_path_factory.mktemp("faulty") / "faulty_session"
+    return made_once.folder("faulty_session", lambda folder: spoilt(folder, jump), to)
 
 
 @pytest.fixture(scope="session")
-def drifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drifting(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same, but its encoder drifts from 15 s on."""
 
     def drift(time: Any, joints: Any) -> None:
         joints[:, 2] += DRIFT * np.maximum(0.0, time - WRONG_FROM)
 
-    return spoilt(tmp_path_factory.mktemp("drifting") / "drifting_session", drift)
+    to = tmp_path_factory.mktemp("drifting") / "drifting_session"
+    return made_once.folder("drifting_session", lambda folder: spoilt(folder, drift), to)
 
 
 def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
@@ -69,9 +72,9 @@ def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
 
 
 @pytest.fixture(scope="session")
-def feed(faulty: Path) -> Feed:
+def feed(faulty: Path, made_once: MadeOnce) -> Feed:
     """That session through the twin."""
-    return read_all(bag_feed(faulty, load_scene(), Settings()))
+    return made_once.value("faulty_feed", lambda: read_all(bag_feed(faulty, load_scene(), Settings())))
 
 
 def read_all(feed: BagFeed) -> BagFeed:
@@ -83,8 +86,7 @@ def read_all(feed: BagFeed) -> BagFeed:
 
 
 @pytest.fixture(scope="session")
-def replayed(faulty: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def replayed(faulty: Path, made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its replay's folder, with ``summary.json`` and ``bag/``."""
-    out = tmp_path_factory.mktemp("replayed")
-    replay(faulty, load_scene(), out)
-    return out
+    to = tmp_path_factory.mktemp("replayed")
+    return made_once.folder("faulty_replayed", lambda folder: replay(faulty, load_scene(), folder), to)

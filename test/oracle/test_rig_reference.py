@@ -26,7 +26,7 @@ def test_statics(posture):
     assert found["cylinder_force_N"] == pytest.approx(expected["cylinder_force_N"], rel=1e-3)
 
 
-@pytest.mark.parametrize("step", [1e-3, 5e-4])
+@pytest.mark.parametrize("step", [1e-3, pytest.param(5e-4, marks=pytest.mark.slow)])  # to the same bounds
 def test_arch_move(step):
     expected = np.genfromtxt(REFERENCE / "arch_move.csv.gz", delimiter=",", names=True)
     first = tuple(float(expected[f"stroke_{i}_m"][0]) for i in range(1, 5))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import MadeOnce
 
 from boom_twin import Stream
 from boom_twin.bag.reader import read, scan
@@ -35,22 +36,30 @@ def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
     }
 
 
-@pytest.fixture(scope="session")
-def sessions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Healthy, and faulty."""
+def write_sessions(folder: Path) -> None:
+    """``healthy`` and ``faulty`` into a folder."""
     found = samples()
     (stamps, strokes), (_, joints), (_, imu) = (found[stream] for stream in Stream)
-    folder, notes = tmp_path_factory.mktemp("sessions"), {"origin": "synthetic session <of a test> & more"}
+    notes = {"origin": "synthetic session <of a test> & more"}
     write_session(folder / "healthy", stamps, strokes, joints, imu, notes)
     wrong = joints + WRONG_BY * np.array([0.0, 0.0, 1.0, 0.0]) * (stamps - stamps[0] > WRONG_FROM * 1e9)[:, None]
     write_session(folder / "faulty", stamps, strokes, wrong, imu, notes)
+
+
+@pytest.fixture(scope="session")
+def sessions(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Healthy, and faulty."""
+    folder = made_once.folder("report_sessions", write_sessions, tmp_path_factory.mktemp("sessions"))
     return folder / "healthy", folder / "faulty"
 
 
 @pytest.fixture(scope="session")
-def replays(sessions: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def replays(sessions: tuple[Path, Path], made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Of both, with report."""
-    folder = tmp_path_factory.mktemp("replays")
-    for session in sessions:
-        assert main(["replay", str(session), "--out", str(folder / session.name), "--report"]) == 0
+
+    def make(folder: Path) -> None:
+        for session in sessions:
+            assert main(["replay", str(session), "--out", str(folder / session.name), "--report"]) == 0
+
+    folder = made_once.folder("report_replays", make, tmp_path_factory.mktemp("replays"))
     return folder / "healthy", folder / "faulty"

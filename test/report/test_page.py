@@ -82,7 +82,7 @@ def test_the_scene_of_a_twin_has_stresses_by_assumed_heights(replays: tuple[Path
 
 def test_heights_may_be_given(tmp_path: Path) -> None:
     heights, out = ["--section-height", "0.4,0.3,0.2,0.1"], tmp_path / "out"
-    written(tmp_path / "bag", 6.0)
+    written(tmp_path / "bag", 3.0)
     assert main(["replay", str(tmp_path / "bag"), "--out", str(out), "--report", "--no-health", *heights]) == 0
     text = outline(out).text
     assert "Heights as given." in text and "The rig's health was not judged." in text

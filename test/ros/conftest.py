@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_once import MadeOnce
 
 from boom_twin.bag.session_files import write_session
 from boom_twin.messages.sample_decoder import stamp_of
@@ -150,8 +151,12 @@ def remote(domain: None) -> Iterator[Remote]:
 
 
 @pytest.fixture(scope="session")
-def motion() -> dict[str, Any]:
+def motion(made_once: MadeOnce) -> dict[str, Any]:
     """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""
+    return made_once.value("ros_motion", two_cylinders_move)
+
+
+def two_cylinders_move() -> dict[str, Any]:
     scene, random = load_scene(), np.random.default_rng(3)
     time_s = np.arange(int(SECONDS * RATE)) / RATE
     stamps = 1_700_000_000_000_000_000 + (time_s * 1e9).astype(np.int64) + random.integers(-150_000, 150_000, len(time_s))

@@ -110,12 +110,16 @@ def test_a_bad_argument_ends_the_node_with_its_name(spawn_node: Callable[..., An
     assert words in node.said() and "Traceback" not in node.said()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("moment", ["", "preparing the model", "active;"])
+ACTIVE, PREPARING = "active;", "preparing the model"
+MOMENTS = [("", signal.SIGINT), (PREPARING, signal.SIGTERM), (ACTIVE, signal.SIGINT), (ACTIVE, signal.SIGTERM)]
+RARER = [("", signal.SIGTERM), (PREPARING, signal.SIGINT)]
+
+
+@pytest.mark.parametrize(("moment", "number"), [*MOMENTS, *(pytest.param(*rare, marks=pytest.mark.slow) for rare in RARER)])
 def test_signals_end_the_node_in_order_at_any_time(
     spawn_node: Callable[..., Any], number: signal.Signals, moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if moment == "preparing the model":
+    if moment == PREPARING:
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # so that it compiles
     node = spawn_node()
     node.wait_for(moment)

@@ -24,7 +24,7 @@ from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.scene.kinematics import strokes_of_posture
 
-RATE = 200.0
+RATE = 100.0
 SOON = 2.0  # s
 BEGIN = 1_700_000_000.0
 

@@ -15,7 +15,7 @@ from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.summary import explain
 
 Place = tuple[str | int, ...]
-SETTINGS = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+SETTINGS = settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
 
 scalars = st.one_of(
     st.none(),

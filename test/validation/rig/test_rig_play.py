@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -38,8 +40,14 @@ def test_rest(posture, cylinder):
     expected = statics(scene, posture=posture)
     assert force == pytest.approx(expected.cylinder_forces[cylinder - 1], abs=2.0)
     drop = statics(load_scene(), posture=posture).tip - expected.tip
-    still = at_rest(load_scene(), strokes_of_posture(scene, posture), 8, nodally_exact=True)
-    assert tip(still) - tip(resting) == pytest.approx(drop, abs=2e-6)
+    assert tip_of_ideal_pins(posture) - tip(resting) == pytest.approx(drop, abs=2e-6)
+
+
+@cache
+def tip_of_ideal_pins(posture):
+    """Tip (m) of the default boom at rest."""
+    scene = load_scene()
+    return tip(at_rest(scene, strokes_of_posture(scene, posture), 8, nodally_exact=True))
 
 
 def tip(resting):
@@ -83,8 +91,8 @@ def test_load_that_turns_lets_it_cross():
     assert force[0] < 0.0 < force[-1]
     lag = rows["joint_4_rad"] - ideal["joint_4_rad"]
     assert lag[0] > 5e-3 and lag[-1] < -5e-3
-    again, _ = move(resting, drive, 3.0, 1e-3, 5e-3)
-    assert np.array_equal(rows["joint_4_rad"], again["joint_4_rad"])
+    again, _ = move(resting, drive, 1.0, 1e-3, 5e-3)
+    assert np.array_equal(rows["joint_4_rad"][:201], again["joint_4_rad"])
 
 
 def test_what_it_does_not_know_is_refused():

@@ -12,7 +12,7 @@ from boom_twin.analysis.motions import halt
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.validation.study.clearance import report as clearance
-from boom_twin.validation.study.clearance.convergence import Track, convergence, errors, one_pin
+from boom_twin.validation.study.clearance.convergence import Convergence, Track, convergence, errors, one_pin
 from boom_twin.validation.study.clearance.rest_stop_cost import main_frequency, shifts, swings
 from boom_twin.validation.study.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 
@@ -65,8 +65,13 @@ def test_errors_are_shares_of_what_is_right() -> None:
     assert errors([wrong], right)[0] == pytest.approx([1.0, 10.0, 25.0])
 
 
-def test_the_independent_model_agrees(two_sections: Scene) -> None:
-    found = convergence(with_play(two_sections), "arch", quick=True)
+@pytest.fixture(scope="module")
+def converged(two_sections: Scene) -> Convergence:
+    return convergence(with_play(two_sections), "arch", True)
+
+
+def test_the_independent_model_agrees(two_sections: Scene, converged: Convergence) -> None:
+    found = converged
     assert [(line.program, line.against) for line in found.lines] == [
         ("boom_twin", "own"), ("boom_twin", "own"), ("boom_twin", "independent"), ("SciPy", "independent"),
     ]  # fmt: skip
@@ -75,8 +80,13 @@ def test_the_independent_model_agrees(two_sections: Scene) -> None:
     assert not one_pin(with_play(two_sections), 0).is_flexible(0)
 
 
-def test_the_files(two_sections: Scene, tmp_path: Path) -> None:
-    written = clearance.write(two_sections, tmp_path / "out", quick=True)
+def test_the_files(two_sections: Scene, converged: Convergence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def convergence_before(*given: object) -> Convergence:
+        assert given == (with_play(two_sections), "arch", True)
+        return converged
+
+    monkeypatch.setattr(clearance, "convergence", convergence_before)
+    written = clearance.write(two_sections, tmp_path / "out", True, "arch")
     assert sorted(written) == sorted((tmp_path / "out").iterdir())
     values = json.loads(written[0].read_text())
     assert len(values["stops"]) == 6 and len(values["rests"]) == 4 and values["costs"][0]["pins"] == 0

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from boom_twin.reduction.variants import variants
+from boom_twin.reduction.variants import KINDS, variants
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.edit import Edit, edited, merged, rewritten
 from boom_twin.scene.load import default_text, examine, structure
@@ -103,10 +103,13 @@ def test_blocks_that_share_their_text_are_written_anew() -> None:
         assert after.model_dump() == edited(scene, [Edit(place, None)]).model_dump()
 
 
-def test_every_variant_of_the_default_scene_is_a_scene(tmp_path: Path) -> None:
+@pytest.mark.parametrize("one_of_a_kind", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_every_variant_of_the_default_scene_is_a_scene(tmp_path: Path, one_of_a_kind: bool) -> None:
     scene, text, path = load_scene(), default_text(), tmp_path / "variant.yaml"
     found = variants(scene)
     assert len({variant.name for variant in found}) == len(found) > 40
-    for variant in found:
+    kinds = {variant.kind: variant for variant in found}
+    assert len(kinds) == len(KINDS) + 1  # numbers of shapes
+    for variant in kinds.values() if one_of_a_kind else found:
         path.write_text(rewritten(text, scene, variant.edits), encoding="utf-8")
         assert examine(path)[0].model_dump() == variant.of(scene).model_dump() != scene.model_dump(), variant.name

@@ -13,7 +13,7 @@ from boom_twin.scene.yaml_reader import with_end_mark
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
 
 
-@pytest.mark.parametrize("count", [2, 3, 7, 50, 200])
+@pytest.mark.parametrize("count", [2, 3, 7, 50, pytest.param(200, marks=pytest.mark.slow)])  # 200: four times 50
 def test_a_long_boom_passes_as_a_scene_file(count, tmp_path):
     check(long_boom(count, kinds=("B1", "B2", "B3")), tmp_path)
 

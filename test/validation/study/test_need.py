@@ -60,7 +60,7 @@ def test_a_second_search_finds_nothing_more(proposal: Proposal) -> None:
     assert again.deviation == proposal.deviation
 
 
-@pytest.mark.parametrize("most", [1e-5, 0.05])  # 2e-3: the command, below
+@pytest.mark.parametrize("most", [pytest.param(1e-5, marks=pytest.mark.slow), 0.05])  # 1e-3: above; 2e-3: the command, below
 def test_it_is_kept_at_other_errors_too(two_sections: Scene, most: float) -> None:
     found = propose(two_sections, most)
     assert measured_anew(two_sections, found.scene) <= most
