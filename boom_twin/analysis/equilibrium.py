@@ -17,7 +17,7 @@ from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import advance
-from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
+from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
 from .modal import Mode, constraints, natural_modes, negative_pivots
@@ -84,14 +84,6 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
     state.history[X, : len(state.z)] = state.z
 
 
-def rigid_tip(scene: Scene, angles: Array) -> Array:
-    """Tip (m), shape (2,), of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
-    heading = np.cumsum(angles)
-    lengths = np.array([section.length for section in scene.sections])
-    pivot = np.array(scene.base.pivot)
-    return np.asarray(pivot + np.array([lengths @ np.cos(heading), lengths @ np.sin(heading)]))
-
-
 SHARE = 0.5  # of the boom's reach, most that the tip may be off the undeformed boom's
 INSTANTS = 8  # of a motion, evenly spaced, at which that is looked at; and where the tip is farthest from its start
 
@@ -116,7 +108,7 @@ def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Arr
             near = joint_angles_of_strokes(scene, strokes[row], near=near)
         except UsageError:  # in the cylinder's travel, but out of the joint's range
             continue
-        worst = max(worst, float(np.hypot(*(tip[row] - rigid_tip(scene, near)))))
+        worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
     return beyond_validity(scene, worst)
 
 
@@ -198,11 +190,9 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
         assert strokes is not None
         strokes = checked_strokes(scene, strokes)
         angles = joint_angles_of_strokes(scene, strokes)
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes, angles)
+    plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
-    undeformed, tip = rigid_tip(scene, angles), state.frames[-1, :2].copy()
+    undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
         tip_rigid=undeformed,
@@ -226,6 +216,14 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
         if not 0.0 <= value <= most:
             raise UsageError(f"stroke_{i + 1} = {value:g} m: cylinder {i + 1} travels 0 to {most:g} m. Give it in metres.")
     return values
+
+
+def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, Work]:
+    """Compile a scene and bring it to rest at `strokes` (m) next to joint `angles` (rad), both (n,); see `settle`."""
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes, angles)
+    return plan, state, work
 
 
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:

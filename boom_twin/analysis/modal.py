@@ -28,7 +28,7 @@ from scipy.special import spherical_jn
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
-from ..kernels.tables import OK, SENTENCES, Motion, State, Work
+from ..kernels.tables import OK, SENTENCES, Condensed, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
@@ -73,20 +73,20 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     position, still = work.position.copy(), np.zeros_like(work.position)
     drive = _drive(plan, state, work)
     for _ in range(TRIES):
-        status, negative, blocks, ends = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
+        status, negative, condensed = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
         if status == OK:
-            return negative + _negative_eigenvalues(blocks) + _negative_eigenvalues(ends)
+            return negative + _negative_eigenvalues(condensed.blocks) + _negative_eigenvalues(condensed.ends)
         omega = omega * (1.0 + 1e-12) + 1e-12
     raise SolverError(f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed: {SENTENCES[status]}. {ABSURD}")
 
 
-def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Array, Array]:
-    """Sweep the whole boom in; status, negative pivots of beams, and what joints and ends of cylinders condensed."""
+def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Condensed]:
+    """Sweep the whole boom in; status, negative pivots of beams, and what was condensed, valid until the next sweep."""
     clear_cut(work, FREE)
     load_pins(plan.tables, state, work, motion)
     operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE)
-    return int(status), int(negative), work.blocks, work.ends
+    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE, work.condensed)
+    return int(status), int(negative), work.condensed
 
 
 def _drive(plan: Plan, state: State, work: Work) -> Array:
@@ -171,8 +171,8 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     drive, sides = _drive(plan, state, work), []
     for size in (LOAD, -LOAD):
         motion = Motion(-omega * omega, 0.0, position + size * load, still)
-        _condense(plan, state, work, motion, drive)
-        sweep_out(plan.tables, state, work, ROOT, np.int64(len(plan.tables.operations)), FREE)
+        _, _, condensed = _condense(plan, state, work, motion, drive)
+        sweep_out(plan.tables, state, work, condensed, ROOT, np.int64(len(plan.tables.operations)), FREE)
         sides.append(work.dz.copy())
     return np.asarray(sides[0] - sides[1])
 

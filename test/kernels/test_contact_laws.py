@@ -18,6 +18,7 @@ from boom_twin.kernels.elements.pin_contact import (
     LAWS,
     LEAST_GAP,
     SMOOTH,
+    Journal,
     approach,
     bearing,
     contact_stiffness,
@@ -40,7 +41,7 @@ def pin(law="lankarani-nikravesh", restitution=0.9, friction=0.0):
 
 
 def force(row, memory, place, velocity=(0.0, 0.0), turning=0.0, rate=0.0):
-    return np.array(bearing(row, memory, *place, *velocity, *velocity, turning, 1.0, 0.0, rate))
+    return np.array(bearing(row, memory, Journal(*place, *velocity, *velocity, turning, 1.0, 0.0), rate))
 
 
 def kept(row, memory, speed):

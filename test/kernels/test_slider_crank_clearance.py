@@ -13,7 +13,7 @@ from oracle.clearance.scenes import RODS, with_pins
 from oracle.clearance.slider_crank import demonstration, phases
 
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, SMOOTH, bearing
+from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, SMOOTH, Journal, bearing
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Ours:
         memory = np.zeros(COLUMNS)
         memory[CLOSED], memory[APPROACH] = entry is not None, entry or 0.0
         velocity = (rate.real, rate.imag)
-        found = bearing(self.row, memory, offset.real, offset.imag, *velocity, *velocity, 0.0, 1.0, 0.0, 0.0)
-        return -complex(found[0], found[1])
+        found = bearing(self.row, memory, Journal(offset.real, offset.imag, *velocity, *velocity, 0.0, 1.0, 0.0), 0.0)
+        return -complex(found.x, found.y)
 
 
 def mechanisms():

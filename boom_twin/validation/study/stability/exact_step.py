@@ -87,8 +87,8 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> Step:
 def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
     clear_cut(work, FREE)
     last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE)
-    sweep_out(plan.tables, state, work, ROOT, last, FREE)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE, work.condensed)
+    sweep_out(plan.tables, state, work, work.condensed, ROOT, last, FREE)
     return bool(status == OK)
 
 
