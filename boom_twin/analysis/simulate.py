@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.compile import compile_scene
 from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
 from .drive import Course
-from .equilibrium import checked_strokes, motion_beyond_validity, settle
+from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, told, too_fast
 
 RHO = 0.8
@@ -131,9 +130,7 @@ def simulate(
         No equilibrium at the first row, or a step that failed; says when.
     """
     times, strokes = _checked(scene, times, strokes, dt)
-    plan = compile_scene(scene)
-    start, work = plan.state(), plan.work()
-    settle(plan, start, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+    plan, start, work = rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
     course = Course(plan, start, work, times, strokes, rho)
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....analysis.equilibrium import settle
+from ....analysis.equilibrium import rest_at
 from ....analysis.methods import March, Method, march
-from ....compiler.compile import compile_scene
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....types import Array
@@ -141,8 +140,6 @@ def _thinned(motion: March, stride: int) -> March:
 
 def _equilibrium(setup: Setup) -> Array:
     """Tip (m), shape (2,), at rest at the last strokes."""
-    plan = compile_scene(setup.scene)
-    state, work = plan.state(), plan.work()
     strokes = setup.drive(np.array([setup.duration]))[0][0]
-    settle(plan, state, work, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
+    _, state, _ = rest_at(setup.scene, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
     return state.frames[-1, :2].copy()

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ....analysis.methods import Drive
-from ....analysis.motions import Motion, motion_of
-from ....scene.kinematics import joint_angles_of_strokes, stroke_curve
+from ....analysis.motions import Motion, ease, ease_integral, motion_of
+from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
 from ....scene.schema import Cylinder, Joint, Scene, Section, Tip
 from ....scene.summary import explain
 from ....types import Array
@@ -163,8 +163,8 @@ class DeadStop:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         moving = times < self.stop - 1e-9
         x = np.clip(times / self.ramp, 0.0, 1.0)
-        gone = self.ramp * (2.5 * x**4 - 3.0 * x**5 + x**6) + np.clip(times, self.ramp, self.stop) - self.ramp
-        rate = np.where(moving, x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 0.0)
+        gone = self.ramp * ease_integral(x) + np.clip(times, self.ramp, self.stop) - self.ramp
+        rate = np.where(moving, ease(x), 0.0)
         return self.first + np.outer(gone, self.speed), np.outer(rate, self.speed)
 
 
@@ -209,19 +209,11 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
     """All cylinders, from near by, to their longest or shortest stroke that range and cylinder allow."""
-    ends, aside = np.array([_reach(scene, i) for i in range(len(scene.joints))]), SHARE
+    ends, aside = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))]), SHARE
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
     first = last + aside * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
-
-
-def _reach(scene: Scene, index: int) -> tuple[float, float]:
-    """Shortest and longest stroke (m) of cylinder `index` over its joint's range."""
-    joint = scene.joints[index]
-    low, high = np.radians(joint.range_deg)
-    strokes = stroke_curve(scene, index, np.linspace(low, high, SAMPLES))
-    return max(0.0, float(np.nanmin(strokes))), min(joint.cylinder.max_stroke, float(np.nanmax(strokes)))
 
 
 def _stroke_for(scene: Scene, posture: str, turn: float) -> float:
