@@ -238,7 +238,7 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
     set_undeformed(plan, state, angles)
     if not _rests(plan, state, work, drive, 1.0):
         set_undeformed(plan, state, angles)
-        share = _load_gradually(plan, state, work, drive)
+        share = _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
         if share < 1.0:
             raise SolverError(
                 f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
@@ -253,11 +253,6 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
                 "pins. Check radial_clearance (m), and how near the posture is to a dead centre."
             )
         linearise_pins(plan, state)
-
-
-def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
-    """Follow the equilibrium from no gravity towards all of it; returns the share that was reached."""
-    return _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
 
 
 def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:

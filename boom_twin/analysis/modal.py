@@ -152,7 +152,7 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
         for mode in lower:
             motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
         increments = _response(plan, state, work, omega * (1.0 - SHIFT), motion)
-        motion = _moved(plan, state, work, increments)
+        motion = along(plan, state, work, increments, lambda: work.position.copy())
         size = math.sqrt(float(plan.masses @ motion**2))
         if not 0.0 < size < math.inf:
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
@@ -177,18 +177,13 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     return np.asarray(sides[0] - sides[1])
 
 
-def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
-    """Linearised motion of all histories by increments of the unknowns; central differences."""
-    return along(plan, state, work, increments, lambda: work.position.copy())
-
-
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
     """Change of the joint angles, shape (n,), rad per unit of the modal coordinate."""
     return along(plan, state, work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
-    """Derivative of what `read` returns along `increments` of the unknowns."""
+    """Derivative of what `read` returns along `increments` of the unknowns, by central differences."""
     z = state.z.copy()
     size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
     sides = []

@@ -136,19 +136,18 @@ def simulate(
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
     by_steps, by_rows = (step_errors(course, own, dt), row_errors(course, own)) if estimate_errors else ((), ())
-    tip = own.rows.tip
-    apart = float(np.diff(times, prepend=times[0]).max())
-    doubts = [
+    tip, apart = own.rows.tip, float(np.diff(times, prepend=times[0]).max())
+    doubts = (
         *ringing(own.jolt, own.shake, own.square),
         *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
         *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
         *too_fast(times, own.rates),
         *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
-    ]
+    )
     return Simulation(
         times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
-        by_steps, by_rows, tuple(doubts), plan.pins, own.rows.pins, own.lost,
+        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from .elements.pin_contact import CLEARANCE
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
 
-JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN, TIP = range(8)
+JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN = range(7)
 
 # Places of a joint's unknowns from `z` of its row on. Both: angle of the section. A: N. B: angles of the links, force in pin Q
 # (2), N. Behind them in both: offsets (2) of the pins with clearance.

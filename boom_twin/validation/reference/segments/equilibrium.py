@@ -6,7 +6,7 @@ import numpy as np
 
 from ....errors import SolverError
 from ....types import Array
-from .boom import Boom, Segments
+from .boom import SegmentBoom, Segments
 from .equations import Jet
 
 PASSES = 60
@@ -14,7 +14,7 @@ SETTLED = 1e-11  # m and rad, largest increment
 LONGEST = 0.1  # m and rad, in one pass
 
 
-def energy(model: Segments, boom: Boom, drive: Array) -> tuple[Jet, list[Jet]]:
+def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[Jet]]:
     """Potential energy (J), and the list of all constraints: closures first, then incompressible cylinders."""
     n = len(boom.tip[0].g)
     v, g, h = 0.0, np.zeros(n), np.zeros((n, n))
@@ -32,7 +32,7 @@ def energy(model: Segments, boom: Boom, drive: Array) -> tuple[Jet, list[Jet]]:
     return Jet(v, g, h), constraints
 
 
-def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, Boom, Array, Array]:
+def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, SegmentBoom, Array, Array]:
     """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad).
 
     Returns

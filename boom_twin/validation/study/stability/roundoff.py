@@ -19,7 +19,7 @@ from ....types import Array
 from ..long_booms import long_boom, seven_sections
 from . import setups as made
 from .cases import short
-from .exact_step import Step, one_step
+from .exact_step import StepRoundoff, one_step
 from .setups import Setup, lighter_gravity, smooth
 
 COUNTS, QUICK_COUNTS = (2, 3, 5, 10, 20, 50, 100, 200), (2, 5, 20)
@@ -34,7 +34,7 @@ class Loss:
     group: str
     name: str
     value: float
-    step: Step
+    step: StepRoundoff
 
 
 def losses(scene: Scene, quick: bool = False) -> list[Loss]:

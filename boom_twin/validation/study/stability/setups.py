@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ....analysis.methods import Drive
 from ....analysis.motions import Motion, ease, ease_integral, motion_of
+from ....scene.edit import scaled
 from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
-from ....scene.schema import Cylinder, Joint, Scene, Section, Tip
+from ....scene.schema import Cylinder, CylinderPart, Joint, Scene, Section, Tip
 from ....scene.summary import explain
 from ....types import Array
 
@@ -50,12 +50,8 @@ def cylinder_parts(scene: Scene, keys: tuple[str, ...], factor: float) -> Scene:
     """Barrels, rods or both (`keys`) with `factor` times their mass and inertia, where there are any."""
 
     def changed(joint: Joint) -> Joint:
-        update: dict[str, Any] = {}
-        for key in keys:
-            part = getattr(joint.cylinder, key)
-            if part is not None:
-                lighter = {"mass": factor * part.mass, "inertia": factor * part.inertia}
-                update[key] = part.model_copy(update=lighter)
+        parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in keys}
+        update = {key: scaled(part, factor) for key, part in parts.items() if part is not None}
         return joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update=update)})
 
     return _joints(scene, changed)
