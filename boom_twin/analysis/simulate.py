@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
-from .drive import Course
+from .drive import Course, Run
 from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, told, too_fast
 
@@ -136,12 +137,9 @@ def simulate(
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
     by_steps, by_rows = (step_errors(course, own, dt), row_errors(course, own)) if estimate_errors else ((), ())
-    tip, apart = own.rows.tip, float(np.diff(times, prepend=times[0]).max())
+    tip = own.rows.tip
     doubts = (
-        *ringing(own.jolt, own.shake, own.square),
-        *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
-        *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
-        *too_fast(times, own.rates),
+        *_doubts(times, dt, own, by_steps, by_rows),
         *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
     )
     return Simulation(
@@ -149,6 +147,17 @@ def simulate(
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
         by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost,
     )  # fmt: skip
+
+
+def _doubts(
+    times: Array, dt: float, own: Run, by_steps: tuple[EstimatedError, ...], by_rows: tuple[EstimatedError, ...]
+) -> Iterator[str]:
+    """What the motion `own` in steps of `dt` (s), rows at `times` (s), itself gives reason to doubt."""
+    apart = float(np.diff(times, prepend=times[0]).max())
+    yield from ringing(own.jolt, own.shake, own.square)
+    yield from told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")
+    yield from told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together")
+    yield from too_fast(times, own.rates)
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:

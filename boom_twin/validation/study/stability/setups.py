@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....analysis.methods import Drive
-from ....analysis.motions import Motion, ease, ease_integral, motion_of
+from ....analysis.motions import FULL_STROKE, Motion, ease, ease_integral, motion_of
 from ....scene.edit import scaled
 from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
 from ....scene.schema import Cylinder, CylinderPart, Joint, Scene, Section, Tip
@@ -111,7 +111,6 @@ def _joints(scene: Scene, change: Callable[[Joint], Joint]) -> Scene:
     return scene.model_copy(update={"joints": tuple(change(joint) for joint in scene.joints)})
 
 
-FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
 SHARE = 0.05  # of a cylinder's travel, from where it goes to the end
 SAMPLES = 1001  # of a joint's range
 
