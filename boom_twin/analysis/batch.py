@@ -13,7 +13,7 @@ import numpy as np
 from ..compiler.plan import Plan, first_row, width_of
 from ..errors import UsageError
 from ..kernels.integrators import GENERALISED_ALPHA
-from ..kernels.tables import OK, SENTENCES
+from ..kernels.tables import OK, SENTENCES, Work
 from ..kernels.transfer.time_step import run_each
 from ..types import Array
 from .drive import PASSES, TOLERANCE
@@ -45,7 +45,7 @@ class Batch:
         self.cores = cores or len(os.sched_getaffinity(0))
         self._tables = _stacked([plan.tables for plan in plans])
         self._states = _stacked([plan.state() for plan in plans])
-        self._works = _stacked([plan.work() for plan in plans])
+        self._works = [plans[0].work() for _ in range(min(len(plans), SHARES * self.cores))]
 
     def settle(self, strokes: Array, angles: Array) -> Array:
         """Bring every boom to rest at `strokes` (m) next to joint `angles` (rad), both (n,) or (booms, n).
@@ -62,7 +62,7 @@ class Batch:
         every = (len(self.plans), n)
         for i, (at, near) in enumerate(zip(np.broadcast_to(strokes, every), np.broadcast_to(angles, every), strict=True)):
             plan, state = self.plans[i], _part(self._states, i)
-            settle(plan, state, _part(self._works, i), at, near)
+            settle(plan, state, self._works[0], at, near)
             rows[i] = first_row(plan, state)
         return rows
 
@@ -94,15 +94,15 @@ class Batch:
         steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
         out, self._ends = np.full((count, rows, width_of(self.plans[0])), np.nan), np.zeros((count, 3), np.int64)
 
-        def share(bounds: tuple[int, int]) -> None:
+        def share(work: Work, bounds: tuple[int, int]) -> None:
             run_each(
-                self._tables, self._states, self._works, *bounds, steps, counts, drives, speeds, GENERALISED_ALPHA, rho,
+                self._tables, self._states, work, *bounds, steps, counts, drives, speeds, GENERALISED_ALPHA, rho,
                 TOLERANCE, PASSES, out, self._ends,
             )  # fmt: skip
 
-        limits = np.linspace(0, count, min(count, SHARES * self.cores) + 1).astype(int).tolist()
+        limits = np.linspace(0, count, len(self._works) + 1).astype(int).tolist()
         with ThreadPoolExecutor(self.cores) as pool:
-            list(pool.map(share, pairwise(limits)))
+            list(pool.map(share, self._works, pairwise(limits)))
         return out
 
     def failures(self) -> dict[int, str]:

@@ -17,7 +17,7 @@ from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import advance
-from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
+from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
 from .modal import Mode, constraints, natural_modes, negative_pivots
@@ -84,14 +84,6 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
     state.history[X, : len(state.z)] = state.z
 
 
-def rigid_tip(scene: Scene, angles: Array) -> Array:
-    """Tip (m), shape (2,), of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
-    heading = np.cumsum(angles)
-    lengths = np.array([section.length for section in scene.sections])
-    pivot = np.array(scene.base.pivot)
-    return np.asarray(pivot + np.array([lengths @ np.cos(heading), lengths @ np.sin(heading)]))
-
-
 SHARE = 0.5  # of the boom's reach, most that the tip may be off the undeformed boom's
 INSTANTS = 8  # of a motion, evenly spaced, at which that is looked at; and where the tip is farthest from its start
 
@@ -116,7 +108,7 @@ def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Arr
             near = joint_angles_of_strokes(scene, strokes[row], near=near)
         except UsageError:  # in the cylinder's travel, but out of the joint's range
             continue
-        worst = max(worst, float(np.hypot(*(tip[row] - rigid_tip(scene, near)))))
+        worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
     return beyond_validity(scene, worst)
 
 
@@ -198,11 +190,9 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
         assert strokes is not None
         strokes = checked_strokes(scene, strokes)
         angles = joint_angles_of_strokes(scene, strokes)
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes, angles)
+    plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
-    undeformed, tip = rigid_tip(scene, angles), state.frames[-1, :2].copy()
+    undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
         tip_rigid=undeformed,
@@ -228,6 +218,14 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
     return values
 
 
+def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, Work]:
+    """Compile a scene and bring it to rest at `strokes` (m) next to joint `angles` (rad), both (n,); see `settle`."""
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes, angles)
+    return plan, state, work
+
+
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
     """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
 
@@ -240,7 +238,7 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
     set_undeformed(plan, state, angles)
     if not _rests(plan, state, work, drive, 1.0):
         set_undeformed(plan, state, angles)
-        share = _load_gradually(plan, state, work, drive)
+        share = _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
         if share < 1.0:
             raise SolverError(
                 f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
@@ -255,11 +253,6 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
                 "pins. Check radial_clearance (m), and how near the posture is to a dead centre."
             )
         linearise_pins(plan, state)
-
-
-def _load_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
-    """Follow the equilibrium from no gravity towards all of it; returns the share that was reached."""
-    return _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
 
 
 def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
@@ -288,6 +281,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
+    state.history[X, plan.tables.parts.history + 2] = 0.0  # of barrels and rods: angles within half a turn, whatever was tried
     status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return bool(status == OK and is_stable(loaded, state, work))
 

@@ -145,10 +145,7 @@ def march(
     SolverError
         No equilibrium at t = 0. A step that fails is a status, not an error.
     """
-    method = method or Method()
-    rows = round(duration / (step * every))
-    if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
-        raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
+    method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)
     if plan.pins and method.product == "plain":
         raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
@@ -173,6 +170,14 @@ def march(
         status="ok" if last.status == OK else SENTENCES[last.status],
         doubt=doubt(last.jolt, last.shake, travel, step * rows * every * step) if last.status == OK else "",
     )
+
+
+def _row_count(duration: float, step: float, every: int) -> int:
+    """Rows of a motion after its first."""
+    rows = round(duration / (step * every))
+    if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
+        raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
+    return rows
 
 
 class _Run(NamedTuple):

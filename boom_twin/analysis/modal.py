@@ -28,7 +28,7 @@ from scipy.special import spherical_jn
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
-from ..kernels.tables import OK, SENTENCES, Motion, State, Work
+from ..kernels.tables import OK, SENTENCES, Condensed, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
@@ -73,20 +73,20 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     position, still = work.position.copy(), np.zeros_like(work.position)
     drive = _drive(plan, state, work)
     for _ in range(TRIES):
-        status, negative, blocks, ends = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
+        status, negative, condensed = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
         if status == OK:
-            return negative + _negative_eigenvalues(blocks) + _negative_eigenvalues(ends)
+            return negative + _negative_eigenvalues(condensed.blocks) + _negative_eigenvalues(condensed.ends)
         omega = omega * (1.0 + 1e-12) + 1e-12
     raise SolverError(f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed: {SENTENCES[status]}. {ABSURD}")
 
 
-def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Array, Array]:
-    """Sweep the whole boom in; status, negative pivots of beams, and what joints and ends of cylinders condensed."""
+def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Condensed]:
+    """Sweep the whole boom in; status, negative pivots of beams, and what was condensed, valid until the next sweep."""
     clear_cut(work, FREE)
     load_pins(plan.tables, state, work, motion)
     operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE)
-    return int(status), int(negative), work.blocks, work.ends
+    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE, work.condensed)
+    return int(status), int(negative), work.condensed
 
 
 def _drive(plan: Plan, state: State, work: Work) -> Array:
@@ -152,7 +152,7 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
         for mode in lower:
             motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
         increments = _response(plan, state, work, omega * (1.0 - SHIFT), motion)
-        motion = _moved(plan, state, work, increments)
+        motion = along(plan, state, work, increments, lambda: work.position.copy())
         size = math.sqrt(float(plan.masses @ motion**2))
         if not 0.0 < size < math.inf:
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
@@ -171,15 +171,10 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     drive, sides = _drive(plan, state, work), []
     for size in (LOAD, -LOAD):
         motion = Motion(-omega * omega, 0.0, position + size * load, still)
-        _condense(plan, state, work, motion, drive)
-        sweep_out(plan.tables, state, work, ROOT, np.int64(len(plan.tables.operations)), FREE)
+        _, _, condensed = _condense(plan, state, work, motion, drive)
+        sweep_out(plan.tables, state, work, condensed, ROOT, np.int64(len(plan.tables.operations)), FREE)
         sides.append(work.dz.copy())
     return np.asarray(sides[0] - sides[1])
-
-
-def _moved(plan: Plan, state: State, work: Work, increments: Array) -> Array:
-    """Linearised motion of all histories by increments of the unknowns; central differences."""
-    return along(plan, state, work, increments, lambda: work.position.copy())
 
 
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
@@ -188,7 +183,7 @@ def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
-    """Derivative of what `read` returns along `increments` of the unknowns."""
+    """Derivative of what `read` returns along `increments` of the unknowns, by central differences."""
     z = state.z.copy()
     size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
     sides = []

@@ -190,8 +190,8 @@ class Halt:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         x, y = np.clip(times / self.ramp, 0.0, 1.0), np.clip((times - self.stop) / self.brake, 0.0, 1.0)
         cruise = np.clip(times, self.ramp, self.stop) - self.ramp
-        gone = self.ramp * _risen(x) + cruise + self.brake * (y - _risen(y))
-        return self.first + np.outer(gone, self.speed), np.outer(_rise(x) - _rise(y), self.speed)
+        gone = self.ramp * ease_integral(x) + cruise + self.brake * (y - ease_integral(y))
+        return self.first + np.outer(gone, self.speed), np.outer(ease(x) - ease(y), self.speed)
 
 
 def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> Halt:
@@ -204,10 +204,11 @@ def halt(scene: Scene, posture: str | None, brake: float, only: int | None = Non
     return Halt(own.angles, own.first, speed, brake)
 
 
-def _rise(x: Array) -> Array:
+def ease(x: Array) -> Array:
+    """Quintic from 0 to 1 over x in [0, 1] with zero slope and curvature at both ends, any shape."""
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
-def _risen(x: Array) -> Array:
-    """Its integral from 0."""
+def ease_integral(x: Array) -> Array:
+    """Integral of `ease` from 0."""
     return 2.5 * x**4 - 3.0 * x**5 + x**6

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.compile import compile_scene
 from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
-from .drive import Course
-from .equilibrium import checked_strokes, motion_beyond_validity, settle
+from .drive import Course, Run
+from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, told, too_fast
 
 RHO = 0.8
@@ -131,28 +131,33 @@ def simulate(
         No equilibrium at the first row, or a step that failed; says when.
     """
     times, strokes = _checked(scene, times, strokes, dt)
-    plan = compile_scene(scene)
-    start, work = plan.state(), plan.work()
-    settle(plan, start, work, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+    plan, start, work = rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
     course = Course(plan, start, work, times, strokes, rho)
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
     by_steps, by_rows = (step_errors(course, own, dt), row_errors(course, own)) if estimate_errors else ((), ())
     tip = own.rows.tip
-    apart = float(np.diff(times, prepend=times[0]).max())
-    doubts = [
-        *ringing(own.jolt, own.shake, own.square),
-        *told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step"),
-        *told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"),
-        *too_fast(times, own.rates),
+    doubts = (
+        *_doubts(times, dt, own, by_steps, by_rows),
         *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
-    ]
+    )
     return Simulation(
         times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
-        by_steps, by_rows, tuple(doubts), plan.pins, own.rows.pins, own.lost,
+        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost,
     )  # fmt: skip
+
+
+def _doubts(
+    times: Array, dt: float, own: Run, by_steps: tuple[EstimatedError, ...], by_rows: tuple[EstimatedError, ...]
+) -> Iterator[str]:
+    """What the motion `own` in steps of `dt` (s), rows at `times` (s), itself gives reason to doubt."""
+    apart = float(np.diff(times, prepend=times[0]).max())
+    yield from ringing(own.jolt, own.shake, own.square)
+    yield from told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")
+    yield from told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together")
+    yield from too_fast(times, own.rates)
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:

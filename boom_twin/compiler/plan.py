@@ -10,7 +10,7 @@ import numpy as np
 from ..kernels.elements import pin_contact as contact
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
-from ..kernels.tables import RECORDS, SLOTS, State, Tables, Work
+from ..kernels.tables import RECORDS, SLOTS, Condensed, State, Tables, Work
 from ..kernels.transfer.time_step import observe
 from ..types import Array
 
@@ -108,14 +108,18 @@ class Plan:
         points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
         beams, operations, n, pins = len(t.beams), len(t.operations), self.joints, len(self.pins)
         inner = 6 + 2 * max((int(joint.clearances) for joint in t.joints), default=0)
+        rows = max(inner, shapes)
+        condensed = Condensed(
+            gains=np.zeros((operations, rows, SLOTS)), free=np.zeros((operations, rows)),
+            blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
+            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)),
+        )  # fmt: skip
         return Work(
             position=np.zeros(histories), velocity=np.zeros(histories), acceleration=np.zeros(histories),
             hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
             finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
-            gains=np.zeros((operations, max(inner, shapes), SLOTS)), free=np.zeros((operations, max(inner, shapes))),
-            block=np.zeros((shapes, shapes)), blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
-            end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)), hold=np.zeros((pins, contact.HOLD_COLUMNS)),
+            condensed=condensed, block=np.zeros((shapes, shapes)), hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
             drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),

@@ -100,10 +100,6 @@ def places_in(joints: int, pins: int) -> Places:
 
 def results_of(rows: Array, joints: int, pins: int) -> Results:
     """The `Results` of rows, shape (.., row_width), with the same leading axes."""
-    lead, tip = rows.shape[:-1], 2 * joints
-    return Results(
-        rows[..., :joints],
-        rows[..., joints:tip],
-        rows[..., tip : tip + TIP].reshape(*lead, 3, 3),
-        rows[..., tip + TIP :].reshape(*lead, pins, PIN),
-    )
+    at, lead = places_in(joints, pins), rows.shape[:-1]
+    tip, journals = rows[..., at.tip].reshape(*lead, 3, 3), rows[..., at.pins].reshape(*lead, pins, PIN)
+    return Results(rows[..., at.joints], rows[..., at.cylinder_forces], tip, journals)

@@ -18,7 +18,7 @@ from .elements.pin_contact import CLEARANCE
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
 
-JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN, TIP = range(8)
+JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN = range(7)
 
 # Places of a joint's unknowns from `z` of its row on. Both: angle of the section. A: N. B: angles of the links, force in pin Q
 # (2), N. Behind them in both: offsets (2) of the pins with clearance.
@@ -136,6 +136,23 @@ class State(NamedTuple):
     pace: np.ndarray
 
 
+class Condensed(NamedTuple):
+    """What a sweep in condenses (`kernels.transfer.riccati_sweep.sweep_in`), for those that go on from it.
+
+    gains : (operations, rows, SLOTS) decrements of the condensed unknowns by increments of the cut, and
+    free : (operations, rows) those that do not depend on it.
+    blocks : (joints, inner, inner) H_qq of what a joint condenses, inner: most unknowns of a joint.
+    ends : (clearances, 2, 2) the same of the end of a cylinder. end_gains : (clearances, 2, 5), end_free : (clearances, 2).
+    """
+
+    gains: Array
+    free: Array
+    blocks: Array
+    ends: Array
+    end_gains: Array
+    end_free: Array
+
+
 class Work(NamedTuple):
     """Scratch of one step; no meaning between steps."""
 
@@ -154,14 +171,9 @@ class Work(NamedTuple):
     own_h: Array  # (5, 5)
     matrix: Array  # (inner, inner), inner: most unknowns of a joint
     right: Array  # (inner, SLOTS)
-    gains: Array  # (operations, rows, SLOTS): decrements of the condensed unknowns by increments of the cut ..
-    free: Array  # (operations, rows): .. and those that do not depend on it
+    condensed: Condensed
     block: Array  # (rows, rows): H_qq of a beam part
-    blocks: Array  # (joints, inner, inner) what a joint condenses, as the last sweep in left it
-    ends: Array  # (clearances, 2, 2) what the end of a cylinder condenses, likewise
-    end_gains: Array  # (clearances, 2, 5), and its gains
-    end_free: Array  # (clearances, 2)
-    hold: Array  # (clearances, 9) what a pin gives, columns as named in `kernels.elements.pin_contact`
+    hold: Array  # (clearances, 9) what holds a journal back, columns as named in `kernels.elements.pin_contact`
     apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)

@@ -10,7 +10,7 @@ import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 from ruamel.yaml import YAML
@@ -19,9 +19,10 @@ from ruamel.yaml.error import YAMLError
 from ..config.yaml_text import with_value, yaml_text
 from ..errors import SceneError, UsageError
 from .load import structure
-from .schema import Cylinder, RigidPart, Scene, Section, Tip
+from .schema import CylinderPart, RigidPart, Scene, Section, Tip
 from .yaml_reader import Place, parse, with_end_mark, words
 
+Body = TypeVar("Body", RigidPart, CylinderPart)
 _NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
 
 
@@ -83,18 +84,14 @@ def _with_one(scene: Scene, name: str, value: float) -> Scene:
     least_is_open = key in ("k", "EI", "mass")
     if not (value > 0.0 if least_is_open else value >= 0.0) or value == float("inf"):
         raise UsageError(f"{name} = {value:g}: must be finite and {'above 0' if least_is_open else 'at least 0'}.")
-    if owner == "tip":
-        return scene.model_copy(update={"tip": (scene.tip or Tip()).model_copy(update={"payload": value})})
-    if owner == "line_fill":
-        return scene.model_copy(update={"line_fill": value})
+    place, part = cast(Place, (owner,)), cast(Any, value)
     if owner == "cylinder":
-        joints = list(scene.joints)
-        cylinder: Cylinder = joints[index].cylinder.model_copy(update={key: value})
-        joints[index] = joints[index].model_copy(update={"cylinder": cylinder})
-        return scene.model_copy(update={"joints": tuple(joints)})
-    sections = list(scene.sections)
-    sections[index] = _section(scene, sections[index], key, value)
-    return scene.model_copy(update={"sections": tuple(sections)})
+        place = ("joints", index, "cylinder", key)
+    elif owner == "section":
+        place, part = ("sections", index), _section(scene, scene.sections[index], key, value)
+    elif owner == "tip":
+        part = (scene.tip or Tip()).model_copy(update={"payload": value})
+    return cast(Scene, _with(scene, place, part))
 
 
 def _section(scene: Scene, section: Section, key: str, value: float) -> Section:
@@ -104,7 +101,7 @@ def _section(scene: Scene, section: Section, key: str, value: float) -> Section:
         return section.model_copy(update={"beta": value})
     factor = value / section_mass(section)
     changes: dict[str, object] = {
-        name: _heavier(part, factor) for name in ("root", "head") if (part := getattr(section, name)) is not None
+        name: scaled(part, factor) for name in ("root", "head") if (part := getattr(section, name)) is not None
     }
     if section.rho_A is not None:
         changes["rho_A"] = factor * section.rho_A
@@ -113,7 +110,8 @@ def _section(scene: Scene, section: Section, key: str, value: float) -> Section:
     return section.model_copy(update=changes)
 
 
-def _heavier(part: RigidPart, factor: float) -> RigidPart:
+def scaled(part: Body, factor: float) -> Body:
+    """A part with `factor` times its mass and inertia."""
     return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
 
 
@@ -159,7 +157,7 @@ def merged(edits: Iterable[Edit]) -> tuple[Edit, ...]:
     return tuple(last[place] for place in sorted(last, key=lambda place: [str(step) for step in place]))
 
 
-def _with(part: Any, place: Sequence[str | int], value: Value | None) -> Any:
+def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
     """`part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
     if not place:
         return value
@@ -194,22 +192,11 @@ def anew(scene: Scene) -> str:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.dump(_plain(scene.model_dump(exclude_none=True)), stream)
+    yaml.dump(scene.model_dump(mode="json", exclude_none=True), stream)
     return with_end_mark(stream.getvalue())
-
-
-def _plain(value: object) -> object:
-    """Lists for tuples."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:
     """The scene with that payload (kg) and line fill (kg/m); below 0 its own."""
-    changes: dict[str, object] = {}
-    if payload >= 0.0:
-        changes["tip"] = (scene.tip or Tip()).model_copy(update={"payload": payload})
-    if line_fill >= 0.0:
-        changes["line_fill"] = line_fill
-    return scene.model_copy(update=changes)
+    loads = {"tip.payload": payload, "line_fill": line_fill}
+    return with_parameters(scene, {name: value for name, value in loads.items() if value >= 0.0})

@@ -58,6 +58,16 @@ def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
         return np.asarray(cylinder_length(row, np.atleast_1d(angles))[0] - closed)
 
 
+def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
+    """Least and greatest stroke (m) of joint `index` at `samples` angles of its range, within the cylinder's travel.
+
+    The least is above the greatest where the range and the travel have nothing in common.
+    """
+    joint = scene.joints[index]
+    strokes = stroke_curve(scene, index, np.radians(np.linspace(*joint.range_deg, samples)))
+    return max(float(np.nanmin(strokes)), 0.0), min(float(np.nanmax(strokes)), joint.cylinder.max_stroke)
+
+
 def posture_angles(scene: Scene, name: str) -> Array:
     """Relative joint angles (rad), shape (n,), of the undeformed boom in a named posture."""
     if name not in scene.postures:

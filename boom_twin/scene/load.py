@@ -12,11 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from ..errors import Fault, SceneError, SceneWarning
-from .checks import clearance
-from .checks import geometry as placement
-from .checks import geometry as reach
-from .checks import values as consistency
-from .checks import values as units
+from .checks import clearance, geometry, values
 from .checks.findings import Draft, Finding, unknown_key, value_fault
 from .glossary import BLOCKS
 from .schema import Scene
@@ -28,24 +24,24 @@ LISTS = ("sections", "joints", "pins")
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
     """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
-    values, faults = _known(document, document.values, Scene, ())
+    known, faults = _known(document, document.values, Scene, ())
     broken: set[Place] = set()
     scene: Scene | None = None
     try:
-        scene = Scene.model_validate(values, strict=True)
+        scene = Scene.model_validate(known, strict=True)
     except ValidationError as error:
         for detail in error.errors(include_url=False):
             place: Place = detail["loc"]
             faults.append(value_fault(document, detail, place))
             broken.add(place[:2] if place[:1] in (("sections",), ("joints",), ("postures",)) else place[:1])
-    return scene, _draft(document, values, broken), faults
+    return scene, _draft(document, known, broken), faults
 
 
-def _draft(document: Document, values: Any, broken: set[Place]) -> Draft:
-    """The usable parts of `values`: everything that is neither in `broken` nor inside it."""
-    if not isinstance(values, dict):
+def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
+    """The usable parts of `known`: everything that is neither in `broken` nor inside it."""
+    if not isinstance(known, dict):
         return Draft(document)
-    usable = {key: value for key, value in values.items() if (key,) not in broken}
+    usable = {key: value for key, value in known.items() if (key,) not in broken}
     blocks: dict[str, Any] = {}
     for key, value in usable.items():
         model = BLOCKS[Scene].get(key)
@@ -59,13 +55,13 @@ def _draft(document: Document, values: Any, broken: set[Place]) -> Draft:
     return Draft(document, **blocks)
 
 
-def _known(document: Document, values: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
-    """`values` without unknown keys and without empty ones, and a fault for every unknown key."""
-    if not isinstance(values, dict):
-        return values, []
+def _known(document: Document, block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
+    """A block without unknown keys and without empty ones, and a fault for every unknown key."""
+    if not isinstance(block, dict):
+        return block, []
     known: dict[str, Any] = {}
     faults: list[Fault] = []
-    for key, value in values.items():
+    for key, value in block.items():
         here = (*place, key)
         inner = BLOCKS.get(model, {}).get(key)
         if key not in model.model_fields:
@@ -88,16 +84,16 @@ def _known(document: Document, values: Any, model: type[BaseModel], place: Place
 
 
 CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
-    consistency.counts,
-    consistency.sections,
-    consistency.modes,
-    consistency.joints,
-    placement.pins,
-    placement.thin_parts,
-    placement.centres,
+    values.counts,
+    values.sections,
+    values.modes,
+    values.joints,
+    geometry.pins,
+    geometry.thin_parts,
+    geometry.centres,
     clearance.pins,
-    reach.joints,
-    units.suspects,
+    geometry.joints,
+    values.suspects,
 )
 
 

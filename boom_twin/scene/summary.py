@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from .kinematics import stroke_curve
+from .kinematics import stroke_range
 from .schema import IDEAL_BELOW, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits
 
@@ -83,6 +81,7 @@ def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
 
 
 UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN = 2, 6, 2
+SAMPLES = 721  # of a joint's range
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,13 +207,13 @@ def _section(scene: Scene, i: int) -> SectionAccount:
 def _joint(scene: Scene, i: int) -> JointAccount:
     joint = scene.joints[i]
     cylinder = joint.cylinder
-    strokes = stroke_curve(scene, i, np.radians(np.linspace(*joint.range_deg, 721)))
+    low, high = stroke_range(scene, i, SAMPLES)
     return JointAccount(
         number=i + 1,
         kind=joint.kind,
         range_deg=joint.range_deg,
-        stroke_low=max(float(np.nanmin(strokes)), 0.0),
-        stroke_high=min(float(np.nanmax(strokes)), cylinder.max_stroke),
+        stroke_low=low,
+        stroke_high=high,
         max_stroke=cylinder.max_stroke,
         k=cylinder.k,
         d=cylinder.d,

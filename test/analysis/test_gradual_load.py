@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.equilibrium import rest_at, statics
 from boom_twin.errors import SolverError
+from boom_twin.kernels.integrators import X
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.validation.study.stability import setups as made
 
 
@@ -24,6 +26,13 @@ def test_a_soft_boom_hangs_and_is_stable(scene, posture):
     found = statics(scene, posture=posture)
     assert found.tip[1] < found.tip_rigid[1] - 1.0
     assert found.frequencies[0] > 0.05
+
+
+def test_barrels_and_rods_at_rest_are_turned_by_less_than_half_a_turn():
+    """Whatever full turns the trials on the way made: a multiple of 2 pi in their histories would cost digits."""
+    soft = made.bending(load_scene(), 1e-3)
+    plan, state, _ = rest_at(soft, strokes_of_posture(soft, "arch"), posture_angles(soft, "arch"))
+    assert np.abs(state.history[X, plan.tables.parts.history + 2]).max() <= np.pi
 
 
 def test_the_path_of_growing_load_is_one_curve():

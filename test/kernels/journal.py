@@ -1,4 +1,4 @@
-"""The model's own law of a pin as the oracle's mechanisms ask for one: `physics.contact.bearing` behind complex numbers."""
+"""The model's own law of a pin as the oracle's mechanisms ask for one: `pin_contact.bearing` behind complex numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def memory(entry=None, force=0.0):
 
 def bearing(row, kept, x, y, vx, vy, turning=0.0, rate=0.0, axis=(1.0, 0.0)):
     """`contact.bearing` with the velocity at the start of the step equal to that at its end."""
-    return contact.bearing(row, kept, x, y, vx, vy, vx, vy, turning, *axis, rate)
+    return contact.bearing(row, kept, contact.Journal(x, y, vx, vy, vx, vy, turning, *axis), rate)
 
 
 class Journal:

@@ -28,16 +28,17 @@ def test_a_condensed_loop_is_the_schur_complement(count: int, size: int) -> None
     room = np.zeros
     work = SimpleNamespace(
         s=room((others, others)), p=room(others), g=g, h=np.tril(h), right=room((count, others + 1)),
-        matrix=room((count, count)), blocks=room((1, count, count)), gains=room((1, count, others)), free=room((1, count)),
+        matrix=room((count, count)),
     )  # fmt: skip
-    assert _condense_loop(work, 0, 0, count, size)
+    found = SimpleNamespace(blocks=room((1, count, count)), gains=room((1, count, others)), free=room((1, count)))
+    assert _condense_loop(work, found, 0, 0, count, size)
     q = np.arange(SECTION, SECTION + count)
     x = np.setdiff1d(np.arange(size), q)
     gains, free = np.linalg.solve(h[np.ix_(q, q)], h[np.ix_(q, x)]), np.linalg.solve(h[np.ix_(q, q)], g[q])
-    assert work.gains[0] == pytest.approx(gains) and work.free[0] == pytest.approx(free)
+    assert found.gains[0] == pytest.approx(gains) and found.free[0] == pytest.approx(free)
     assert work.s == pytest.approx(h[np.ix_(x, x)] - h[np.ix_(x, q)] @ gains)
     assert work.p == pytest.approx(g[x] - h[np.ix_(x, q)] @ free)
-    parts = [np.linalg.eigvalsh(part) for part in (work.blocks[0], work.s)]
+    parts = [np.linalg.eigvalsh(part) for part in (found.blocks[0], work.s)]
     assert np.sum(np.linalg.eigvalsh(h) < 0.0) == sum(np.sum(part < 0.0) for part in parts)
 
 
@@ -61,10 +62,9 @@ def test_condensed_ends_solve_the_system_with_their_offsets(places: tuple[np.int
     inner = np.linalg.solve(whole[5:, 5:], np.column_stack([whole[5:, :5], right[5:]]))
     t = SimpleNamespace(clearances=[SimpleNamespace(place=place) for place in places])
     cylinder = SimpleNamespace(first_clearance=0, clearances=k, history=0)
-    work = SimpleNamespace(
-        hold=hold, position=np.ones(1), ends=np.zeros((k, 2, 2)), end_gains=np.zeros((k, 2, 5)), end_free=np.zeros((k, 2))
-    )
-    condense_ends(t, None, work, cylinder, g, h)
+    work = SimpleNamespace(hold=hold, position=np.ones(1))
+    condensed = SimpleNamespace(ends=np.zeros((k, 2, 2)), end_gains=np.zeros((k, 2, 5)), end_free=np.zeros((k, 2)))
+    condense_ends(t, None, work, condensed, cylinder, g, h)
     assert h == pytest.approx(whole[:5, :5] - whole[:5, 5:] @ inner[:, :5])
     assert g == pytest.approx(right[:5] - whole[:5, 5:] @ inner[:, 5])
 

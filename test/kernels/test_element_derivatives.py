@@ -49,7 +49,7 @@ def cylinder_row(compliance, lag):
 
 def cylinder_forces(z, row, drive=1.2, drive_rate=0.3):
     g, h, position = np.zeros(5), np.zeros((5, 5)), np.zeros(7)
-    cylinder.place_cylinder(row, PARTS, *z[:4], position)
+    cylinder.place_cylinder(row, PARTS, *z[:4], np.zeros(7), position)
     motion = Motion(GAIN, RATE, HATS, 0.1 * HATS)
     cylinder.cylinder_terms(row, PARTS, *z, drive, drive_rate, motion, GRAVITY, position, g, h)
     return g, h
@@ -129,28 +129,29 @@ BEAM_Z = np.array([0.2, -0.1, 0.6, 0.10, -0.15, 0.05, 0.02])  # x, y, theta of t
 
 
 def placed(z, row):
-    """End position (3,) and all histories for input end z[:3] and coordinates z[3:]."""
+    """End position (3,), all histories and the part for input end z[:3] and coordinates z[3:]."""
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
-    turn, angles, position = np.zeros((POINTS, 4)), np.zeros(POINTS + 1), np.zeros(COUNT + 1 + 3 * POINTS)
-    angle = beam.beam_shape(row, SIZES, BASIS.psi, TABLES[1], z[3:], rho, drho, angles, turn)
+    part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((POINTS, 4)))
+    angles, position = np.zeros(POINTS + 1), np.zeros(COUNT + 1 + 3 * POINTS)
+    angle = beam.beam_shape(row, part, SIZES, z[3:], angles)
     c, s = np.cos(z[2]), np.sin(z[2])
-    beam.place_beam(row, SIZES, rho, angles, *z[:3], c, s, position)
+    beam.place_beam(row, part, SIZES, angles, *z[:3], c, s, position)
     end = z[:2] + np.array([[c, -s], [s, c]]) @ rho[-1]
-    scratch = rho, drho, turn, np.zeros((POINTS, 2)), np.zeros((COUNT + 1, COUNT + 1))
-    return np.append(end, z[2] + angle), position, scratch
+    return np.append(end, z[2] + angle), position, part
 
 
 def swept(z, row):
     """Cut at the input end and gains, with two carried slots and the outboard side linearised where the end is."""
-    _, position, scratch = placed(z, row)
-    s, p, gains, free = END_STIFFNESS.copy(), END_FORCE.copy(), np.zeros((COUNT + 1, 5)), np.zeros(COUNT + 1)
+    _, position, part = placed(z, row)
+    s, p, size = END_STIFFNESS.copy(), END_FORCE.copy(), COUNT + 1
+    own = beam.BeamEquations(np.zeros((size, 5)), np.zeros((size, size)), np.zeros(size), np.zeros((POINTS, 2)))
     motion, turn = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS), (np.cos(z[2]), np.sin(z[2]))
-    beam.transfer_beam(row, SIZES, TABLES, scratch, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5), gains, free)
-    return s, p, free, gains
+    beam.transfer_beam(row, part, SIZES, own, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5))
+    return s, p, own.force, own.coupling
 
 
 def beam_potential(row):
-    """Jet over (input end, two carried slots, q): positions by the integral in the head of `physics.beam`."""
+    """Jet over (input end, two carried slots, q): positions by the integral in the head of `kernels.elements.beam`."""
     z = coordinates(np.concatenate([BEAM_Z[:3], np.zeros(2), BEAM_Z[3:]]))
     x, y, theta, carried, q, eps = z[0], z[1], z[2], z[3:5], z[5:-1], z[-1]
     bends = [sum((shape * a for shape, a in zip(psi, q, strict=True)), 0.0) for psi in BASIS.psi]
@@ -208,8 +209,8 @@ def test_beam_condenses_the_hessian_of_its_energy(beta, finite):
 @pytest.mark.parametrize("finite", [POINTS, 0])
 def test_beam_shape_derivatives(finite):
     row = beam_row(0.0, finite)
-    drho = placed(BEAM_Z, row)[2][1]
-    expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2][0], BEAM_Z[3:])
+    drho = placed(BEAM_Z, row)[2].drho
+    expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2].rho, BEAM_Z[3:])
     assert drho == pytest.approx(np.moveaxis(expected, -1, 1), abs=1e-8)
 
 

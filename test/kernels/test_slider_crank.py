@@ -65,8 +65,9 @@ class Ours:
         memory = np.zeros(contact.COLUMNS)
         memory[contact.CLOSED], memory[contact.APPROACH] = entry is not None, entry or 0.0
         velocity = (rate.real, rate.imag)
-        found = contact.bearing(self.row, memory, offset.real, offset.imag, *velocity, *velocity, 0.0, 1.0, 0.0, 0.0)
-        return -complex(found[0], found[1])
+        journal = contact.Journal(offset.real, offset.imag, *velocity, *velocity, 0.0, 1.0, 0.0)
+        found = contact.bearing(self.row, memory, journal, 0.0)
+        return -complex(found.x, found.y)
 
 
 def compiled():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kernels.dense import Dense, riccati_pass
 from oracle import booms
+from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin.analysis.equilibrium import set_undeformed, settle
 from boom_twin.compiler.compile import compile_scene
@@ -15,6 +16,7 @@ from boom_twin.kernels.integrators import GENERALISED_ALPHA, REST, A, X, prepare
 from boom_twin.kernels.tables import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, Motion
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.matrix_product import new_product
+from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from boom_twin.kernels.transfer.time_step import advance
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
@@ -115,7 +117,7 @@ def test_condensed_tangent_is_symmetric(scene, posture):
     motion = Motion(1e5, 500.0, rested, -500.0 * rested)
     riccati_pass(plan, state, work, motion, plan.closed_lengths, np.zeros(plan.joints))
     for index in range(plan.joints):
-        block = work.blocks[index]
+        block = work.condensed.blocks[index]
         assert block == pytest.approx(block.T, rel=1e-9, abs=1e-9 * np.abs(block).max())
 
 
@@ -162,3 +164,50 @@ def test_massless_boom_without_stiffness_is_singular():
     status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(1), 1e-9, np.int64(20), 0.1, None)
     assert status in (SINGULAR, NOT_FINITE)
     assert status != OK
+
+
+def scratch(work):
+    """All arrays of work, also those of what is condensed, but the weights of the schemes, which `run` prepares once."""
+    for name, value in work._asdict().items():
+        if isinstance(value, tuple):
+            yield from value
+        elif name not in ("weights", "finer"):
+            yield value
+
+
+@pytest.mark.parametrize("worn", [False, True])
+def test_work_means_nothing_between_steps(worn):
+    """What a step leaves in it, or a boom beside, is not what the next step starts from: not a number there changes no bit."""
+    document = booms.document()
+    scene = with_pins(document, [*RODS, "joint_3.Q"], friction=0.1) if worn else booms.scene_of(document)
+    plan, ends = compile_scene(scene), []
+    first = strokes_of_posture(scene, "arch")
+    for spoilt in (False, True):
+        state, work = plan.state(), plan.work()
+        settle(plan, state, work, first, posture_angles(scene, "arch"))
+        scheme = prepare(GENERALISED_ALPHA, 0.8, 1e-3, work.weights)
+        for k in range(20):
+            for array in scratch(work) if spoilt else ():
+                array[...] = np.nan
+            drive = plan.closed_lengths + first + 1e-4 * k
+            status, _, _ = advance(plan.tables, state, work, scheme, drive, np.zeros(4), 1e-7, np.int64(20), 0.5, None)
+            assert status == OK
+        ends.append(state)
+    for clean, other in zip(*ends, strict=True):
+        assert np.array_equal(clean, other)
+
+
+def test_increments_are_of_the_sweep_that_is_handed_over():
+    """Another sweep in between, into other arrays, changes none of them."""
+    scene = load_scene()
+    plan, state, work, rested = boom_beside_equilibrium(scene, "arch")
+    motions = [Motion(gain, 500.0, rested, -500.0 * rested) for gain in (1e5, 3e5)]
+    riccati_pass(plan, state, work, motions[0], plan.closed_lengths, np.zeros(4))
+    expected, own, end = work.dz.copy(), plan.work().condensed, np.int64(len(plan.tables.operations))
+    for motion, condensed in zip(motions, (own, work.condensed), strict=True):
+        clear_cut(work, FREE)
+        sweep_in(plan.tables, state, work, motion, plan.closed_lengths, np.zeros(4), ROOT, end, FREE, condensed)
+    sweep_out(plan.tables, state, work, own, ROOT, end, FREE)
+    assert np.array_equal(work.dz, expected)
+    sweep_out(plan.tables, state, work, work.condensed, ROOT, end, FREE)
+    assert not np.allclose(work.dz, expected)

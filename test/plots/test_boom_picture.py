@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import rigid_tip, statics
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.plots.boom import boom_picture, undeformed_outline
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
@@ -37,7 +37,8 @@ def test_pins_agree_with_lengths_and_strokes(scene: Scene, name: str) -> None:
             assert np.hypot(*(joint.q - joint.e)) == pytest.approx(part.lR, abs=1e-9)
             over, out = joint.e - joint.d, joint.q - joint.d
             assert over[0] * out[1] - over[1] * out[0] > 0.0, "Q is not to the left of D->E"
-    assert bones.pivots[-1] == pytest.approx(rigid_tip(scene, posture_angles(scene, name)), abs=1e-12)
+    sides = [part.length * np.exp(1j * np.radians(up)) for part, up in zip(scene.sections, scene.postures[name], strict=True)]
+    assert complex(*bones.pivots[-1]) == pytest.approx(complex(*scene.base.pivot) + sum(sides), abs=1e-12)
 
 
 def test_undeformed_outline_lies_on_the_sections(scene: Scene) -> None:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...types import Array
 from ..jit import inner
 from ..plane_algebra import condense, cosines
 
@@ -45,6 +46,38 @@ class Sizes(NamedTuple):
     points: np.int64
 
 
+class BeamPart(NamedTuple):
+    """Tables of a beam part, and its shape, which `beam_shape` fills.
+
+    psi : (P+1, n); the last row, as those of all that follows with P+1 rows, belongs to the output end.
+    weights : (P+1, P), m. stiffness : (n, n), N m. mass, rotary : (P,), kg and kg m^2.
+    rho : (P+1, 2), m. drho : (P+1, n + axial, 2), its derivatives by q.
+    turn : (P, 4) cosine, sine and their derivatives by the angle.
+    """
+
+    psi: Array
+    weights: Array
+    stiffness: Array
+    mass: Array
+    rotary: Array
+    rho: Array
+    drho: Array
+    turn: Array
+
+
+class BeamEquations(NamedTuple):
+    """Equations of a part's q while it is condensed, and its gains afterwards (see `condense`).
+
+    coupling : (>= n + axial, m) H_qe. block : (>= n + axial, ..) H_qq, lower triangle. force : (>= n + axial,) g_q.
+    local : (P, 2) forces of the points' masses in the axes of the input end, N.
+    """
+
+    coupling: Array
+    block: Array
+    force: Array
+    local: Array
+
+
 USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))  # as constants, which the compiler unrolls: an eighth off a step
 
 
@@ -55,9 +88,9 @@ def is_usual(row):
 
 
 @inner
-def turn_points(row, sizes, psi, z, angles, turn):
-    """Fill turn (P, 4): cosine, sine and their derivatives by the angle, at every point; returns the end's turn."""
-    end = 0.0
+def turn_points(row, part, sizes, z, angles):
+    """Fill the part's `turn`, and `angles` (P+1,) of all cross-sections; returns the end's turn (rad)."""
+    psi, turn, end = part.psi, part.turn, 0.0
     for j in range(sizes.points + 1):
         end = 0.0
         for k in range(sizes.bending):
@@ -72,15 +105,13 @@ def turn_points(row, sizes, psi, z, angles, turn):
 
 
 @inner
-def beam_shape(row, sizes, psi, weights, z, rho, drho, angles, turn):
-    """Fill rho (P+1, 2), its derivatives drho (P+1, n+axial, 2), angles (P+1,), `turn`; returns the end's turn.
-
-    `psi` is (P+1, n), `weights` (P+1, P); their last row belongs to the output end.
-    """
+def beam_shape(row, part, sizes, z, angles):
+    """Fill the part's shape, and `angles` (P+1,) of its cross-sections, from the unknowns z; returns the end's turn (rad)."""
+    psi, weights, rho, drho, turn = part.psi, part.weights, part.rho, part.drho, part.turn
     n, stretch = sizes.bending, 1.0
     if sizes.axial:
         stretch += z[row.z + n]
-    end = turn_points(row, sizes, psi, z, angles, turn)
+    end = turn_points(row, part, sizes, z, angles)
     for i in range(sizes.points + 1):
         x, y = 0.0, 0.0
         for k in range(n):
@@ -100,8 +131,9 @@ def beam_shape(row, sizes, psi, weights, z, rho, drho, angles, turn):
 
 
 @inner
-def place_beam(row, sizes, rho, angles, x, y, theta, c, s, position):
+def place_beam(row, part, sizes, angles, x, y, theta, c, s, position):
     """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
+    rho = part.rho
     for i in range(sizes.points):
         at = row.history + 2 * i
         position[at] = x + c * rho[i, 0] - s * rho[i, 1]
@@ -111,32 +143,29 @@ def place_beam(row, sizes, rho, angles, x, y, theta, c, s, position):
 
 
 @inner
-def transfer_beam(row, sizes, tables, scratch, z, c, sn, motion, gravity, position, s, p, m, gains, force):
-    """Carry a cut (s, p) with m slots from the output to the input end, condensing q.
+def transfer_beam(row, part, sizes, own, z, c, sn, motion, gravity, position, s, p, m):
+    """Carry a cut (s, p) with m slots from the output to the input end, condensing q in `own`, a `BeamEquations`.
 
-    tables : psi, weights, stiffness (n, n), mass (P,), rotary (P,) of this part.
-    scratch : rho, drho, turn as `beam_shape` left them, `local` (P, 2) for forces, `block` for H_qq.
     c, sn : cos and sin of the input end's orientation.
-    gains, force : (>= n + axial, m), (>= n + axial,); the gains of q afterwards (see `condense`).
 
     Returns the number of negative pivots, or -1.
     """
-    psi, weights, stiffness, mass, rotary = tables
-    rho, drho, turn, local, block = scratch
     n = sizes.bending
     size = n + sizes.axial
     fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
-    end = sizes.points
-    _pull_back_end(psi[end], rho[end], drho[end], n, size, c, sn, fx, fy, s, p, m, gains, block, force)
-    _add_points(row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, gains, block, force)
-    _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n], block)
-    _add_stiffness(row, sizes, stiffness, z, motion, block, force)
-    return condense(s, p, gains, block, force, m, size)
+    _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m)
+    _add_points(row, part, sizes, own, c, sn, motion, gravity, position, s, p)
+    _add_bending_of_forces(row, part, sizes, own, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n])
+    _add_stiffness(row, part, sizes, own, z, motion)
+    return condense(s, p, own.coupling, own.block, own.force, m, size)
 
 
 @inner
-def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, block, force):
-    """Pull (s, p) at the output end back to (e_I, carried slots) in place and to q in coupling, block, force."""
+def _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m):
+    """Pull (s, p) at the output end back to (e_I, carried slots) in place and to q in `own`; force (fx, fy) there."""
+    psi, rho, drho = part.psi[sizes.points], part.rho[sizes.points], part.drho[sizes.points]
+    n, coupling, block, force = sizes.bending, own.coupling, own.block, own.force
+    size = n + sizes.axial
     ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
     for a in range(size):
         ax, ay = drho[a, 0], drho[a, 1]
@@ -161,14 +190,13 @@ def _pull_back_end(psi, rho, drho, n, size, c, sn, fx, fy, s, p, m, coupling, bl
 
 
 @inner
-def _add_points(
-    row, sizes, psi, rho, drho, mass, rotary, c, sn, motion, gravity, position, local, s, p, coupling, block, force
-):
-    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `local`.
+def _add_points(row, part, sizes, own, c, sn, motion, gravity, position, s, p):
+    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `own.local`.
 
     Into s only below its diagonal.
     """
-    n = sizes.bending
+    psi, rho, drho, mass, rotary = part.psi, part.rho, part.drho, part.mass, part.rotary
+    coupling, block, force, local, n = own.coupling, own.block, own.force, own.local, sizes.bending
     size = n + sizes.axial
     total, fx_all, fy_all, moment, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(sizes.points):
@@ -218,8 +246,9 @@ def _add_points(
 
 
 @inner
-def _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx_end, fy_end, stretch, block):
+def _add_bending_of_forces(row, part, sizes, own, fx_end, fy_end, stretch):
     """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
+    psi, weights, turn, local, block = part.psi, part.weights, part.turn, own.local, own.block
     n, points = sizes.bending, sizes.points
     for j in range(points):
         fx, fy = weights[points, j] * fx_end, weights[points, j] * fy_end
@@ -238,9 +267,9 @@ def _add_bending_of_forces(row, sizes, psi, weights, turn, local, fx_end, fy_end
 
 
 @inner
-def _add_stiffness(row, sizes, stiffness, z, motion, block, force):
+def _add_stiffness(row, part, sizes, own, z, motion):
     """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
-    n = sizes.bending
+    stiffness, block, force, n = part.stiffness, own.block, own.force, sizes.bending
     lead = 1.0 + row.beta * motion.rate
     for a in range(n):
         for b in range(n):

@@ -52,8 +52,8 @@ def near(angle, other):
 
 
 @inner
-def place_cylinder(row, parts, cx, cy, rx, ry, position):
-    """Write length, centres and angles into `position`."""
+def place_cylinder(row, parts, cx, cy, rx, ry, before, position):
+    """Write length, centres and angles into `position`; angles next to those in `before`, positions of the last step."""
     dx, dy = rx - cx, ry - cy
     length = math.hypot(dx, dy)
     ex, ey = dx / length, dy / length
@@ -65,7 +65,7 @@ def place_cylinder(row, parts, cx, cy, rx, ry, position):
             x, y, along = rx, ry, -part.com
         position[part.history] = x + along * ex
         position[part.history + 1] = y + along * ey
-        position[part.history + 2] = near(math.atan2(dy, dx), position[part.history + 2])
+        position[part.history + 2] = near(math.atan2(dy, dx), before[part.history + 2])
 
 
 @inner

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +41,44 @@ SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 # Places of pins; typed, because numba compiles once more for every literal.
 PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64, range(6))
 
-# Columns of `Work.hold`, as `bearing` gives them: force, its tangent by the offset (K_XX, K_XY, K_YY), torque of friction, its
-# derivatives by the offset and by the turning.
+
+class Journal(NamedTuple):
+    """Where a journal is in its bush, and how it moves.
+
+    x, y : offset, m. vx, vy : its velocity, m/s. before_x, before_y : that at the start of the step, m/s.
+    turning : of the journal in the bush, rad/s. axis_x, axis_y : first axis of what the linearisation is fixed to.
+    """
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    before_x: float
+    before_y: float
+    turning: float
+    axis_x: float
+    axis_y: float
+
+
+class Hold(NamedTuple):
+    """What holds a journal back, and its turning.
+
+    x, y : force, N. xx, xy, yy : its tangent by the offset, N/m.
+    torque : of friction, N m. torque_x, torque_y, torque_turn : its derivatives by the offset (N) and by the turning (N m).
+    """
+
+    x: float
+    y: float
+    xx: float
+    xy: float
+    yy: float
+    torque: float
+    torque_x: float
+    torque_y: float
+    torque_turn: float
+
+
+# Columns of `Work.hold`, a `Hold` for every pin.
 HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, TORQUE, TORQUE_X, TORQUE_Y, TORQUE_TURN, HOLD_COLUMNS = range(10)
 
 CLEARANCE = np.dtype(
@@ -157,25 +194,17 @@ def approach(memory, nx, ny, vx, vy):
 
 
 @inner
-def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis_y, rate):
-    """Force and tangent of a pin whose journal is at (x, y) with velocity (vx, vy).
-
-    before_x, before_y : velocity at the start of the step, m/s. turning : of the journal in the bush, rad/s.
-    axis_x, axis_y : first axis of what the linearisation is fixed to. rate : C of the integrator, dv/dx.
-
-    Returns
-    -------
-    fx, fy, kxx, kxy, kyy, torque, kx, ky, turn
-        What holds the journal back (N), its tangent (N/m), what holds its turning back (N m) with its derivatives by x and y
-        (N) and by the turning (N m).
-    """
+def bearing(row, memory, journal, rate):
+    """The `Hold` of the pin `row` on a `Journal`; rate : C of the integrator, dv/dx."""
+    x, y, vx, vy = journal.x, journal.y, journal.vx, journal.vy
     if memory[SPRING] > 0.0:
-        k, c = memory[SPRING], memory[DAMPER]
-        fx = k * (x - axis_x * memory[SEAT_X] + axis_y * memory[SEAT_Y]) + c * vx
-        fy = k * (y - axis_y * memory[SEAT_X] - axis_x * memory[SEAT_Y]) + c * vy
-        return fx, fy, k + rate * c, 0.0, k + rate * c, 0.0, 0.0, 0.0, 0.0
+        k, c, ax, ay = memory[SPRING], memory[DAMPER], journal.axis_x, journal.axis_y
+        fx = k * (x - ax * memory[SEAT_X] + ay * memory[SEAT_Y]) + c * vx
+        fy = k * (y - ay * memory[SEAT_X] - ax * memory[SEAT_Y]) + c * vy
+        stiff = k + rate * c
+        return Hold(x=fx, y=fy, xx=stiff, xy=0.0, yy=stiff, torque=0.0, torque_x=0.0, torque_y=0.0, torque_turn=0.0)
     nx, ny, r, d, slope = penetration(row, x, y)
-    speed = approach(memory, nx, ny, before_x, before_y)
+    speed = approach(memory, nx, ny, journal.before_x, journal.before_y)
     elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
     lead = row.loss / speed
     share = 1.0 + lead * (nx * vx + ny * vy)
@@ -186,7 +215,7 @@ def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis
     across = force / r
     drag, drag_rate = 0.0, 0.0
     if row.friction > 0.0:
-        slip = nx * vy - ny * vx + row.radius * turning
+        slip = nx * vy - ny * vx + row.radius * journal.turning
         width = math.sqrt(slip * slip + SLIP * SLIP)
         most = row.friction * memory[FORCE]
         drag, drag_rate = most * slip / width, 0.5 * most / width * (1.0 + (SLIP / width) ** 2) * rate
@@ -194,8 +223,10 @@ def bearing(row, memory, x, y, vx, vy, before_x, before_y, turning, axis_x, axis
     kxx = radial * nx * nx + along * ny * ny + rest
     kyy = radial * ny * ny + along * nx * nx + rest
     kxy = (radial - along) * nx * ny
-    fx, fy = force * nx - drag * ny, force * ny + drag * nx
-    return fx, fy, kxx, kxy, kyy, row.radius * drag, -turn * ny, turn * nx, row.radius * turn
+    return Hold(
+        x=force * nx - drag * ny, y=force * ny + drag * nx, xx=kxx, xy=kxy, yy=kyy,
+        torque=row.radius * drag, torque_x=-turn * ny, torque_y=turn * nx, torque_turn=row.radius * turn,
+    )  # fmt: skip
 
 
 @inner

@@ -34,6 +34,8 @@ from ..elements.pin_contact import (
     TORQUE,
     TORQUE_TURN,
     TORQUE_X,
+    TORQUE_Y,
+    Journal,
     bearing,
     limited,
     remember,
@@ -85,9 +87,13 @@ def load_pins(t, state, work, motion):
         if row.friction > 0.0:
             turning = motion.rate * work.position[row.turn] + motion.offset[row.turn]
         ax, ay = axis_of(t, state, row)
-        hold[0], hold[1], hold[2], hold[3], hold[4], hold[5], hold[6], hold[7], hold[8] = bearing(
-            row, state.contacts[k], x, y, vx, vy, before[row.z], before[row.z + 1], turning, ax, ay, motion.rate
+        journal = Journal(
+            x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], turning=turning, axis_x=ax, axis_y=ay
         )
+        found = bearing(row, state.contacts[k], journal, motion.rate)
+        hold[HOLD_X], hold[HOLD_Y], hold[K_XX], hold[K_XY], hold[K_YY] = found.x, found.y, found.xx, found.xy, found.yy
+        hold[TORQUE], hold[TORQUE_X], hold[TORQUE_Y] = found.torque, found.torque_x, found.torque_y
+        hold[TORQUE_TURN] = found.torque_turn
 
 
 @inner
@@ -136,7 +142,7 @@ def end_of(row):
 
 
 @inner
-def condense_ends(t, state, work, cylinder, g, h):
+def condense_ends(t, state, work, condensed, cylinder, g, h):
     """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h).
 
     (g, h) is written for the ends y = (C, R, N), and an end is its pin plus delta. So what `g` and `h` say of that end e holds
@@ -154,7 +160,8 @@ def condense_ends(t, state, work, cylinder, g, h):
     if torque != 0.0:
         _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
-        at, hold, block, gains, free = end_of(t.clearances[k]), work.hold[k], work.ends[k], work.end_gains[k], work.end_free[k]
+        at, hold, block = end_of(t.clearances[k]), work.hold[k], condensed.ends[k]
+        gains, free = condensed.end_gains[k], condensed.end_free[k]
         block[0, 0], block[0, 1] = h[at, at] + hold[K_XX], h[at, at + 1] + hold[K_XY]
         block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[K_YY]
         share = 1.0 / (block[0, 0] * block[1, 1] - block[0, 1] * block[0, 1])
@@ -187,10 +194,10 @@ def _turn_back(g, h, force):
 
 
 @inner
-def move_ends(t, work, cylinder, cx, cy, rx, ry, force):
+def move_ends(t, work, condensed, cylinder, cx, cy, rx, ry, force):
     """Increments of the offsets of a cylinder's ends from those of its pins C and R and of its force."""
     for k in range(cylinder.first_clearance + cylinder.clearances - 1, cylinder.first_clearance - 1, -1):
-        row, gains, free = t.clearances[k], work.end_gains[k], work.end_free[k]
+        row, gains, free = t.clearances[k], condensed.end_gains[k], condensed.end_free[k]
         dx = -free[0] - gains[0, 0] * cx - gains[0, 1] * cy - gains[0, 2] * rx - gains[0, 3] * ry - gains[0, 4] * force
         dy = -free[1] - gains[1, 0] * cx - gains[1, 1] * cy - gains[1, 2] * rx - gains[1, 3] * ry - gains[1, 4] * force
         work.dz[row.z], work.dz[row.z + 1] = dx, dy
@@ -221,7 +228,7 @@ def note_contacts(t, state, work):
 
 
 @inner
-def coarseness(t, state, work, scheme):
+def coarseness(t, state, work, condensed, scheme):
     """Largest error of a sub-step in the offset of a pin that touches, over what is allowed.
 
     (1/A - h^2/6) (a' - a) (Zienkiewicz and Xie 1991, with 1/A = beta h^2 for Newmark's family), against `ALLOWED` of the
@@ -241,19 +248,19 @@ def coarseness(t, state, work, scheme):
         if touching or memory[CLOSED] > 0.0:
             ax = scheme.gain * (state.z[i] - work.hat[i]) - before[i]
             ay = scheme.gain * (state.z[j] - work.hat[j]) - before[j]
-            ax, ay = unstiffened(t, work, k, ax, ay)
+            ax, ay = unstiffened(t, work, condensed, k, ax, ay)
             worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * max(row.gap, LEAST_GAP)))
     return worst
 
 
 @inner
-def unstiffened(t, work, k, ax, ay):
-    """(M A + K)^-1 M A times (ax, ay), with the tangents of the last pass for pin `k`."""
+def unstiffened(t, work, condensed, k, ax, ay):
+    """(M A + K)^-1 M A times (ax, ay), with the tangents of a pass for pin `k`: M A + K is what was condensed there."""
     row, hold = t.clearances[k], work.hold[k]
     if row.place >= ROD_END_PIN:
-        xx, xy, yy = work.ends[k, 0, 0], work.ends[k, 0, 1], work.ends[k, 1, 1]
+        xx, xy, yy = condensed.ends[k, 0, 0], condensed.ends[k, 0, 1], condensed.ends[k, 1, 1]
     else:
-        block, at = work.blocks[row.owner], row.z - t.joints[row.owner].z
+        block, at = condensed.blocks[row.owner], row.z - t.joints[row.owner].z
         xx, xy, yy = block[at, at], block[at + 1, at], block[at + 1, at + 1]
     fx = (xx - hold[K_XX]) * ax + (xy - hold[K_XY]) * ay
     fy = (xy - hold[K_XY]) * ax + (yy - hold[K_YY]) * ay

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..elements.beam import USUAL, Sizes, beam_shape, is_usual, place_beam
+from ..elements.beam import USUAL, BeamPart, Sizes, beam_shape, is_usual, place_beam
 from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
 from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
@@ -97,13 +97,24 @@ def place_rod(t, state, work, index, x, y, theta):
     cylinder, pins = t.cylinders[index], state.pins[index]
     dx, dy = offset_of(t, state.z, cylinder, ROD_END_PIN)
     pins[END_R], pins[END_R + 1] = x + dx, y + dy
-    place_cylinder(cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], work.position)
+    place_cylinder(
+        cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.history[X], work.position
+    )
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         row = t.clearances[k]
         if row.friction > 0.0:
             bush = theta if row.place == ROD_END_PIN else -work.position[row.turn]
             angle = math.atan2(pins[END_R + 1] - pins[END_C + 1], pins[END_R] - pins[END_C])
             work.position[row.turn] = near(angle - bush, state.history[X, row.turn])
+
+
+@inner
+def beam_part(t, work, row):
+    """Tables and shape of the beam part `row`."""
+    return BeamPart(
+        psi=t.psi[row], weights=t.weights[row], stiffness=t.stiffness[row], mass=t.point_mass[row],
+        rotary=t.point_rotary[row], rho=work.rho[row], drho=work.drho[row], turn=work.turn[row],
+    )  # fmt: skip
 
 
 @inner
@@ -123,15 +134,15 @@ def place(t, state, work):
         kind, row = t.operations[k].kind, t.operations[k].row
         put_frame(frames[k], x, y, theta, c, s)
         if kind == BEAM:
-            beam, rho = t.beams[row], work.rho[row]
+            beam, part = t.beams[row], beam_part(t, work, row)
             if is_usual(beam):
-                end = beam_shape(beam, USUAL, t.psi[row], t.weights[row], z, rho, work.drho[row], work.angles, work.turn[row])
-                place_beam(beam, USUAL, rho, work.angles, x, y, theta, c, s, position)
+                end = beam_shape(beam, part, USUAL, z, work.angles)
+                place_beam(beam, part, USUAL, work.angles, x, y, theta, c, s, position)
             else:
                 sizes = Sizes(beam.bending, beam.axial, beam.points)
-                end = beam_shape(beam, sizes, t.psi[row], t.weights[row], z, rho, work.drho[row], work.angles, work.turn[row])
-                place_beam(beam, sizes, rho, work.angles, x, y, theta, c, s, position)
-            bx, by = rho[beam.points, 0], rho[beam.points, 1]
+                end = beam_shape(beam, part, sizes, z, work.angles)
+                place_beam(beam, part, sizes, work.angles, x, y, theta, c, s, position)
+            bx, by = part.rho[beam.points, 0], part.rho[beam.points, 1]
             x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
             c, s = math.cos(theta), math.sin(theta)
         elif kind == BODY:

@@ -144,7 +144,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(units - 1, -1, -1):
         open_end(work, force[k])
-        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
+        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX, work.condensed)
         if status != OK:
             return SINGULAR
         if k > 0:
@@ -169,7 +169,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
         for j in range(3):
             z[i] += s[3 + i, 3 + j] * right[2 + j, 0]
         force[0, i] = z[3 + i]
-    sweep_out(t, state, work, bounds[0], bounds[1], SEVEN)
+    sweep_out(t, state, work, work.condensed, bounds[0], bounds[1], SEVEN)
     return multiply_out(t, state, work, product)
 
 
@@ -191,6 +191,6 @@ def multiply_out(t, state, work, product):
             z[i] = new[i]
         for i in range(3):
             force[k, i] = z[3 + i]
-        sweep_out(t, state, work, bounds[k], bounds[k + 1], SIX)
+        sweep_out(t, state, work, work.condensed, bounds[k], bounds[k + 1], SIX)
     left = max(abs(z[3]), abs(z[4]), abs(z[5]))
     return OK if left <= LOST * largest else DIGITS_LOST

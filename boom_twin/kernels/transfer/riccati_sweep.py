@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elements.beam import USUAL, Sizes, is_usual, transfer_beam
+from ..elements.beam import USUAL, BeamEquations, Sizes, is_usual, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
 from ..elements.rigid_body import add_body, merge_outlet, pull_back
 from ..jit import inner, kernel
@@ -24,6 +24,7 @@ from ..tables import (
     Z_SECTION,
 )
 from .clearance_pins import move_ends, torque_of
+from .forward_kinematics import beam_part
 from .six_bar import close_loop, open_loop
 from .slider_crank import close_base, join_rod
 
@@ -44,21 +45,16 @@ def transfer_body(t, work, motion, row, c, sn):
 
 
 @inner
-def beam_operation(t, state, work, motion, row, operation, c, sn, m):
+def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
-    tables = (t.psi[row], t.weights[row], t.stiffness[row], t.point_mass[row], t.point_rotary[row])
-    scratch = (work.rho[row], work.drho[row], work.turn[row], work.local, work.block)
-    beam = t.beams[row]
+    beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
+    own = BeamEquations(
+        coupling=condensed.gains[operation], block=work.block, force=condensed.free[operation], local=work.local
+    )
     if is_usual(beam):
-        return transfer_beam(
-            beam, USUAL, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
-            work.gains[operation], work.free[operation],
-        )  # fmt: skip
+        return transfer_beam(beam, part, USUAL, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
     sizes = Sizes(beam.bending, beam.axial, beam.points)
-    return transfer_beam(
-        beam, sizes, tables, scratch, state.z, c, sn, motion, t.gravity, work.position, work.s, work.p, m,
-        work.gains[operation], work.free[operation],
-    )  # fmt: skip
+    return transfer_beam(beam, part, sizes, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
 
 
 @inner
@@ -71,22 +67,22 @@ def clear_cut(work, m):
 
 
 @kernel
-def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
+def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condensed):
     """Carry the cut in `work`, m slots wide, from the end of operation `last - 1` inwards through operation `first`.
 
-    Besides the cut it writes what others read after it: gains and free parts for `sweep_out`; what joints and ends of cylinders
-    condensed (`Work.blocks`, `Work.ends`) for `clearance_pins.coarseness` and for counting natural frequencies.
+    condensed : Condensed
+        Written: what `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies are given.
 
     Returns
     -------
     status, negative, m : int
-        OK or SINGULAR; the number of negative pivots in the beams (joints: see `Work.blocks`); slots of the cut now.
+        OK or SINGULAR; the number of negative pivots in the beams (joints: see `Condensed.blocks`); slots of the cut now.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
         if kind == BEAM:
-            count = beam_operation(t, state, work, motion, row, k, c, sn, m)
+            count = beam_operation(t, state, work, condensed, motion, row, k, c, sn, m)
             if count < 0:
                 return SINGULAR, negative, m
             negative += count
@@ -100,28 +96,28 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
             m = merge_outlet(s, p, m, c * bx - sn * by, sn * bx + c * by)
             p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:
-            m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
+            m = join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:
-            if not close_loop(t, state, work, motion, drive, drive_rate, row, k, m):
+            if not close_loop(t, state, work, condensed, motion, drive, drive_rate, row, k, m):
                 return SINGULAR, negative, m
             m += 2
-        elif kind == JOINT_A and not close_base(t, work, k):
+        elif kind == JOINT_A and not close_base(t, work, condensed, k):
             return SINGULAR, negative, m
     return OK, negative, m
 
 
 @kernel
-def sweep_out(t, state, work, first, last, m):
+def sweep_out(t, state, work, condensed, first, last, m):
     """Increments of the unknowns of operations `first` .. `last - 1` from the cut before them, m slots in `work.cut`.
 
-    Uses the gains that `sweep_in` kept; writes what to ADD to the unknowns into `work.dz`.
+    `condensed` is what `sweep_in` wrote. What to ADD to the unknowns is written into `work.dz`.
     """
     cut, dz = work.cut, work.dz
     for k in range(first, last):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
-        gains, free = work.gains[k], work.free[k]
+        gains, free = condensed.gains[k], condensed.free[k]
         if kind == BEAM:
-            out_beam(t.beams[row], t.psi[row], work.rho[row], work.drho[row], gains, free, c, sn, m, cut, dz)
+            out_beam(t.beams[row], beam_part(t, work, row), gains, free, c, sn, m, cut, dz)
         elif kind == OFFSET:
             bx, by = t.offsets[row].x, t.offsets[row].y
             cut[0] -= (sn * bx + c * by) * cut[2]
@@ -136,9 +132,9 @@ def sweep_out(t, state, work, first, last, m):
             m -= 1
             bx, by = t.outlets[row].x, t.outlets[row].y
             rx, ry = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
-            move_ends(t, work, t.cylinders[0], 0.0, 0.0, rx, ry, cut[m])
+            move_ends(t, work, condensed, t.cylinders[0], 0.0, 0.0, rx, ry, cut[m])
         elif kind == JOINT_B:
-            m = open_loop(t, state, work, row, gains, free, m)
+            m = open_loop(t, state, work, condensed, row, k, m)
         elif kind == JOINT_A:
             at = t.joints[row].z
             for i in range(2 + 2 * t.joints[row].clearances):
@@ -151,9 +147,9 @@ def sweep_out(t, state, work, first, last, m):
 
 
 @inner
-def out_beam(beam, psi, rho, drho, gains, free, c, sn, m, cut, dz):
+def out_beam(beam, part, gains, free, c, sn, m, cut, dz):
     """Increments of a beam part's coordinates, and of its output end."""
-    end = beam.points
+    psi, rho, drho, end = part.psi, part.rho, part.drho, beam.points
     dx, dy, turn = -rho[end, 1] * cut[2], rho[end, 0] * cut[2], 0.0  # in the axes of the input end
     for a in range(beam.bending + beam.axial):
         value = -free[a]

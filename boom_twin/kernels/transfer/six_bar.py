@@ -106,7 +106,7 @@ def _add_link(t, joint, linkage, side, turns, motion, position, g, h):
 
 
 @inner
-def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
+def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g, h):
     """The cylinder between pin C and the rod pin on its link."""
     linkage, cylinder, pins = t.linkages[index], t.cylinders[index], state.pins[index]
     own_g, own_h = work.own_g, work.own_h
@@ -114,7 +114,7 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
         cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[index], drive_rate[index], motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
-    condense_ends(t, state, work, cylinder, own_g, own_h)
+    condense_ends(t, state, work, condensed, cylinder, own_g, own_h)
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
     wx, wy = rotated(c, s, linkage.along, linkage.left)
     base, link = SECTION, ALPHA_R
@@ -148,12 +148,12 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
 
 
 @inner
-def _add_side(t, state, work, index, side, motion, drive, drive_rate, g, h):
+def _add_side(t, state, work, condensed, index, side, motion, drive, drive_rate, g, h):
     """Link L or R of joint `index`, with the cylinder if it pushes on it."""
     linkage = t.linkages[index]
     _add_link(t, t.joints[index], linkage, side, state.turns[index], motion, work.position, g, h)
     if linkage.mount == side:
-        _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
+        _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g, h)
 
 
 @inner
@@ -167,7 +167,7 @@ def _add_cut(work, m, behind, g, h):
 
 
 @inner
-def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
+def close_loop(t, state, work, condensed, motion, drive, drive_rate, index, operation, m):
     """Condense joint B `index`: the cut of section i (m slots) becomes the cut at the head, pin C carried as slots 3 and 4.
 
     Returns False if the loop's system is singular (a linkage at its dead centre, no inertia).
@@ -180,26 +180,26 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
         for j in range(i + 1):
             h[i, j] = 0.0
     if joint.clearances == 0:
-        _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
-        _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
+        _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
+        _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
         _add_cut(work, m, behind, g, h)
         _add_closure(joint, linkage, state.z, turns, g, h)
-        return _condense_loop(work, index, operation, INNER, size)
+        return _condense_loop(work, condensed, index, operation, INNER, size)
     keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
+    _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_L_PIN, size, g, h)
     keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
+    _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_R_PIN, size, g, h)
     _add_cut(work, m, behind, g, h)
     take_rows(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, g, h)
     free_pins(t, state, work, joint, g, h)
-    return _condense_loop(work, index, operation, behind - SECTION, size)
+    return _condense_loop(work, condensed, index, operation, behind - SECTION, size)
 
 
 @inner
-def _condense_loop(work, index, operation, count, size):
+def _condense_loop(work, condensed, index, operation, count, size):
     """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten.
 
     A Newton pass wants H d + g = 0. With the inner unknowns q and all others x,
@@ -215,7 +215,7 @@ def _condense_loop(work, index, operation, count, size):
     the five others before SECTION meet q in its rows, those behind it in its columns.
     """
     s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
-    block, gains, free, others = work.blocks[index], work.gains[operation], work.free[operation], size - count
+    block, gains, free, others = condensed.blocks[index], condensed.gains[operation], condensed.free[operation], size - count
     for i in range(count):
         for j in range(SECTION):
             right[i, j] = h[SECTION + i, j]
@@ -247,16 +247,16 @@ def _condense_loop(work, index, operation, count, size):
 
 
 @inner
-def open_loop(t, state, work, index, gains, free, m):
+def open_loop(t, state, work, condensed, index, operation, m):
     """Increments of joint B `index` from the cut at its head (m slots), which becomes that of section i; returns its slots."""
-    joint, cut, dz = t.joints[index], work.cut, work.dz
+    joint, cut, dz, gains, free = t.joints[index], work.cut, work.dz, condensed.gains[operation], condensed.free[operation]
     for i in range(INNER + 2 * joint.clearances):
         value = -free[i]
         for j in range(m):
             value -= gains[i, j] * cut[j]
         dz[joint.z + i] = value
     if t.cylinders[index].clearances:
-        _move_cylinder(t, state, work, index)
+        _move_cylinder(t, state, work, condensed, index)
     for k in range(joint.clearances):
         if t.clearances[joint.first_clearance + k].place == PIVOT:
             cut[0] += dz[joint.z + INNER + 2 * k]
@@ -268,7 +268,7 @@ def open_loop(t, state, work, index, gains, free, m):
 
 
 @inner
-def _move_cylinder(t, state, work, index):
+def _move_cylinder(t, state, work, condensed, index):
     """Increments of the ends of a six-bar's cylinder from those of its pins."""
     joint, linkage, cut, dz = t.joints[index], t.linkages[index], work.cut, work.dz
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
@@ -282,4 +282,4 @@ def _move_cylinder(t, state, work, index):
         if (place == LINK_L_PIN) == (linkage.mount == LINK_L) and place != Q_PIN:
             rx, ry = rx + dz[at], ry + dz[at + 1]
     rx, ry = rx - by * base - wy * link, ry + bx * base + wx * link
-    move_ends(t, work, t.cylinders[index], cut[PIN_C], cut[PIN_C + 1], rx, ry, dz[joint.z + Z_FORCE_B])
+    move_ends(t, work, condensed, t.cylinders[index], cut[PIN_C], cut[PIN_C + 1], rx, ry, dz[joint.z + Z_FORCE_B])

@@ -14,7 +14,7 @@ from .clearance_pins import condense_ends, torque_of
 
 
 @inner
-def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
+def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m):
     """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); the cut gains the column N. Returns m + 1."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
@@ -23,7 +23,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
         cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[0], drive_rate[0], motion, t.gravity, work.position, g, h,
     )  # fmt: skip
-    condense_ends(t, state, work, cylinder, g, h)
+    condense_ends(t, state, work, condensed, cylinder, g, h)
     bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
     for i in range(m + 1):
         s[m, i] = 0.0
@@ -50,7 +50,7 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
 
 
 @inner
-def close_base(t, work, operation):
+def close_base(t, work, condensed, operation):
     """Solve increments of joint A into the gains of `operation`: theta, N, and x, y if the pivot has clearance.
 
     False if singular.
@@ -77,9 +77,9 @@ def close_base(t, work, operation):
             a[2 + i, 0] += hold[TORQUE_X + i]
     for i in range(size):
         for j in range(size):
-            work.blocks[0, i, j] = a[i, j]
+            condensed.blocks[0, i, j] = a[i, j]
     if not solve(a, b, size, 1):
         return False
     for i in range(size):
-        work.free[operation, i] = b[i, 0]
+        condensed.free[operation, i] = b[i, 0]
     return True

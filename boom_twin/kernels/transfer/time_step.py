@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..elements.pin_contact import CLOSED, bearing
+from ..elements.pin_contact import CLOSED, Journal, bearing
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
-from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables, Work
+from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .matrix_product import plain_pass
@@ -50,6 +50,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         On failure the histories stay as they were, or as the last sub-step left them.
     """
     history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
+    condensed = work.condensed
     part, least = first_part(t, state, scheme), least_part(t, scheme)
     coarse = max(least, TICKS // MOST)
     now = scheme
@@ -65,9 +66,9 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             load_pins(t, state, work, motion)
             if product is None:
                 clear_cut(work, FREE)
-                solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+                solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, condensed)
                 if solved == OK:
-                    sweep_out(t, state, work, ROOT, operations, FREE)
+                    sweep_out(t, state, work, condensed, ROOT, operations, FREE)
             else:
                 solved = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
             if solved == OK:
@@ -77,7 +78,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             status = verdict(work, solved, size, tolerance, passes)
             left -= 1
         total += passes - left
-        error = coarseness(t, state, work, now)
+        error = coarseness(t, state, work, condensed, now)
         if (status != OK and part > least) or (error > 1.0 and part > coarse):
             part //= 2
             for i in range(state.z.shape[0]):
@@ -194,8 +195,9 @@ def observe_pins(t, state, out):
         if row.friction > 0.0:
             turning = v[row.turn]
         ax, ay = axis_of(t, state, row)
-        fx, fy, _, _, _, _, _, _, _ = bearing(row, memory, x, y, vx, vy, vx, vy, turning, ax, ay, 0.0)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(fx, fy), memory[CLOSED]
+        journal = Journal(x=x, y=y, vx=vx, vy=vy, before_x=vx, before_y=vy, turning=turning, axis_x=ax, axis_y=ay)
+        hold = bearing(row, memory, journal, 0.0)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(hold.x, hold.y), memory[CLOSED]
 
 
 @kernel
@@ -249,40 +251,33 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
 def tables_of(b, i):
     """Tables of boom `i` of a stack; they differ in numbers only, so `tip` is common."""
     return Tables(
-        b.operations[i], b.joints[i], b.linkages[i], b.links[i], b.offsets[i], b.bodies[i], b.beams[i], b.psi[i], b.weights[i],
-        b.stiffness[i], b.point_mass[i], b.point_rotary[i], b.outlets[i], b.cylinders[i], b.parts[i], b.clearances[i],
-        b.gravity[i], b.moving[i], b.scale[i], b.tip,
+        operations=b.operations[i], joints=b.joints[i], linkages=b.linkages[i], links=b.links[i], offsets=b.offsets[i],
+        bodies=b.bodies[i], beams=b.beams[i], psi=b.psi[i], weights=b.weights[i], stiffness=b.stiffness[i],
+        point_mass=b.point_mass[i], point_rotary=b.point_rotary[i], outlets=b.outlets[i], cylinders=b.cylinders[i],
+        parts=b.parts[i], clearances=b.clearances[i],
+        gravity=b.gravity[i], moving=b.moving[i], scale=b.scale[i], tip=b.tip,
     )  # fmt: skip
 
 
 @inner
 def state_of(b, i):
     """State of boom `i` of a stack."""
-    return State(b.z[i], b.history[i], b.frames[i], b.turns[i], b.pins[i], b.contacts[i], b.drives[i], b.pace[i])
-
-
-@inner
-def work_of(b, i):
-    """Work of boom `i` of a stack."""
-    return Work(
-        b.position[i], b.velocity[i], b.acceleration[i], b.hat[i], b.offset[i], b.weights[i],
-        b.finer[i], b.s[i], b.p[i], b.g[i], b.h[i], b.own_g[i], b.own_h[i],
-        b.matrix[i], b.right[i], b.gains[i], b.free[i], b.block[i], b.blocks[i], b.ends[i], b.end_gains[i],
-        b.end_free[i], b.hold[i], b.apart[i], b.rho[i], b.drho[i], b.angles[i], b.turn[i], b.local[i], b.drive[i],
-        b.drive_rate[i], b.dz[i], b.cut[i],
+    return State(
+        z=b.z[i], history=b.history[i], frames=b.frames[i], turns=b.turns[i], pins=b.pins[i], contacts=b.contacts[i],
+        drives=b.drives[i], pace=b.pace[i],
     )  # fmt: skip
 
 
 @kernel
-def run_each(tables, states, works, first, last, steps, counts, drives, rates, family, parameter, tolerance, passes, out, ends):
-    """`run` for booms `first` .. `last - 1` of a stack.
+def run_each(tables, states, work, first, last, steps, counts, drives, rates, family, parameter, tolerance, passes, out, ends):
+    """`run` for booms `first` .. `last - 1` of a stack, one after the other in the same `work`.
 
     drives, rates : (booms, steps in all, n), m and m/s. out : (booms, rows, row_width), see `run`.
     ends : ndarray of int, shape (booms, 3): status, row, passes of each, see `run`.
     """
     for i in range(first, last):
         status, row, total, _, _ = run(
-            tables_of(tables, i), state_of(states, i), work_of(works, i), steps, counts, drives[i], rates[i],
+            tables_of(tables, i), state_of(states, i), work, steps, counts, drives[i], rates[i],
             family, parameter, tolerance, passes, None, out[i],
         )  # fmt: skip
         ends[i, 0], ends[i, 1], ends[i, 2] = status, row, total

@@ -14,7 +14,7 @@ from ..kinematics import linkage_of
 from ..schema import Joint, Point, Section
 from ..yaml_reader import Place
 from .findings import Draft, Finding, odd, wrong
-from .values import LINK_KEYS
+from .values import NEEDED
 
 TOLERANCE = 1e-9
 
@@ -148,8 +148,7 @@ def _geometry(draft: Draft, i: int) -> np.record | None:
     if joint.kind == "A":
         complete = draft.base is not None and first is not None and first.rod_pin is not None
     else:
-        keys = LINK_KEYS if joint.kind == "B1" else (*LINK_KEYS, "R")
-        complete = all(getattr(joint, key) is not None for key in keys)
+        complete = all(getattr(joint, key) is not None for key in NEEDED[joint.kind])
     return linkage_of(joint, draft.base, first) if complete else None
 
 

@@ -18,6 +18,8 @@ BEAM_NEEDS = ("A", "I", "rho_A")
 BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
 LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "R", "mL", "mR")
+NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
+"""Keys of a joint by its kind."""
 
 
 def counts(draft: Draft) -> Iterator[Finding]:
@@ -123,9 +125,8 @@ def _kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
 
 def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     place = ("joints", i)
-    needed = {"A": (), "B1": LINK_KEYS}.get(joint.kind, (*LINK_KEYS, "R"))
     refused = {"A": SIX_BAR_ONLY, "B1": ("R",)}.get(joint.kind, ())
-    for key in needed:
+    for key in NEEDED[joint.kind]:
         if getattr(joint, key) is None:
             remedy = f"Give {key}, {MEANING[Joint][key]}."
             yield wrong(draft, (*place, key), ABSENT, f"a joint of kind {joint.kind} needs it", remedy)
@@ -142,11 +143,7 @@ def _range(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     if not -360 <= low < high <= 360:
         bound = "[low, high] must have -360 <= low < high <= 360 degrees"
         yield wrong(
-            draft,
-            ("joints", i, "range_deg"),
-            joint.range_deg,
-            bound,
-            "Give the lower angle first, both within one turn.",
+            draft, ("joints", i, "range_deg"), joint.range_deg, bound, "Give the lower angle first, both within one turn."
         )
 
 

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UsageError
-from ...scene.edit import parameter, parameter_names, with_parameters
+from ...scene.edit import parameter, parameter_names, scaled, with_parameters
 from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
 from ...types import SECOND, Array
 from .session import RigSession
@@ -207,13 +207,9 @@ def _factor(share: float, rng: np.random.Generator) -> float:
 def _joint(joint: Joint, share: float, rng: np.random.Generator) -> Joint:
     links = {key: getattr(joint, key) for key in ("mL", "mR")}
     parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in ("barrel", "rod")}
-    cylinder = {key: _heavier(part, _factor(share, rng)) for key, part in parts.items() if part is not None}
+    cylinder = {key: scaled(part, _factor(share, rng)) for key, part in parts.items() if part is not None}
     changes = {key: mass * _factor(share, rng) for key, mass in links.items() if mass is not None}
     return joint.model_copy(update={**changes, "cylinder": joint.cylinder.model_copy(update=cylinder)})
-
-
-def _heavier(part: CylinderPart, factor: float) -> CylinderPart:
-    return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
 
 
 SPIKE_SHARE = 0.02  # of the readings

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import UsageError
-from ...scene.kinematics import stroke_curve, strokes_of_posture
+from ...scene.kinematics import stroke_range, strokes_of_posture
 from ...scene.schema import Scene
 from ...types import Array
 from .exudyn.system import section_frames
@@ -106,6 +106,7 @@ BUNDLED_MOVES = (
 """Cylinder (0-based), start (s), duration (s), target (m): for the default scene from its posture arch."""
 
 TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
+SAMPLES = 91  # of a joint's range
 MARGIN = 0.08  # of the range of a stroke, kept free at both ends
 HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
 FIRST_HOLD = 3.0  # s
@@ -144,17 +145,6 @@ def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> 
         now, time = aim, time + span + rng.uniform(*HOLD)
 
 
-def stroke_range(scene: Scene, cylinder: int) -> tuple[float, float]:
-    """Least and greatest stroke (m) within both ``max_stroke`` and ``range_deg``."""
-    joint = scene.joints[cylinder]
-    angles = np.radians(np.linspace(joint.range_deg[0], joint.range_deg[1], 91))
-    curve = stroke_curve(scene, cylinder, angles)
-    low, high = max(0.0, float(np.nanmin(curve))), min(joint.cylinder.max_stroke, float(np.nanmax(curve)))
-    if low >= high:
-        raise UsageError(f"cylinder_{cylinder + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
-    return low, high
-
-
 def tip_speed(scene: Scene, programme: Programme, times: Array) -> Array:
     """Speed of the tip (m/s) between successive `times` (m,), shape (m - 1,), of the undeformed boom."""
     end = (scene.sections[-1].length, 0.0)
@@ -166,7 +156,9 @@ def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng:
     """Random targets of some cylinders, drawn nearer until the tip is slow enough."""
     aim = now.copy()
     for i in cylinders:
-        low, high = stroke_range(scene, i)
+        low, high = stroke_range(scene, i, SAMPLES)
+        if low >= high:
+            raise UsageError(f"cylinder_{i + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
         free = MARGIN * (high - low)
         aim[i] = rng.uniform(low + free, high - free)
     while True:

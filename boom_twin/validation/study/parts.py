@@ -37,7 +37,7 @@ HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest 
 
 
 @dataclass(frozen=True)
-class Part:
+class VariantCost:
     """One variant and what it does.
 
     Attributes
@@ -62,21 +62,21 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Parts:
+class PartsStudy:
     """A study. `full_times`: a step of the full model, measured twice, s; `parts` ascend in the error of the tip."""
 
     course: StrokeCourse
     frequencies: Array
     full_times: tuple[float, float]
     unknowns: int
-    parts: tuple[Part, ...]
+    parts: tuple[VariantCost, ...]
 
-    def saved(self, part: Part) -> float:
+    def saved(self, part: VariantCost) -> float:
         """Share of the full model's run time that leaving the part out saves; negative where it costs."""
         return 1.0 - part.step_time / self.full_times[0]
 
 
-def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> Parts:
+def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsStudy:
     """Every variant of a scene against the scene itself, times the least of `rounds`.
 
     Raises
@@ -95,14 +95,14 @@ def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> Parts:
     times[able] = least[1:-1]
     parts = [_part(scene, *row, full, course) for row in zip(found, answers, times.tolist(), strict=True)]
     parts.sort(key=lambda part: (part.deviation.worst, part.variant.name))
-    return Parts(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
+    return PartsStudy(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
 
 
-def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Response, course: StrokeCourse) -> Part:
+def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Response, course: StrokeCourse) -> VariantCost:
     shifts = np.full(FREQUENCIES, np.nan)
     both = min(len(found.frequencies), len(full.frequencies))
     shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0
-    return Part(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
+    return VariantCost(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
@@ -120,7 +120,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     return paths
 
 
-def as_json(found: Parts) -> dict[str, Any]:
+def as_json(found: PartsStudy) -> dict[str, Any]:
     """All numbers, SI units, shares as fractions."""
     return {
         "at_rest_in": found.course.names,
@@ -147,7 +147,7 @@ def as_json(found: Parts) -> dict[str, Any]:
     }
 
 
-def as_markdown(found: Parts) -> str:
+def as_markdown(found: PartsStudy) -> str:
     """The report: how it was measured, and one table, ascending in the error of the tip."""
     frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies)
     first, second = (1e6 * time for time in found.full_times)
@@ -165,7 +165,7 @@ def as_markdown(found: Parts) -> str:
     return "\n".join(lines)
 
 
-def _row(found: Parts, part: Part) -> Sequence[object]:
+def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
     off, good = part.deviation, part.status == "ok"
     errors = (1e3 * off.rest, off.where, 1e3 * off.rms, 1e3 * off.most) if good else (None, None, None, None)
     shifts = [100.0 * float(shift) for shift in part.shifts]
@@ -173,10 +173,10 @@ def _row(found: Parts, part: Part) -> Sequence[object]:
     return [part.variant.name, *errors, *shifts, *time, part.unknowns, part.status]
 
 
-def bars(found: Parts) -> Bars:
+def bars(found: PartsStudy) -> Bars:
     """What the picture shows: all but single sections with more modes than they have."""
 
-    def shown(part: Part) -> bool:
+    def shown(part: VariantCost) -> bool:
         single = part.variant.kind == "modes" and len(part.variant.edits) == 1
         return part.status == "ok" and not (single and part.unknowns > found.unknowns)
 

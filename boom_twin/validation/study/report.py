@@ -48,8 +48,6 @@ def _cpu() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-__all__ = ["machine", "provenance", "table", "write_json"]
-
 SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig."
 
 

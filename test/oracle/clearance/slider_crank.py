@@ -15,7 +15,7 @@ from math import asin, pi
 import numpy as np
 
 from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.validation.reference.worn_pin.impacts import Motion, follow
+from boom_twin.validation.reference.worn_pin.impacts import ContactMotion, follow
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class SliderCrank:
         turn = -self.speed * hand.real / arm.real
         return [psi, (hand + arm).real, turn, (1j * (self.speed * hand + turn * arm)).real]
 
-    def run(self, turns, rows, tolerance=1e-9, method="DOP853") -> Motion:
+    def run(self, turns, rows, tolerance=1e-9, method="DOP853") -> ContactMotion:
         """From crank angle 0, the pin in the middle of the bush, over some turns of the crank."""
         period = 2.0 * pi / self.speed
         absolute = tolerance * np.array([1e-3, 1e-3, 1.0, 1.0])

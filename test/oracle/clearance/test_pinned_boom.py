@@ -54,7 +54,8 @@ def test_energy(law, loses):
     drive = geometry.cylinder_length(document, HEADINGS[:1], 0)
     found = boom.follow(lambda time: (drive, 0.0), boom.rest(drive, 0.5), np.linspace(0.0, 0.06, 2001), rate=0.3)
     distance = np.hypot(*found.offset.T)
-    total = found.energy + [boom.contact.stored(d - boom.contact.clearance) for d in distance]
+    depth, n = np.maximum(distance - boom.contact.clearance, 0.0), boom.contact.exponent
+    total = found.energy + boom.contact.stiffness * depth ** (n + 1.0) / (n + 1.0)
     moving = 0.5 * boom.part.at(0.5).inertia * 0.3**2
     assert len(found.episodes) >= 2
     if loses:

@@ -52,7 +52,7 @@ def test_accelerations_are_those_of_lagrange(scene, posture, fineness):
     assert max((abs(c.v) for c in boom.closures), default=0.0) < 1e-12
     assert np.abs(found - expected[own]).max() < 1e-9 * np.abs(expected).max()
     assert placed.lengths.value == pytest.approx([length.v for length in boom.lengths], abs=1e-12)
-    assert placed.tip.place[0] == pytest.approx([boom.tip[0].v, boom.tip[1].v], abs=1e-12)
+    assert placed.tip.value[0] == pytest.approx([boom.tip[0].v, boom.tip[1].v], abs=1e-12)
     assert placed.joints == pytest.approx([joint.v for joint in boom.joints], abs=1e-12)
     assert forces[equations.rigid] == pytest.approx(multipliers, rel=1e-9)
 

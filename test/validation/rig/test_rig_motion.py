@@ -9,9 +9,9 @@ pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import joint_angles_of_strokes
+from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
 from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
-from boom_twin.validation.rig.motion import BUNDLED_MOVES, stroke_range, tip_speed
+from boom_twin.validation.rig.motion import BUNDLED_MOVES, SAMPLES, tip_speed
 
 SCENE = load_scene()
 
@@ -49,7 +49,7 @@ def test_overlapping_moves_are_refused():
 def test_programmes_stay_in_range(programme):
     strokes = programme(np.linspace(0.0, 60.0, 121))[0]
     for cylinder in range(4):
-        low, high = stroke_range(SCENE, cylinder)
+        low, high = stroke_range(SCENE, cylinder, SAMPLES)
         assert low < strokes[:, cylinder].min() and strokes[:, cylinder].max() < high
     assert np.isfinite([joint_angles_of_strokes(SCENE, row) for row in strokes[::10]]).all()  # raises if out of reach
 

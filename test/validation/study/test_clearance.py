@@ -12,7 +12,7 @@ from boom_twin.analysis.motions import halt
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.validation.study.clearance import report as clearance
-from boom_twin.validation.study.clearance.convergence import Convergence, Track, convergence, errors, one_pin
+from boom_twin.validation.study.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
 from boom_twin.validation.study.clearance.rest_stop_cost import main_frequency, shifts, swings
 from boom_twin.validation.study.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 
@@ -60,8 +60,8 @@ def test_main_frequency() -> None:
 
 
 def test_errors_are_shares_of_what_is_right() -> None:
-    right = Track(np.ones((5, 2)), np.full((5, 2), 2.0), np.full((5, 1), 4.0))
-    wrong = Track(np.ones((5, 2)) + 1e-3, np.full((5, 2), 2.2), np.full((5, 1), 5.0))
+    right = MotionRows(np.ones((5, 2)), np.full((5, 2), 2.0), np.full((5, 1), 4.0))
+    wrong = MotionRows(np.ones((5, 2)) + 1e-3, np.full((5, 2), 2.2), np.full((5, 1), 5.0))
     assert errors([wrong], right)[0] == pytest.approx([1.0, 10.0, 25.0])
 
 

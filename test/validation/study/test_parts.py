@@ -19,18 +19,18 @@ from boom_twin.validation.study.clearance.scenes import with_play
 
 
 @pytest.fixture(scope="module")
-def found(two_sections: Scene) -> parts.Parts:
+def found(two_sections: Scene) -> parts.PartsStudy:
     return parts.measure(two_sections, deviation.course_of(two_sections), rounds=1)
 
 
-def test_every_variant_is_there_ascending_in_error(found: parts.Parts, two_sections: Scene) -> None:
+def test_every_variant_is_there_ascending_in_error(found: parts.PartsStudy, two_sections: Scene) -> None:
     assert {part.variant for part in found.parts} == set(variants(two_sections))
     errors = [part.deviation.worst for part in found.parts]
     assert errors == sorted(errors) and all(np.isfinite(errors))
     assert all(part.status == "ok" and part.step_time > 0.0 for part in found.parts)
 
 
-def test_its_numbers_are_those_of_the_edited_scene(found: parts.Parts, two_sections: Scene) -> None:
+def test_its_numbers_are_those_of_the_edited_scene(found: parts.PartsStudy, two_sections: Scene) -> None:
     part = next(part for part in found.parts if part.variant.name == "cylinder 2 incompressible")
     second = two_sections.joints[1]
     cylinder = second.cylinder.model_copy(update={"k": None, "d": None})
@@ -44,7 +44,7 @@ def test_its_numbers_are_those_of_the_edited_scene(found: parts.Parts, two_secti
     assert part.unknowns == found.unknowns
 
 
-def test_what_leaves_more_out_has_less_unknowns(found: parts.Parts) -> None:
+def test_what_leaves_more_out_has_less_unknowns(found: parts.PartsStudy) -> None:
     unknowns = {part.variant.name: part.unknowns for part in found.parts}
     assert unknowns["all sections rigid"] < unknowns["all sections with modes: 1"] < unknowns["all sections with modes: 2"]
     assert unknowns["all sections with modes: 2"] < found.unknowns < unknowns["all sections with modes: 4"]
@@ -76,7 +76,7 @@ def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, mon
     assert "a sentence" in row and "nan" not in row and "inf" not in row
 
 
-def test_the_files(found: parts.Parts, two_sections: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_files(found: parts.PartsStudy, two_sections: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "measure", lambda *_: found)
     out = tmp_path / "deep" / "out"
     written = parts.write(two_sections, out, quick=True)

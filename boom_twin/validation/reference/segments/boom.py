@@ -21,7 +21,7 @@ Place = tuple[Jet, Jet]
 
 
 @dataclass
-class Mass:
+class LumpedMass:
     """A mass (kg) at a point with an inertia (kg m^2) about it; x, y, turn are jets."""
 
     mass: float
@@ -32,11 +32,11 @@ class Mass:
 
 
 @dataclass
-class Boom:
+class SegmentBoom:
     """A boom at one set of coordinates."""
 
     tip: tuple[Jet, Jet, Jet]
-    masses: list[Mass] = field(default_factory=list)
+    masses: list[LumpedMass] = field(default_factory=list)
     springs: list[tuple[float, float, Jet]] = field(default_factory=list)  # stiffness, damping, elongation
     closures: list[Jet] = field(default_factory=list)  # are zero
     lengths: list[Jet] = field(default_factory=list)  # of the cylinders
@@ -74,12 +74,12 @@ class Segments:
         """Cylinder lengths (m) of the undeformed boom."""
         return np.array([length.v for length in self.place(self.start(angles)).lengths])
 
-    def place(self, q: Array) -> Boom:
+    def place(self, q: Array) -> SegmentBoom:
         """The boom at coordinates q."""
         jets, n = iter(coordinates(q)), len(q)
         (px, py), (cx, cy) = self.scene.base.pivot, self.scene.base.cylinder_pin
         x, y, head = constant(px, n), constant(py, n), constant(0.0, n)
-        pin, boom = (constant(cx, n), constant(cy, n)), Boom((x, y, head))
+        pin, boom = (constant(cx, n), constant(cy, n)), SegmentBoom((x, y, head))
         for i, joint in enumerate(self.scene.joints):
             theta = next(jets)
             boom.joints.append(theta - head)
@@ -92,11 +92,11 @@ class Segments:
             pin = found.get("C", pin)
         boom.tip = x, y, head
         if self.scene.tip is not None and self.scene.tip.payload:
-            boom.masses.append(Mass(self.scene.tip.payload, 0.0, x, y, head))
+            boom.masses.append(LumpedMass(self.scene.tip.payload, 0.0, x, y, head))
         return boom
 
     def _section(
-        self, boom: Boom, i: int, x: Jet, y: Jet, theta: Jet, jets: Iterator[Jet]
+        self, boom: SegmentBoom, i: int, x: Jet, y: Jet, theta: Jet, jets: Iterator[Jet]
     ) -> tuple[Jet, Jet, Jet, dict[str, Place]]:
         found: dict[str, Place] = {}
         parts = pieces(self.scene, i, self.fineness)
@@ -109,14 +109,14 @@ class Segments:
             if part.springs == 0:
                 for body in rigid_masses(self.scene, i, part.x0, part.x1):
                     at = _point((x, y), theta, body.com[0] - part.x0, body.com[1])
-                    boom.masses.append(Mass(body.mass, body.inertia, *at, theta))
+                    boom.masses.append(LumpedMass(body.mass, body.inertia, *at, theta))
                 x, y = _point((x, y), theta, part.x1 - part.x0, 0.0)
                 continue
             x, y, theta = self._beam(boom, i, (part.x1 - part.x0) / part.springs, part.springs, (x, y), theta, jets)
         return x, y, theta, found
 
     def _beam(
-        self, boom: Boom, i: int, h: float, springs: int, place: Place, theta: Jet, jets: Iterator[Jet]
+        self, boom: SegmentBoom, i: int, h: float, springs: int, place: Place, theta: Jet, jets: Iterator[Jet]
     ) -> tuple[Jet, Jet, Jet]:
         """Half a piece, a spring, half a piece; as often as there are springs. Stretch is shared by both halves."""
         (x, y), beta = place, self.scene.sections[i].beta or 0.0
@@ -130,11 +130,11 @@ class Segments:
                 if side == 1:
                     theta = theta + turn
                 c, s = cos(theta), sin(theta)
-                boom.masses.append(Mass(mass, inertia, x + 0.5 * half * c, y + 0.5 * half * s, theta))
+                boom.masses.append(LumpedMass(mass, inertia, x + 0.5 * half * c, y + 0.5 * half * s, theta))
                 x, y = x + half * c, y + half * s
         return x, y, theta
 
-    def _linkage(self, boom: Boom, joint: Joint, pivot: Place, head: Jet, theta: Jet, links: tuple[Jet, Jet]) -> Place:
+    def _linkage(self, boom: SegmentBoom, joint: Joint, pivot: Place, head: Jet, theta: Jet, links: tuple[Jet, Jet]) -> Place:
         """Closure in pin Q, masses of the links; returns the rod pin."""
         assert joint.D and joint.E and joint.lL and joint.lR
         d, e = _point(pivot, head, *joint.D), _point(pivot, theta, *joint.E)
@@ -142,7 +142,7 @@ class Segments:
         boom.closures += [left[0] - right[0], left[1] - right[1]]
         for mass, length, start, turn in ((joint.mL, joint.lL, d, links[0]), (joint.mR, joint.lR, e, links[1])):
             if mass:
-                boom.masses.append(Mass(mass, mass * length**2 / 12, *_point(start, turn, 0.5 * length, 0.0), turn))
+                boom.masses.append(LumpedMass(mass, mass * length**2 / 12, *_point(start, turn, 0.5 * length, 0.0), turn))
         along, aside = joint.R or (0.0, 0.0)
         if joint.kind == "B1":
             return left
@@ -151,7 +151,7 @@ class Segments:
         # B3: from Q along Q->E (against link R), and to the left of that direction
         return _point(right, links[1], -along, -aside)
 
-    def _cylinder(self, boom: Boom, cylinder: Cylinder, pin: Place, rod: Place) -> None:
+    def _cylinder(self, boom: SegmentBoom, cylinder: Cylinder, pin: Place, rod: Place) -> None:
         dx, dy = rod[0] - pin[0], rod[1] - pin[1]
         length = root(dx * dx + dy * dy)
         boom.lengths.append(length)
@@ -161,7 +161,7 @@ class Segments:
         for part, start, sign in ((cylinder.barrel, pin, 1.0), (cylinder.rod, rod, -1.0)):
             if part is not None:
                 at = start[0] + sign * part.com * ux, start[1] + sign * part.com * uy
-                boom.masses.append(Mass(part.mass, part.inertia, *at, turn))
+                boom.masses.append(LumpedMass(part.mass, part.inertia, *at, turn))
 
 
 def _point(place: Place, theta: Jet, ahead: float, aside: float) -> Place:

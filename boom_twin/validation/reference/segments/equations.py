@@ -17,28 +17,28 @@ import numpy as np
 from ....scene.schema import Scene
 from ....types import Array
 from .geometry import Bodies, Linkages, gravity_in_base
-from .kinematics import Points, Turns, all_turns, carried, chain_points, fixed, joined, spans, tables_of
+from .kinematics import Quantities, carried, chain_points, fixed, joined, segment_tables, spans
 
 Drive = Callable[[float], tuple[Array, Array, Array]]
 """Time (s) -> lengths (m), rates (m/s) and accelerations (m/s^2) of the drives, each (n,)."""
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedBoom:
     """A boom at one instant: its masses with their headings, the cylinders' lengths, the joint angles, the tip."""
 
-    masses: Points
-    turns: Turns
-    lengths: Turns
+    masses: Quantities
+    turns: Quantities
+    lengths: Quantities
     joints: Array
-    tip: Points
+    tip: Quantities
 
 
 class Equations:
     """A scene cut into about 4 `fineness` springs in every flexible section; 0 makes all sections rigid."""
 
     def __init__(self, scene: Scene, drive: Drive, fineness: int) -> None:
-        self.scene, self.drive, self.tables = scene, drive, tables_of(scene, fineness)
+        self.scene, self.drive, self.tables = scene, drive, segment_tables(scene, fineness)
         self.linkages = Linkages(scene.joints[1:])
         self.bodies = Bodies(scene)
         cylinders = [joint.cylinder for joint in scene.joints]
@@ -54,7 +54,7 @@ class Equations:
         """Number of coordinates."""
         return len(self.tables.stiffness)
 
-    def place(self, q: Array, v: Array) -> Placed:
+    def place(self, q: Array, v: Array) -> PlacedBoom:
         """The boom at coordinates q with rates v."""
         t, bodies = self.tables, self.bodies
         points, headings = chain_points(t, self.scene.base.pivot, q, v)
@@ -77,18 +77,18 @@ class Equations:
             carried(barrel_pins, axes, bodies.barrel, zero),
             carried(rod_pins, axes, -bodies.rod, zero),
         )
-        turns = all_turns(headings[t.link[:count]], left, right, axes, axes)
+        turns = joined(headings[t.link[:count]], left, right, axes, axes)
         first = headings.value[:1]
-        return Placed(masses, turns, lengths, np.concatenate([first, own.value - before.value]), points[t.tip : t.tip + 1])
+        return PlacedBoom(masses, turns, lengths, np.concatenate([first, own.value - before.value]), points[t.tip : t.tip + 1])
 
-    def _links(self, before: Turns, own: Turns) -> tuple[Turns, Turns]:
+    def _links(self, before: Quantities, own: Quantities) -> tuple[Quantities, Quantities]:
         """Headings of links L and R between the heads `before` and the roots `own`."""
         phi, rate = own.value - before.value, own.rate - before.rate
         difference = own.jacobian - before.jacobian
         found = []
         for link in self.linkages.angles(phi):
             found.append(
-                Turns(
+                Quantities(
                     before.value + link.value,
                     before.rate + link.first * rate,
                     before.jacobian + link.first[:, None] * difference,
@@ -97,7 +97,7 @@ class Equations:
             )
         return found[0], found[1]
 
-    def accelerations(self, time: float, q: Array, v: Array) -> tuple[Array, Array, Placed]:
+    def accelerations(self, time: float, q: Array, v: Array) -> tuple[Array, Array, PlacedBoom]:
         """Second derivatives of the coordinates, forces of all cylinders (N, tension positive), and the boom."""
         placed = self.place(q, v)
         forces = self._spring_forces(time, placed)
@@ -126,12 +126,12 @@ class Equations:
         found[n:] = -np.linalg.solve(matrix, right)[:n]
         return found
 
-    def _spring_forces(self, time: float, placed: Placed) -> Array:
+    def _spring_forces(self, time: float, placed: PlacedBoom) -> Array:
         """Forces (N) of the oil springs and dampers; 0 for incompressible cylinders."""
         length, rate, _ = self.drive(time)
         return np.asarray(self.k * (placed.lengths.value - length) + self.d * (placed.lengths.rate - rate))
 
-    def _generalised(self, placed: Placed, q: Array, v: Array) -> Array:
+    def _generalised(self, placed: PlacedBoom, q: Array, v: Array) -> Array:
         """Forces on the coordinates: weight, inertia forces at zero second derivatives, springs of the segments."""
         load = self.weight - self.mass[:, None] * placed.masses.bias
         moment = self.inertia * placed.turns.bias
@@ -139,12 +139,12 @@ class Equations:
         force = load.ravel() @ placed.masses.jacobian.reshape(-1, n) - moment @ placed.turns.jacobian
         return np.asarray(force - self.tables.stiffness * q - self.tables.damping * v)
 
-    def _mass_matrix(self, placed: Placed) -> Array:
+    def _mass_matrix(self, placed: PlacedBoom) -> Array:
         rows = (np.sqrt(self.mass)[:, None, None] * placed.masses.jacobian).reshape(-1, self.size)
         turning = np.sqrt(self.inertia)[:, None] * placed.turns.jacobian
         return np.asarray(rows.T @ rows + turning.T @ turning)
 
-    def _demand(self, time: float, placed: Placed) -> Array:
+    def _demand(self, time: float, placed: PlacedBoom) -> Array:
         return np.asarray((self.drive(time)[2] - placed.lengths.bias)[self.rigid])
 
     @staticmethod

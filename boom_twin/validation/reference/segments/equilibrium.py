@@ -1,16 +1,12 @@
-"""Equilibrium and small vibrations of the finite-segment reference boom, from its energy."""
+"""Equilibrium of the finite-segment reference boom, from its energy."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from scipy.linalg import eigh, null_space
 
 from ....errors import SolverError
-from ....scene.schema import Scene
 from ....types import Array
-from .boom import Boom, Segments
+from .boom import SegmentBoom, Segments
 from .equations import Jet
 
 PASSES = 60
@@ -18,7 +14,7 @@ SETTLED = 1e-11  # m and rad, largest increment
 LONGEST = 0.1  # m and rad, in one pass
 
 
-def energy(model: Segments, boom: Boom, drive: Array) -> tuple[Jet, list[Jet]]:
+def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[Jet]]:
     """Potential energy (J), and the list of all constraints: closures first, then incompressible cylinders."""
     n = len(boom.tip[0].g)
     v, g, h = 0.0, np.zeros(n), np.zeros((n, n))
@@ -36,7 +32,7 @@ def energy(model: Segments, boom: Boom, drive: Array) -> tuple[Jet, list[Jet]]:
     return Jet(v, g, h), constraints
 
 
-def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, Boom, Array, Array]:
+def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, SegmentBoom, Array, Array]:
     """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad).
 
     Returns
@@ -70,50 +66,3 @@ def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, Bo
         q = q + share * dq
         multipliers = step[len(q) :] if share == 1.0 else multipliers + share * (step[len(q) :] - multipliers)
     raise SolverError("the finite-segment boom found no equilibrium. Check masses and stiffnesses, or take another posture.")
-
-
-def mass_matrix(boom: Boom) -> Array:
-    """Of all coordinates."""
-    rows = [math.sqrt(m.mass) * axis.g for m in boom.masses for axis in (m.x, m.y)]
-    rows += [math.sqrt(m.inertia) * m.turn.g for m in boom.masses]
-    jacobian = np.array(rows).reshape(-1, len(boom.tip[0].g))
-    return np.asarray(jacobian.T @ jacobian)
-
-
-def frequencies(model: Segments, boom: Boom, hessian: Array, count: int = 6) -> Array:
-    """Lowest natural frequencies (Hz) within the constraints."""
-    _, constraints = energy(model, boom, np.array([length.v for length in boom.lengths]))
-    n = len(hessian)
-    free = null_space(np.array([c.g for c in constraints])) if constraints else np.eye(n)
-    if free.shape[1] == 0:
-        return np.zeros(0)
-    values = eigh(free.T @ hessian @ free, free.T @ mass_matrix(boom) @ free, eigvals_only=True)
-    if values[0] <= 0.0:
-        raise SolverError("the equilibrium of the finite-segment boom is not stable. Take another posture.")
-    return np.asarray(np.sqrt(values[:count]) / (2.0 * math.pi))
-
-
-def statics(scene: Scene, fineness: int, drive: Array, angles: Array, modes: int = 6) -> Array:
-    """Tip (2,), joints (n,), cylinder forces (n,) and frequencies (<= modes,) in one row."""
-    model = Segments(scene, fineness)
-    _, boom, multipliers, hessian = equilibrium(model, drive, angles)
-    tip, joints = np.array([boom.tip[0].v, boom.tip[1].v]), np.array([joint.v for joint in boom.joints])
-    forces = cylinder_forces(scene, boom, drive, multipliers[len(boom.closures) :])
-    return np.concatenate([tip, joints, forces, frequencies(model, boom, hessian, modes)])
-
-
-def cylinder_forces(scene: Scene, boom: Boom, drive: Array, multipliers: Array) -> Array:
-    """Tension between barrel and rod (N), shape (n,): of the spring, or the multiplier of a rigid cylinder."""
-    rigid = iter(multipliers)
-    return np.array(
-        [
-            next(rigid) if joint.cylinder.k is None else joint.cylinder.k * (length.v - reference)
-            for joint, length, reference in zip(scene.joints, boom.lengths, drive, strict=True)
-        ]
-    )
-
-
-def extrapolated(scene: Scene, drive: Array, angles: Array, coarse: int = 2, modes: int = 6) -> Array:
-    """`statics` with Richardson extrapolation from `coarse` and twice that."""
-    a, b = (statics(scene, fineness, drive, angles, modes) for fineness in (coarse, 2 * coarse))
-    return np.asarray(b + (b - a) / 3.0)

@@ -20,7 +20,7 @@ Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Tables:
+class SegmentTables:
     """k links, p points on them, n coordinates, s sections.
 
     Attributes
@@ -42,7 +42,7 @@ class Tables:
     rod_pin : int
         Point at which the rod of cylinder 1 is pinned.
     barrel_pin, d, e : ndarray of int, shape (s - 1,)
-        Points C, D and E of every six-bar.
+        Quantities C, D and E of every six-bar.
     tip : int
         The tip's point.
     """
@@ -78,7 +78,7 @@ class _Draft:
     pins: list[dict[str, tuple[int, float, float]]] = field(default_factory=list)
 
 
-def tables_of(scene: Scene, fineness: int) -> Tables:
+def segment_tables(scene: Scene, fineness: int) -> SegmentTables:
     """Lay a scene down with about 4 `fineness` springs in every flexible section."""
     draft = _Draft()
     for index in range(len(scene.sections)):
@@ -124,7 +124,7 @@ def _beam(draft: _Draft, scene: Scene, index: int, h: float, springs: int, turni
     return turning
 
 
-def _finish(scene: Scene, draft: _Draft) -> Tables:
+def _finish(scene: Scene, draft: _Draft) -> SegmentTables:
     n, count = len(draft.springs), len(draft.links)
     turn, stretch = np.zeros((count, n)), np.zeros((count, n))
     for k, (_, turning, stretching) in enumerate(draft.links):
@@ -145,7 +145,7 @@ def _finish(scene: Scene, draft: _Draft) -> Tables:
     barrel_pin, d, e = (np.arange(first + i, len(points), 3) for i in range(3))
     stiffness, damping = np.array(draft.springs).T
     mass, inertia = np.array([mass[4:] for mass in draft.masses]).reshape(-1, 2).T
-    return Tables(
+    return SegmentTables(
         turn, stretch, np.array([row[0] for row in draft.links]), link.astype(np.int64), ahead, aside, share,
         mass, inertia, stiffness, damping, root, head,
         first - 1, barrel_pin, d, e, first - 2,
@@ -153,62 +153,50 @@ def _finish(scene: Scene, draft: _Draft) -> Tables:
 
 
 @dataclass(frozen=True)
-class Points:
-    """p points. With coordinates q, the acceleration of a point is `jacobian` q'' + `bias`.
+class Quantities:
+    """p functions of the coordinates q: headings (rad) or lengths (m), or points (m), which have a second axis of size 2.
 
     Attributes
     ----------
-    place, velocity, bias : ndarray, shape (p, 2)
-    jacobian : ndarray, shape (p, 2, n)
+    value, rate, bias : ndarray, shape (p,) or (p, 2)
+        The second rate is `jacobian` q'' + `bias`.
+    jacobian : ndarray, shape (p, n) or (p, 2, n)
     """
-
-    place: Array
-    velocity: Array
-    jacobian: Array
-    bias: Array
-
-    def __getitem__(self, which: slice | Places) -> Points:
-        return Points(*(values[which] for values in (self.place, self.velocity, self.jacobian, self.bias)))
-
-
-@dataclass(frozen=True)
-class Turns:
-    """Headings (rad) of p frames: value, rate, Jacobian (p, n), and second rate at zero second derivatives."""
 
     value: Array
     rate: Array
     jacobian: Array
     bias: Array
 
-    def __getitem__(self, which: slice | Places) -> Turns:
-        return Turns(*(values[which] for values in (self.value, self.rate, self.jacobian, self.bias)))
+    def __getitem__(self, which: slice | Places) -> Quantities:
+        return Quantities(*(values[which] for values in (self.value, self.rate, self.jacobian, self.bias)))
 
 
-def joined(*groups: Points) -> Points:
-    """All points of some groups in one."""
-    rows = [(group.place, group.velocity, group.jacobian, group.bias) for group in groups]
-    return Points(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+def joined(*groups: Quantities) -> Quantities:
+    """All of some groups in one."""
+    rows = [(group.value, group.rate, group.jacobian, group.bias) for group in groups]
+    return Quantities(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def fixed(place: tuple[float, float], n: int) -> Points:
+def fixed(place: tuple[float, float], n: int) -> Quantities:
     """One point of the base."""
-    return Points(np.array([place]), np.zeros((1, 2)), np.zeros((1, 2, n)), np.zeros((1, 2)))
+    return Quantities(np.array([place]), np.zeros((1, 2)), np.zeros((1, 2, n)), np.zeros((1, 2)))
 
 
-def carried(origin: Points, turns: Turns, ahead: Array, aside: Array) -> Points:
+def carried(origin: Quantities, turns: Quantities, ahead: Array, aside: Array) -> Quantities:
     """Points at (`ahead`, `aside`), each (p,) in m, in frames that turn about the points `origin`."""
     c, s = np.cos(turns.value), np.sin(turns.value)
     arm = np.stack([ahead * c - aside * s, ahead * s + aside * c], axis=1)
     across = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-    return Points(
-        origin.place + arm,
-        origin.velocity + across * turns.rate[:, None],
+    return Quantities(
+        origin.value + arm,
+        origin.rate + across * turns.rate[:, None],
         origin.jacobian + across[:, :, None] * turns.jacobian[:, None, :],
         origin.bias + across * turns.bias[:, None] - arm * (turns.rate**2)[:, None],
     )
 
 
-def chain_points(tables: Tables, base: tuple[float, float], q: Array, v: Array) -> tuple[Points, Turns]:
+def chain_points(tables: SegmentTables, base: tuple[float, float], q: Array, v: Array) -> tuple[Quantities, Quantities]:
     """All points of `tables` and the headings of its links at coordinates q with rates v, each (n,)."""
     t = tables
     heading, omega, stretch, speed = t.turn @ q, t.turn @ v, t.stretch @ q, t.stretch @ v
@@ -216,18 +204,18 @@ def chain_points(tables: Tables, base: tuple[float, float], q: Array, v: Array) 
     along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     sides = along[:, :, None] * t.stretch[:, None, :] + (across * length[:, None])[:, :, None] * t.turn[:, None, :]
-    ends = Points(
+    ends = Quantities(
         np.add(_summed(along * length[:, None]), base),
         _summed(along * speed[:, None] + across * (length * omega)[:, None]),
         _summed(sides),
         _summed(across * (2.0 * speed * omega)[:, None] - along * (length * omega**2)[:, None]),
     )
     k = t.link
-    turns = Turns(heading, omega, t.turn, np.zeros(len(heading)))
+    turns = Quantities(heading, omega, t.turn, np.zeros(len(heading)))
     points = carried(ends[k], turns[k], t.ahead + t.share * stretch[k], t.aside)
     moving = t.share != 0.0
     k, share = k[moving], t.share[moving, None]
-    points.velocity[moving] += share * along[k] * speed[k, None]
+    points.rate[moving] += share * along[k] * speed[k, None]
     points.jacobian[moving] += (share * along[k])[:, :, None] * t.stretch[k][:, None, :]
     points.bias[moving] += share * across[k] * (2.0 * speed * omega)[k, None]
     return points, turns
@@ -240,23 +228,19 @@ def _summed(steps: Array) -> Array:
     return sums
 
 
-def spans(barrel: Points, rod: Points) -> tuple[Turns, Turns]:
-    """Lengths (as values with rate, Jacobian and bias) and headings of the cylinders between their pins."""
-    span, speed = rod.place - barrel.place, rod.velocity - barrel.velocity
+def spans(barrel: Quantities, rod: Quantities) -> tuple[Quantities, Quantities]:
+    """Lengths and headings of the cylinders between their pins."""
+    span, speed = rod.value - barrel.value, rod.rate - barrel.rate
     jacobian, bias = rod.jacobian - barrel.jacobian, rod.bias - barrel.bias
     length = np.hypot(span[:, 0], span[:, 1])
     along = span / length[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     rate, turning = np.sum(along * speed, axis=1), np.sum(across * speed, axis=1) / length
-    lengths = Turns(length, rate, np.einsum("ij,ijk->ik", along, jacobian), np.sum(along * bias, axis=1) + length * turning**2)
-    headings = Turns(
+    lengths = Quantities(
+        length, rate, np.einsum("ij,ijk->ik", along, jacobian), np.sum(along * bias, axis=1) + length * turning**2
+    )
+    headings = Quantities(
         np.arctan2(span[:, 1], span[:, 0]), turning, np.einsum("ij,ijk->ik", across, jacobian) / length[:, None],
         (np.sum(across * bias, axis=1) - 2.0 * rate * turning) / length,
     )  # fmt: skip
     return lengths, headings
-
-
-def all_turns(*groups: Turns) -> Turns:
-    """All headings of some groups in one."""
-    rows = [(group.value, group.rate, group.jacobian, group.bias) for group in groups]
-    return Turns(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))

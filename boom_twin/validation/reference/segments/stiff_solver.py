@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -25,7 +25,7 @@ MOST = 400  # coordinates; beyond, the equilibrium alone takes minutes
 
 
 @dataclass(frozen=True)
-class Followed:
+class SegmentMotion:
     """A motion at given times; m rows, n cylinders.
 
     Attributes
@@ -59,7 +59,7 @@ def follow(
     tolerance: float,
     solver: Solver = "Radau",
     repeats: int = 1,
-) -> Followed:
+) -> SegmentMotion:
     """Start at rest in the equilibrium of the drive at the first time and follow it.
 
     Parameters
@@ -90,6 +90,19 @@ def follow(
     if size > MOST:
         raise UsageError(f"fineness = {fineness}: the boom has {size} coordinates, at most {MOST} are sensible. Take less.")
     equations, start = Equations(scene, drive, fineness), _start(scene, drive(float(times[0]))[0], angles, fineness)
+    seconds: list[float] = []
+    while not seconds or (len(seconds) < repeats and sum(seconds) < LONG):
+        begun = time.perf_counter()
+        found = _solved(equations, start, times, tolerance, solver)
+        seconds.append(time.perf_counter() - begun)
+    rows = [_row(equations, at, state[:size], state[size:]) for at, state in zip(times, found.y.T, strict=True)]
+    tip, acceleration, joints, forces = (np.array(column) for column in zip(*rows, strict=True))
+    return SegmentMotion(tip, acceleration, joints, forces, statistics.median(seconds), int(found.nfev), size)
+
+
+def _solved(equations: Equations, start: Array, times: Array, tolerance: float, solver: Solver) -> Any:
+    """The solver's states at `times`, from rest at the coordinates `start`; SolverError if it gave up."""
+    size = len(start)
 
     def rates(at: float, state: Array) -> Array:
         return np.concatenate([state[size:], equations.accelerations(at, state[:size], state[size:])[0]])
@@ -99,19 +112,13 @@ def follow(
 
     absolute = ABSOLUTE * tolerance * np.repeat([1.0, 10.0], size)
     span, first = (float(times[0]), float(times[-1])), np.concatenate([start, np.zeros(size)])
-    seconds: list[float] = []
-    while not seconds or (len(seconds) < repeats and sum(seconds) < LONG):
-        begun = time.perf_counter()
-        try:
-            found = solve_ivp(rates, span, first, solver, t_eval=times, rtol=tolerance, atol=absolute, jac=slopes)
-        except np.linalg.LinAlgError:
-            raise SolverError("the mass matrix is singular: a part can move without any mass. Give it one.") from None
-        if not found.success:
-            raise SolverError(f"{solver} stopped at t = {found.t[-1]:g} s: {found.message}. Take another tolerance.")
-        seconds.append(time.perf_counter() - begun)
-    rows = [_row(equations, at, state[:size], state[size:]) for at, state in zip(times, found.y.T, strict=True)]
-    tip, acceleration, joints, forces = (np.array(column) for column in zip(*rows, strict=True))
-    return Followed(tip, acceleration, joints, forces, statistics.median(seconds), int(found.nfev), size)
+    try:
+        found = solve_ivp(rates, span, first, solver, t_eval=times, rtol=tolerance, atol=absolute, jac=slopes)
+    except np.linalg.LinAlgError:
+        raise SolverError("the mass matrix is singular: a part can move without any mass. Give it one.") from None
+    if not found.success:
+        raise SolverError(f"{solver} stopped at t = {found.t[-1]:g} s: {found.message}. Take another tolerance.")
+    return found
 
 
 def _start(scene: Scene, lengths: Array, angles: Array, fineness: int) -> Array:
@@ -127,4 +134,4 @@ def _start(scene: Scene, lengths: Array, angles: Array, fineness: int) -> Array:
 
 def _row(equations: Equations, at: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
     acceleration, forces, placed = equations.accelerations(at, q, v)
-    return placed.tip.place[0], placed.tip.jacobian[0] @ acceleration + placed.tip.bias[0], placed.joints, forces
+    return placed.tip.value[0], placed.tip.jacobian[0] @ acceleration + placed.tip.bias[0], placed.joints, forces

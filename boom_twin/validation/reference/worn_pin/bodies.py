@@ -18,7 +18,7 @@ from .geometry import Document, Mass, Point, Turn, dot, links, on_left, on_right
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedBodies:
     """A part at one heading.
 
     Attributes
@@ -49,8 +49,8 @@ class Lever:
     pin: complex
     tip: complex
 
-    def at(self, phi: float) -> Placed:
-        """See `Placed`."""
+    def at(self, phi: float) -> PlacedBodies:
+        """See `PlacedBodies`."""
         turn = Turn(phi, 1.0, 0.0)
         bodies = [(self.body, Point(self.pivot, 0j, 0j) + turn.arm(self.body.at), turn)]
         return _placed(bodies, Point(self.pivot, 0j, 0j) + turn.arm(self.pin))
@@ -70,8 +70,8 @@ class SixBar:
     before: float
     tip: complex
 
-    def at(self, phi: float) -> Placed:
-        """See `Placed`."""
+    def at(self, phi: float) -> PlacedBodies:
+        """See `PlacedBodies`."""
         joint, angle, turn = self.joint, phi - self.before, Turn(phi, 1.0, 0.0)
         left, right = links(joint, angle)
         long, short = joint["lL"], joint["lR"]
@@ -91,9 +91,9 @@ class SixBar:
         return point.seen_from(self.pivot, self.before)
 
 
-def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> Placed:
+def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> PlacedBodies:
     """`bodies`: mass, place and turn of each."""
-    return Placed(
+    return PlacedBodies(
         sum(b.mass * abs(z.first) ** 2 + b.inertia * t.first**2 for b, z, t in bodies),
         2.0 * sum(b.mass * (z.first.conjugate() * z.second).real + b.inertia * t.first * t.second for b, z, t in bodies),
         sum(b.mass * z.first for b, z, _ in bodies),
@@ -103,7 +103,7 @@ def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> Placed:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class OilCylinder:
     """Barrel pin (complex, m), oil spring (N/m) and damper (N s/m), barrel and rod (kg, kg m^2, m from their own pins)."""
 
     pin: complex

@@ -109,8 +109,3 @@ class Contact:
         size = abs(force)
         depth = (size / self.stiffness) ** (1.0 / self.exponent)
         return complex((self.clearance + depth - 0.25 * self.smoothing**2 / depth) * force / size)
-
-    def stored(self, gap: float) -> float:
-        """Energy (J) of a sharp contact."""
-        n = self.exponent
-        return float(self.stiffness * max(gap, 0.0) ** (n + 1.0) / (n + 1.0))

@@ -45,7 +45,7 @@ class Episode:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ContactMotion:
     """States (m, n) at times (m,), the entry speed that held at each (nan in flight), and the episodes of contact."""
 
     times: Array
@@ -64,7 +64,7 @@ def follow(
     breaks: Sequence[float] = (),
     longest: float = np.inf,
     method: str = "Radau",
-) -> Motion:
+) -> ContactMotion:
     """Follow a motion with one contact.
 
     Parameters
@@ -83,13 +83,13 @@ def follow(
 
     Returns
     -------
-    Motion
+    ContactMotion
     """
     stops = [*sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
     options = {"method": method, "rtol": rtol, "atol": atol, "max_step": longest}
     pieces = list(_pieces(rates, gap, times[0], np.array(start, dtype=float), stops, options))
     states, entries = _rows(pieces, times)
-    return Motion(times, states, entries, _episodes(pieces, gap))
+    return ContactMotion(times, states, entries, _episodes(pieces, gap))
 
 
 def _pieces(

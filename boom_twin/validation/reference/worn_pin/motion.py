@@ -26,10 +26,10 @@ from scipy.optimize import brentq
 from ....errors import UsageError
 from ....types import Array
 from . import geometry
-from .bodies import Cylinder, Lever, SixBar
+from .bodies import Lever, OilCylinder, SixBar
 from .contact import Contact
 from .geometry import Document, Point, dot
-from .impacts import Episode, Motion, follow
+from .impacts import ContactMotion, Episode, follow
 
 NEAR = 0.05  # rad, about the guess
 PASSES = 40
@@ -49,40 +49,13 @@ class Rest:
     tension: float
 
 
-def equilibrium(boom: PinnedBoom, drive: float, phi: float) -> Rest:
-    """`Rest` of a `PinnedBoom` at a length of the drive (m), within `NEAR` of heading `phi` (rad)."""
-    offset = 0j
-    for _ in range(PASSES):
-        rest = _held(boom, drive, phi, offset)
-        found = 0j if boom.contact is None else boom.contact.resting_offset(-rest.force)
-        if abs(found - offset) < SAME:
-            return rest
-        offset = found
-    raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
-
-
-def _held(boom: PinnedBoom, drive: float, phi: float, offset: complex) -> Rest:
-    """With the pin at `offset`."""
-
-    def at(angle: float) -> tuple[float, Rest]:
-        placed = boom.part.at(angle)
-        axis = placed.pin.value + offset - boom.cylinder.pin
-        length, psi = abs(axis), phase(axis)
-        tension = boom.cylinder.k * (length - drive)
-        force = boom.cylinder.holding(length, psi, tension, boom.gravity)
-        moment = dot(boom.gravity, placed.moments) - dot(force, placed.pin.first)
-        return moment, Rest(angle, length, psi, boom.part.tip_at(angle), offset, force, tension)
-
-    return at(brentq(lambda angle: at(angle)[0], phi - NEAR, phi + NEAR, xtol=1e-15))[1]
-
-
 Drive = Callable[[float], tuple[float, float]]
 
 LONGEST = 1e-2  # s, step
 
 
 @dataclass(frozen=True)
-class Followed:
+class PinMotion:
     """A motion in m rows.
 
     Tip (m), its acceleration (m/s^2), offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
@@ -106,13 +79,20 @@ class PinnedBoom:
     """`part`: a `Lever` or `SixBar`; `contact` None: an ideal pin, for `rest` only; gravity complex, m/s^2."""
 
     part: Lever | SixBar
-    cylinder: Cylinder
+    cylinder: OilCylinder
     contact: Contact | None
     gravity: complex
 
     def rest(self, drive: float, phi: float) -> Rest:
-        """See `equilibrium`."""
-        return equilibrium(self, drive, phi)
+        """Equilibrium at a length of the drive (m), within `NEAR` of heading `phi` (rad); ArithmeticError if there is none."""
+        offset = 0j
+        for _ in range(PASSES):
+            rest = self._held(drive, phi, offset)
+            found = 0j if self.contact is None else self.contact.resting_offset(-rest.force)
+            if abs(found - offset) < SAME:
+                return rest
+            offset = found
+        raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
 
     def follow(
         self,
@@ -123,8 +103,8 @@ class PinnedBoom:
         tolerance: float = 1e-8,
         method: str = "LSODA",
         rate: float = 0.0,
-    ) -> Followed:
-        """Motion from an equilibrium, as `Followed`.
+    ) -> PinMotion:
+        """Motion from an equilibrium, as `PinMotion`.
 
         Parameters
         ----------
@@ -184,16 +164,30 @@ class PinnedBoom:
             raise UsageError("contact = None: an ideal pin has an equilibrium but no motion here. Give a `Contact`.")
         return self.contact
 
+    def _held(self, drive: float, phi: float, offset: complex) -> Rest:
+        """The equilibrium with the pin at `offset`."""
+
+        def at(angle: float) -> tuple[float, Rest]:
+            placed = self.part.at(angle)
+            axis = placed.pin.value + offset - self.cylinder.pin
+            length, psi = abs(axis), phase(axis)
+            tension = self.cylinder.k * (length - drive)
+            force = self.cylinder.holding(length, psi, tension, self.gravity)
+            moment = dot(self.gravity, placed.moments) - dot(force, placed.pin.first)
+            return moment, Rest(angle, length, psi, self.part.tip_at(angle), offset, force, tension)
+
+        return at(brentq(lambda angle: at(angle)[0], phi - NEAR, phi + NEAR, xtol=1e-15))[1]
+
     def _pin(self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point) -> tuple[complex, complex]:
         rate = (speed + 1j * length * swing) * u - bush.first * turn
         return self.cylinder.pin + length * u - bush.value, rate
 
-    def _rows(self, drive: Drive, found: Motion, states: Array) -> Followed:
+    def _rows(self, drive: Drive, found: ContactMotion, states: Array) -> PinMotion:
         pins = [self.pin(state) for state in states]
         entries = [None if np.isnan(entry) else entry for entry in found.entries]
         drives = [drive(time) for time in found.times]
         both = list(zip(states, drives, strict=True))
-        return Followed(
+        return PinMotion(
             found.times,
             _pairs([self.part.tip_at(state[0]) for state in states]),
             _pairs([self._tip_acceleration(*row) for row in zip(drives, states, entries, strict=True)]),
@@ -237,5 +231,5 @@ def freed(document: Document, headings: Sequence[float] | Array, index: int, con
         part = SixBar(places[index], body, joint, headings[index - 1], tip)
     cylinder, pin = joint["cylinder"], geometry.pins(document, headings, index)[0]
     barrel, rod = ([p["mass"], p["inertia"], p["com"]] for p in (cylinder["barrel"], cylinder["rod"]))
-    oil = Cylinder(pin, cylinder["k"], cylinder.get("d", 0.0), *barrel, *rod)
+    oil = OilCylinder(pin, cylinder["k"], cylinder.get("d", 0.0), *barrel, *rod)
     return PinnedBoom(part, oil, contact, geometry.gravity(document))

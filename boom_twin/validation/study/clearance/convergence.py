@@ -18,7 +18,7 @@ from ....scene.schema import Cylinder, Joint, Scene
 from ....types import Array
 from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
 from ...reference.worn_pin.geometry import cylinder_length
-from ...reference.worn_pin.motion import Followed, PinnedBoom, freed
+from ...reference.worn_pin.motion import PinMotion, PinnedBoom, freed
 from .scenes import pin_like, pins_of, treated, with_pins, without_friction
 
 STEPS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)  # s
@@ -35,7 +35,7 @@ MEASURES = ("tip, mm", "acceleration of the tip, %", "force of the pin, %")
 
 
 @dataclass(frozen=True)
-class Track:
+class MotionRows:
     """m rows: tip (m), its acceleration (m/s^2), contact forces (N)."""
 
     tip: Array
@@ -44,7 +44,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Line:
+class ErrorCurve:
     """One program on one boom, coarse to fine.
 
     Attributes
@@ -83,7 +83,7 @@ class Line:
 class Convergence:
     """All lines, how far both references of the one pin are apart (`MEASURES`), and how long the motions last (s)."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[ErrorCurve, ...]
     apart: Array
     span: float
 
@@ -105,8 +105,8 @@ def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Conve
     runs = [peer(one, index, drive, span, tolerance) for tolerance in tolerances]
     lines += [
         line,
-        Line(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
-        Line(
+        ErrorCurve(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
+        ErrorCurve(
             line.case,
             "SciPy",
             "independent",
@@ -125,24 +125,24 @@ def _stopped(scene: Scene, posture: str | None, only: int | None) -> Halt:
 
 def _own(
     case: str, scene: Scene, drive: Halt, span: float, steps: tuple[float, ...], finest: float
-) -> tuple[Line, Track, list[Track]]:
+) -> tuple[ErrorCurve, MotionRows, list[MotionRows]]:
     runs = [
         march(scene, drive, span, step, round(ROW / step), angles=drive.angles, repeats=3 if step >= 1e-4 else 1)
         for step in (*steps, finest)
     ]
     tracks = [_track(run) for run in runs]
     found = errors(tracks[:-1], tracks[-1])
-    return Line(case, "boom_twin", "own", steps, found, tuple(run.seconds for run in runs[:-1])), tracks[-1], tracks[:-1]
+    return ErrorCurve(case, "boom_twin", "own", steps, found, tuple(run.seconds for run in runs[:-1])), tracks[-1], tracks[:-1]
 
 
-def _track(run: March) -> Track:
-    return Track(run.tip, run.tip_acceleration, run.pins[:, :, 2])
+def _track(run: March) -> MotionRows:
+    return MotionRows(run.tip, run.tip_acceleration, run.pins[:, :, 2])
 
 
-def errors(tracks: Sequence[Track], right: Track) -> Array:
+def errors(tracks: Sequence[MotionRows], right: MotionRows) -> Array:
     """`MEASURES` of every track, shape (k, 3)."""
 
-    def off(track: Track) -> list[float]:
+    def off(track: MotionRows) -> list[float]:
         return [
             1e3 * _rms(track.tip - right.tip),
             100.0 * _rms(track.acceleration - right.acceleration) / _rms(right.acceleration),
@@ -175,7 +175,7 @@ def _hard(joint: Joint) -> Joint:
     return joint.model_copy(update={"cylinder": cylinder})
 
 
-def peer(scene: Scene, index: int, drive: Halt, span: float, tolerance: float) -> tuple[Track, float]:
+def peer(scene: Scene, index: int, drive: Halt, span: float, tolerance: float) -> tuple[MotionRows, float]:
     """The motion by the independent model, and its run time (s)."""
     headings, document = np.cumsum(drive.angles), scene.model_dump(exclude_none=True)
     boom: PinnedBoom = freed(document, headings.tolist(), index, _contact(scene))
@@ -188,9 +188,9 @@ def peer(scene: Scene, index: int, drive: Halt, span: float, tolerance: float) -
     rest = boom.rest(cylinder_length(document, headings, index), float(headings[index]))
     times = np.asarray(ROW * np.arange(round(span / ROW) + 1), float)
     begun = time.perf_counter()
-    found: Followed = boom.follow(length, rest, times, (drive.ramp, drive.stop, drive.still), tolerance)
+    found: PinMotion = boom.follow(length, rest, times, (drive.ramp, drive.stop, drive.still), tolerance)
     seconds = time.perf_counter() - begun
-    return Track(found.tip, found.acceleration, np.hypot(*found.force.T)[:, None]), seconds
+    return MotionRows(found.tip, found.acceleration, np.hypot(*found.force.T)[:, None]), seconds
 
 
 def _contact(scene: Scene) -> Contact:

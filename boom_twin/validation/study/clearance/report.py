@@ -20,7 +20,7 @@ from ....scene.schema import IDEAL_BELOW, Scene
 from ....system.atomic_files import write_atomic
 from ..report import machine, provenance, table, write_json
 from . import convergence as near
-from .convergence import MEASURES, Convergence, Line, convergence
+from .convergence import MEASURES, Convergence, ErrorCurve, convergence
 from .rest_stop_cost import (
     BRAKE,
     COUNT,
@@ -54,8 +54,7 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
     head = [
         "# Play in the pins\n",
         f"Radial clearance: {told}; {block.contact.law}, exponent {block.contact.exponent:g}, restitution "
-        f"{block.contact.restitution:g}, friction {block.contact.friction:g}. Radii and clearances of the "
-        "package's block are "
+        f"{block.contact.restitution:g}, friction {block.contact.friction:g}. Radii and clearances of the package's block are "
         "surrogates.\n",
     ]
     parts = [_stops(swings), _rests(shifts), _convergence(found), _costs(costs)]
@@ -72,14 +71,11 @@ def _stops(found: list[Swing]) -> list[str]:
         "## After a stop\n",
         "![The tip after a stop](clearance.png)\n",
         "From rest in each posture the cylinders of the study's motion run at full speed (the whole stroke in 10 s, or as "
-        f"fast as the motion's travel allows), brake within {1e3 * BRAKE:g} ms, and hold for up to {HOLD:g} s. "
-        "Vertical movement "
-        "of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance "
-        "from that rest "
-        "after the stop (linearised pins: from the mean). Halved: stays "
-        f"within {SETTLED:g} of the peak from then on. Contacts lost are those seen from row to row; of "
-        "linearised pins, which pull as well, "
-        "those that contact would have lost.\n",
+        f"fast as the motion's travel allows), brake within {1e3 * BRAKE:g} ms, and hold for up to {HOLD:g} s. Vertical "
+        "movement of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance from "
+        f"that rest after the stop (linearised pins: from the mean). Halved: stays within {SETTLED:g} of the peak from then "
+        "on. Contacts lost are those seen from row to row; of linearised pins, which pull as well, those that contact would "
+        "have lost.\n",
         table(STOP_HEAD, rows),
     ]
 
@@ -99,14 +95,11 @@ def _rests(found: list[Shift]) -> list[str]:
         "## At rest\n",
         "![The resting tip](clearance_static.png)\n",
         "Distance (mm) of the resting tip from that with ideal pins, with play in one pin only. Lever: way of the tip for "
-        "the way of the cylinder, of the rigid boom's geometry; loaded: of the elastic boom under its "
-        "weight, by moving the "
-        "stroke. Ratio: the shift over loaded lever x (clearance + penetration), least and greatest over all "
-        "clearances. Below "
-        f"{1e6 * IDEAL_BELOW:g} um a pin is ideal; the tip then jumps by what the column says, at worst "
-        f"{1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}): mostly penetration, which the cap on the "
-        "contact's stiffness "
-        "leaves when the clearance is gone.\n",
+        "the way of the cylinder, of the rigid boom's geometry; loaded: of the elastic boom under its weight, by moving the "
+        "stroke. Ratio: the shift over loaded lever x (clearance + penetration), least and greatest over all clearances. "
+        f"Below {1e6 * IDEAL_BELOW:g} um a pin is ideal; the tip then jumps by what the column says, at worst "
+        f"{1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}): mostly penetration, which the cap on the contact's "
+        "stiffness leaves when the clearance is gone.\n",
         table(head, rows),
     ]
 
@@ -115,22 +108,18 @@ def _convergence(found: Convergence) -> list[str]:
     lines = [
         "## Convergence\n",
         "![Error against run time](clearance_convergence.png)\n",
-        f"A stop within {1e3 * near.BRAKE:g} ms out of full speed, {found.span:g} s in all, rows every "
-        f"{1e3 * near.ROW:g} ms; "
-        "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: "
-        "boom_twin with steps of "
-        f"{1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by hand in "
-        "three coordinates, integrated by SciPy's LSODA between touch and release "
-        "(`boom_twin/validation/reference/worn_pin`), tolerance "
-        f"{near.TIGHTEST:g}. It shares no equation with boom_twin but states the same contact law.\n",
+        f"A stop within {1e3 * near.BRAKE:g} ms out of full speed, {found.span:g} s in all, rows every {1e3 * near.ROW:g} ms; "
+        "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: boom_twin with "
+        f"steps of {1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by "
+        "hand in three coordinates, integrated by SciPy's LSODA between touch and release "
+        f"(`boom_twin/validation/reference/worn_pin`), tolerance {near.TIGHTEST:g}. It shares no equation with boom_twin but "
+        "states the same contact law.\n",
     ]
     if np.isfinite(found.apart).all():
         lines.append(
-            f"Both references of the one pin differ by {found.apart[0]:.2g} mm, {found.apart[1]:.2g} % of the "
-            "acceleration and "
-            f"{found.apart[2]:.2g} % of the force. Accelerations at steps below 20 us carry the round-off of "
-            "positions over "
-            "the square of the step: the run of 1 us is no reference for them, the independent one is.\n"
+            f"Both references of the one pin differ by {found.apart[0]:.2g} mm, {found.apart[1]:.2g} % of the acceleration "
+            f"and {found.apart[2]:.2g} % of the force. Accelerations at steps below 20 us carry the round-off of positions "
+            "over the square of the step: the run of 1 us is no reference for them, the independent one is.\n"
         )
     else:
         lines.append("Without the independent model: no cylinder has k, barrel and rod.\n")
@@ -148,7 +137,7 @@ def _convergence(found: Convergence) -> list[str]:
     ]
 
 
-def _line(line: Line) -> list[Sequence[object]]:
+def _line(line: ErrorCurve) -> list[Sequence[object]]:
     unit = (1e3, "ms") if line.program == "boom_twin" else (1.0, "")
     marks = [f"{unit[0] * mark:g} {unit[1]}".strip() for mark in line.marks]
     rows = zip(marks, line.errors.tolist(), line.seconds, strict=True)
@@ -160,9 +149,8 @@ def _costs(found: list[Cost]) -> list[str]:
     return [
         "## What a pin costs\n",
         f"Step 1 ms. Gentle: the move of the other studies. Violent: to full speed within {1e3 * RAMP:g} ms, after "
-        f"{1e3 * STOP:g} ms to a stop within {1e3 * HARD_BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. "
-        "Factor: real time "
-        "over run time.\n",
+        f"{1e3 * STOP:g} ms to a stop within {1e3 * HARD_BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. Factor: "
+        "real time over run time.\n",
         table(("pins", "treatment", "gentle, us a step", "factor", "violent, us a step", "factor"), rows),
     ]
 
@@ -239,7 +227,7 @@ def panels(found: Convergence) -> tuple[Panel, ...]:
     return tuple(Panel(name.split(",")[0], name, own) for name, own in zip(MEASURES, curves, strict=True))
 
 
-def _curve(found: Convergence, line: Line, measure: int) -> Curve:
+def _curve(found: Convergence, line: ErrorCurve, measure: int) -> Curve:
     family = FAMILIES[line.case, line.program]
     notes = [f"{1e3 * mark:g} ms" if line.program == "boom_twin" else f"{mark:.0e}" for mark in line.marks]
     some = tuple(note if number % 3 == 1 else "" for number, note in enumerate(notes))

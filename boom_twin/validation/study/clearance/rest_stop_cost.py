@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....analysis.equilibrium import settle, statics
+from ....analysis.equilibrium import rest_at, statics
 from ....analysis.methods import March, march
 from ....analysis.motions import Halt, halt, motion_of
-from ....compiler.compile import compile_scene
 from ....compiler.plan import first_row, taken_apart
 from ....scene.kinematics import posture_angles, strokes_of_posture
 from ....scene.schema import IDEAL_BELOW, Scene
@@ -90,9 +89,7 @@ def _loaded(scene: Scene, posture: str, index: int) -> float:
 
 def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array, Array, Array]:
     """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
-    plan = compile_scene(scene)
-    state = plan.state()
-    settle(plan, state, plan.work(), strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
+    plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
     found = taken_apart(plan, first_row(plan, state))
     return found.tip[0, :2], found.joints, found.pins
 

@@ -25,7 +25,7 @@ Long = np.longdouble
 
 
 @dataclass
-class Frame:
+class FrameIncrements:
     """A place and its increments per unknown. x, y, theta: m, m, rad; rows: (3, unknowns)."""
 
     x: np.longdouble
@@ -40,14 +40,14 @@ class Frame:
         moved = np.stack([self.rows[0] - by * self.rows[2], self.rows[1] + bx * self.rows[2]])
         return np.array([self.x + bx, self.y + by]), moved
 
-    def shifted(self, x: float, y: float) -> Frame:
+    def shifted(self, x: float, y: float) -> FrameIncrements:
         """The frame with its origin at (x, y)."""
         at, moved = self.point(x, y)
-        return Frame(at[0], at[1], self.theta, np.stack([*moved, self.rows[2]]))
+        return FrameIncrements(at[0], at[1], self.theta, np.stack([*moved, self.rows[2]]))
 
-    def turned(self, theta: np.longdouble, row: Array) -> Frame:
+    def turned(self, theta: np.longdouble, row: Array) -> FrameIncrements:
         """The frame at the same place with an orientation of its own."""
-        return Frame(self.x, self.y, theta, np.stack([self.rows[0], self.rows[1], row]))
+        return FrameIncrements(self.x, self.y, theta, np.stack([self.rows[0], self.rows[1], row]))
 
 
 @dataclass
@@ -65,7 +65,7 @@ class Kinematics:
         self.eye = np.eye(size, dtype=Long)
         self.moved = np.zeros((len(self.plan.masses), size), dtype=Long)
         t = self.plan.tables
-        frame = Frame(Long(0), Long(0), Long(0), np.zeros((3, size), dtype=Long))
+        frame = FrameIncrements(Long(0), Long(0), Long(0), np.zeros((3, size), dtype=Long))
         base = [Long(t.joints[0].x) + Long(t.linkages[0].cx), Long(t.joints[0].y) + Long(t.linkages[0].cy)]
         self.pins[0, 0] = np.array(base), np.zeros((2, size), dtype=Long)
         for operation in t.operations:
@@ -73,7 +73,7 @@ class Kinematics:
         self.tip = frame.rows
         self.moved[t.tip : t.tip + 3] = frame.rows
 
-    def _operate(self, kind: int, row: int, frame: Frame) -> Frame:
+    def _operate(self, kind: int, row: int, frame: FrameIncrements) -> FrameIncrements:
         t = self.plan.tables
         if kind == JOINT_A:
             joint = t.joints[row]
@@ -94,10 +94,10 @@ class Kinematics:
             return self._six_bar(row, frame)
         return frame
 
-    def _put(self, history: int, frame: Frame) -> None:
+    def _put(self, history: int, frame: FrameIncrements) -> None:
         self.moved[history : history + 3] = frame.rows
 
-    def _beam(self, row: int, frame: Frame) -> Frame:
+    def _beam(self, row: int, frame: FrameIncrements) -> FrameIncrements:
         """A straight beam part: its shapes turn and shift the points, its strain stretches it."""
         t = self.plan.tables
         beam, n = t.beams[row], int(t.beams[row].bending)
@@ -121,7 +121,7 @@ class Kinematics:
             self.moved[beam.history + 2 * beam.points + i] = ends[i].rows[2]
         return ends[-1]
 
-    def _six_bar(self, index: int, frame: Frame) -> Frame:
+    def _six_bar(self, index: int, frame: FrameIncrements) -> FrameIncrements:
         t = self.plan.tables
         joint, link = t.joints[index], t.linkages[index]
         section = frame.turned(Long(self.z[joint.z]), self.eye[joint.z])

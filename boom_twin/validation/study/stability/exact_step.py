@@ -29,7 +29,7 @@ ROUNDS = 12  # of equilibration, and most of refinement
 
 
 @dataclass(frozen=True)
-class Step:
+class StepRoundoff:
     """Round-off in one step of a boom.
 
     Attributes
@@ -56,7 +56,7 @@ def digits(error: float) -> float:
     return 16.0 if not math.isfinite(error) else min(16.0, max(0.0, math.log10(max(error, EPS) / EPS)))
 
 
-def one_step(scene: Scene, angles: Array, step: float, rho: float) -> Step:
+def one_step(scene: Scene, angles: Array, step: float, rho: float) -> StepRoundoff:
     """Compare on a boom at rest at joint `angles` (rad), undeformed, that gravity begins to move; step in s."""
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
@@ -74,7 +74,7 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> Step:
             return math.nan
         return float(np.linalg.norm(tip @ (increments - exact)) / np.linalg.norm(tip @ exact))
 
-    return Step(
+    return StepRoundoff(
         len(plan.names),
         system.condition(),
         error(_increments(plan, state, work, motion, _riccati)),
@@ -87,8 +87,8 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> Step:
 def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
     clear_cut(work, FREE)
     last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE)
-    sweep_out(plan.tables, state, work, ROOT, last, FREE)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE, work.condensed)
+    sweep_out(plan.tables, state, work, work.condensed, ROOT, last, FREE)
     return bool(status == OK)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from ..report import machine, provenance, table, write_json
 from .cases import Case, cases, days
 from .exact_step import digits
 from .roundoff import TARGET, TURN_UP_STEPS, Limit, Loss, TurnUp, limit_of, losses, turn_up
-from .runner import METHODS, Cell, Row, run
+from .runner import METHODS, CaseResult, Cell, run
 from .setups import move_in_words
 from .verdict import BOUNDS
 
@@ -53,8 +53,8 @@ def mark(cell: Cell) -> str:
 
 
 def text(
-    rows: Sequence[Row], long_rows: Sequence[Row], limits: dict[str, Limit], losses: Sequence[Loss], turned: TurnUp,
-    move: str,
+    rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: dict[str, Limit], losses: Sequence[Loss],
+    turned: TurnUp, move: str,
 ) -> str:  # fmt: skip
     """The whole report; `long_rows` are holds of a day, `move` tells of the scene's motion."""
     parts = [INTRODUCTION, f"The move: {move}. Cases take it, or a share of it, in 1 s unless they say otherwise.\n\n"]
@@ -69,7 +69,7 @@ def text(
     return "".join(parts)
 
 
-def _matrix(rows: Sequence[Row]) -> str:
+def _matrix(rows: Sequence[CaseResult]) -> str:
     methods = list(rows[0].cells)
     lines: list[list[object]] = [[_title(row), *(SYMBOLS[mark(cell)] for cell in row.cells.values())] for row in rows]
     counted: list[list[object]] = [
@@ -79,7 +79,7 @@ def _matrix(rows: Sequence[Row]) -> str:
     return table(["case", *methods], lines + counted)
 
 
-def _title(row: Row) -> str:
+def _title(row: CaseResult) -> str:
     return f"{row.case.group}: {row.case.name}"
 
 
@@ -88,7 +88,7 @@ def _bounds() -> str:
     return table(["symptom", "degrades above", "fails above"], lines)
 
 
-def _silent(rows: Sequence[Row]) -> str:
+def _silent(rows: Sequence[CaseResult]) -> str:
     found: dict[str, list[str]] = {}
     for row in rows:
         for method, cell in row.cells.items():
@@ -99,7 +99,7 @@ def _silent(rows: Sequence[Row]) -> str:
     return default + "".join(lines) if found else "None: no method, in no case.\n"
 
 
-def _symptoms(rows: Sequence[Row]) -> Iterator[str]:
+def _symptoms(rows: Sequence[CaseResult]) -> Iterator[str]:
     """One entry a case, methods with the same symptom together."""
     for row in rows:
         by_symptom: dict[str, list[str]] = {}
@@ -120,7 +120,7 @@ def _limits(limits: dict[str, Limit]) -> Iterator[str]:
         )
 
 
-def _long(rows: Sequence[Row]) -> str:
+def _long(rows: Sequence[CaseResult]) -> str:
     head = ["case", "right is", "verdict", "drift / path of the tip", "vibration, last quarter / first", "passes"]
     lines = []
     for row in rows:
@@ -171,10 +171,7 @@ def _progress(line: str) -> None:
     print(line, file=sys.stderr)
 
 
-def write(
-    scene: Scene, out: Path, quick: bool = False, posture: str | None = None, soak: bool = False,
-    tell: Callable[[str], None] = _progress,
-) -> list[Path]:  # fmt: skip
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None, soak: bool = False) -> list[Path]:
     """Run the study; write stability.json, stability.md, stability.png and stability_roundoff.png into `out`.
 
     Parameters
@@ -185,8 +182,6 @@ def write(
         Where motions of the scene start.
     soak : bool
         The holds of 24 simulated hours as well, by the default method.
-    tell : callable
-        Hears a line about each case.
 
     Returns
     -------
@@ -196,12 +191,12 @@ def write(
     out.mkdir(parents=True, exist_ok=True)
     scene = scene if posture is None else _only(scene, posture)
     chosen = [case for case in cases(scene) if case.quick or not quick]
-    rows = run(chosen, METHODS, tell)
-    long_rows = run(days(scene) if soak else (), {"default": METHODS["default"]}, tell)
+    rows = run(chosen, METHODS, _progress)
+    long_rows = run(days(scene) if soak else (), {"default": METHODS["default"]}, _progress)
     limits = {f"{case.group}: {case.name}": limit_of(case.make()) for case in chosen if _stuck(rows, case)}
-    tell("round-off in one step")
+    _progress("round-off in one step")
     lost = losses(scene, quick)
-    tell("error over the step")
+    _progress("error over the step")
     turned = turn_up(scene, QUICK_STEPS if quick else TURN_UP_STEPS)
     return write_files(out, rows, long_rows, limits, lost, turned, move_in_words(scene))
 
@@ -212,13 +207,19 @@ def _only(scene: Scene, posture: str) -> Scene:
     return scene.model_copy(update={"postures": {posture: scene.postures[posture]}})
 
 
-def _stuck(rows: Sequence[Row], case: Case) -> bool:
+def _stuck(rows: Sequence[CaseResult], case: Case) -> bool:
     """Whether a case did not start for want of an equilibrium."""
     return any(row.case is case and NO_EQUILIBRIUM in row.cells["default"].facts.status for row in rows)
 
 
 def write_files(
-    out: Path, rows: list[Row], long_rows: list[Row], limits: dict[str, Limit], lost: list[Loss], turned: TurnUp, move: str
+    out: Path,
+    rows: list[CaseResult],
+    long_rows: list[CaseResult],
+    limits: dict[str, Limit],
+    lost: list[Loss],
+    turned: TurnUp,
+    move: str,
 ) -> list[Path]:
     """Write all files from what was found; `long_rows` are holds of a day, `move` tells of the scene's motion."""
     names = ("stability.json", "stability.md", "stability.png", "stability_roundoff.png")
@@ -237,7 +238,7 @@ def write_files(
     return [numbers, report, matrix, roundoff]
 
 
-def _as_json(rows: list[Row], limits: dict[str, Limit], lost: list[Loss], turned: TurnUp) -> dict[str, Any]:
+def _as_json(rows: list[CaseResult], limits: dict[str, Limit], lost: list[Loss], turned: TurnUp) -> dict[str, Any]:
     """Everything that was found."""
     return {
         "machine": machine(),
@@ -256,7 +257,7 @@ def _as_json(rows: list[Row], limits: dict[str, Limit], lost: list[Loss], turned
     }
 
 
-def _case(row: Row) -> dict[str, Any]:
+def _case(row: CaseResult) -> dict[str, Any]:
     case = row.case
     return {
         "group": case.group,

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....analysis.equilibrium import settle
+from ....analysis.equilibrium import rest_at
 from ....analysis.methods import Method, march
 from ....analysis.modal import natural_modes
 from ....analysis.motions import motion_of
 from ....analysis.simulate import RHO
-from ....compiler.compile import compile_scene
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....scene.schema import Scene
@@ -20,7 +19,7 @@ from ....types import Array
 from ..long_booms import long_boom, seven_sections
 from . import setups as made
 from .cases import short
-from .exact_step import Step, one_step
+from .exact_step import StepRoundoff, one_step
 from .setups import Setup, lighter_gravity, smooth
 
 COUNTS, QUICK_COUNTS = (2, 3, 5, 10, 20, 50, 100, 200), (2, 5, 20)
@@ -35,7 +34,7 @@ class Loss:
     group: str
     name: str
     value: float
-    step: Step
+    step: StepRoundoff
 
 
 def losses(scene: Scene, quick: bool = False) -> list[Loss]:
@@ -170,11 +169,10 @@ def limit_of(setup: Setup) -> Limit:
 
 def _slowest(setup: Setup, share: float) -> float:
     """First natural frequency (Hz) at the setup's first strokes under `share` of gravity; NaN without an equilibrium."""
-    plan = compile_scene(lighter_gravity(setup.scene, share))
-    state, work = plan.state(), plan.work()
     strokes = setup.drive(np.zeros(1))[0][0]
+    angles = joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
     try:
-        settle(plan, state, work, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
+        plan, state, work = rest_at(lighter_gravity(setup.scene, share), strokes, angles)
     except SolverError:
         return float("nan")
     return natural_modes(plan, state, work, 1, COUNTED)[0].frequency

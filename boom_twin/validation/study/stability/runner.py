@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....analysis.equilibrium import settle
+from ....analysis.equilibrium import rest_at
 from ....analysis.methods import March, Method, march
-from ....compiler.compile import compile_scene
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....types import Array
 from .cases import Case
 from .setups import Setup
-from .verdict import Facts, Verdict, against_motion, against_rest, verdict
+from .verdict import CaseVerdict, Facts, against_motion, against_rest, verdict
 
 METHODS: dict[str, Method] = {
     "default": Method(),
@@ -40,11 +39,11 @@ class Cell:
     """What came of one method in one case."""
 
     facts: Facts
-    verdict: Verdict
+    verdict: CaseVerdict
 
 
 @dataclass(frozen=True)
-class Row:
+class CaseResult:
     """A case with a cell for each method, and what the reference was."""
 
     case: Case
@@ -53,25 +52,25 @@ class Row:
 
 
 def run(
-    found: Iterable[Case], methods: dict[str, Method] | None = None, tell: Callable[[str], None] = lambda line: None
-) -> list[Row]:
-    """March all cases by all methods; `tell` hears of each case as it is done."""
+    found: Iterable[Case], methods: dict[str, Method] | None = None, progress: Callable[[str], None] = lambda line: None
+) -> list[CaseResult]:
+    """March all cases by all methods; `progress` is told of each case as it is done."""
     rows = []
     for case in found:
         rows.append(one(case, METHODS if methods is None else methods))
-        tell(f"{case.group}: {case.name}: " + ", ".join(cell.verdict.word for cell in rows[-1].cells.values()))
+        progress(f"{case.group}: {case.name}: " + ", ".join(cell.verdict.word for cell in rows[-1].cells.values()))
     return rows
 
 
-def one(case: Case, methods: dict[str, Method]) -> Row:
+def one(case: Case, methods: dict[str, Method]) -> CaseResult:
     """March one case by `methods`."""
     try:
         setup = case.make()
         judge, told = _judge(case, setup)
     except SolverError as error:
         refused = _cell(Facts(str(error), solvable=False))
-        return Row(case, NOTHING, dict.fromkeys(methods, refused))
-    return Row(case, told, {name: _cell(_facts(case, setup, method, judge)) for name, method in methods.items()})
+        return CaseResult(case, NOTHING, dict.fromkeys(methods, refused))
+    return CaseResult(case, told, {name: _cell(_facts(case, setup, method, judge)) for name, method in methods.items()})
 
 
 def _cell(facts: Facts) -> Cell:
@@ -141,8 +140,6 @@ def _thinned(motion: March, stride: int) -> March:
 
 def _equilibrium(setup: Setup) -> Array:
     """Tip (m), shape (2,), at rest at the last strokes."""
-    plan = compile_scene(setup.scene)
-    state, work = plan.state(), plan.work()
     strokes = setup.drive(np.array([setup.duration]))[0][0]
-    settle(plan, state, work, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
+    _, state, _ = rest_at(setup.scene, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
     return state.frames[-1, :2].copy()

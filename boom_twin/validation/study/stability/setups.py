@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ....analysis.methods import Drive
-from ....analysis.motions import Motion, motion_of
-from ....scene.kinematics import joint_angles_of_strokes, stroke_curve
-from ....scene.schema import Cylinder, Joint, Scene, Section, Tip
+from ....analysis.motions import FULL_STROKE, Motion, ease, ease_integral, motion_of
+from ....scene.edit import scaled
+from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
+from ....scene.schema import Cylinder, CylinderPart, Joint, Scene, Section, Tip
 from ....scene.summary import explain
 from ....types import Array
 
@@ -50,12 +50,8 @@ def cylinder_parts(scene: Scene, keys: tuple[str, ...], factor: float) -> Scene:
     """Barrels, rods or both (`keys`) with `factor` times their mass and inertia, where there are any."""
 
     def changed(joint: Joint) -> Joint:
-        update: dict[str, Any] = {}
-        for key in keys:
-            part = getattr(joint.cylinder, key)
-            if part is not None:
-                lighter = {"mass": factor * part.mass, "inertia": factor * part.inertia}
-                update[key] = part.model_copy(update=lighter)
+        parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in keys}
+        update = {key: scaled(part, factor) for key, part in parts.items() if part is not None}
         return joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update=update)})
 
     return _joints(scene, changed)
@@ -115,7 +111,6 @@ def _joints(scene: Scene, change: Callable[[Joint], Joint]) -> Scene:
     return scene.model_copy(update={"joints": tuple(change(joint) for joint in scene.joints)})
 
 
-FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
 SHARE = 0.05  # of a cylinder's travel, from where it goes to the end
 SAMPLES = 1001  # of a joint's range
 
@@ -163,8 +158,8 @@ class DeadStop:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         moving = times < self.stop - 1e-9
         x = np.clip(times / self.ramp, 0.0, 1.0)
-        gone = self.ramp * (2.5 * x**4 - 3.0 * x**5 + x**6) + np.clip(times, self.ramp, self.stop) - self.ramp
-        rate = np.where(moving, x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 0.0)
+        gone = self.ramp * ease_integral(x) + np.clip(times, self.ramp, self.stop) - self.ramp
+        rate = np.where(moving, ease(x), 0.0)
         return self.first + np.outer(gone, self.speed), np.outer(rate, self.speed)
 
 
@@ -209,19 +204,11 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
     """All cylinders, from near by, to their longest or shortest stroke that range and cylinder allow."""
-    ends, aside = np.array([_reach(scene, i) for i in range(len(scene.joints))]), SHARE
+    ends, aside = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))]), SHARE
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
     first = last + aside * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
-
-
-def _reach(scene: Scene, index: int) -> tuple[float, float]:
-    """Shortest and longest stroke (m) of cylinder `index` over its joint's range."""
-    joint = scene.joints[index]
-    low, high = np.radians(joint.range_deg)
-    strokes = stroke_curve(scene, index, np.linspace(low, high, SAMPLES))
-    return max(0.0, float(np.nanmin(strokes))), min(joint.cylinder.max_stroke, float(np.nanmax(strokes)))
 
 
 def _stroke_for(scene: Scene, posture: str, turn: float) -> float:

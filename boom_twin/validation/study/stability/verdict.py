@@ -59,7 +59,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CaseVerdict:
     """`silent`: the numbers are wrong, the status says "ok" and nothing is doubted."""
 
     word: Word
@@ -81,23 +81,23 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
 }
 
 
-def verdict(facts: Facts) -> Verdict:
+def verdict(facts: Facts) -> CaseVerdict:
     """The verdict on `facts`, by `BOUNDS`."""
     if facts.status != "ok":
-        return Verdict("fails" if facts.solvable else "refuses", facts.status)
+        return CaseVerdict("fails" if facts.solvable else "refuses", facts.status)
     told = f" (it says: {facts.doubt})" if facts.doubt else ""
     if not facts.solvable:
-        return Verdict("fails", "gives numbers where there is no solution" + told, silent=not facts.doubt)
+        return CaseVerdict("fails", "gives numbers where there is no solution" + told, silent=not facts.doubt)
     beyond = {name: _grade(name, getattr(facts, name)) for name in BOUNDS}
     symptoms = {
         grade: [BOUNDS[name][2].format(_shown(getattr(facts, name))) for name, own in beyond.items() if own == grade]
         for grade in ("fails", "degrades")
     }
     if symptoms["fails"]:
-        return Verdict("fails", "; ".join(symptoms["fails"] + symptoms["degrades"]) + told, silent=not facts.doubt)
+        return CaseVerdict("fails", "; ".join(symptoms["fails"] + symptoms["degrades"]) + told, silent=not facts.doubt)
     if symptoms["degrades"]:
-        return Verdict("degrades", "; ".join(symptoms["degrades"]) + told)
-    return Verdict("holds", "")
+        return CaseVerdict("degrades", "; ".join(symptoms["degrades"]) + told)
+    return CaseVerdict("holds", "")
 
 
 def _grade(name: str, value: float) -> Word:
