@@ -9,13 +9,15 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
-from .baseline import Baseline
+from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Prediction, Residuals, Stream, channels_of
+from .baseline import JUDGED, Baseline, judged_channels
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, means, stacked
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import SensorCheck, SensorMonitor
+from .sensor_monitor import SensorCheck, SensorMonitor, sensor_ranges
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
+CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.is_smooth)
+"""The streams whose single sensors are checked."""
 
 
 class HealthMonitor:
@@ -42,18 +44,11 @@ class HealthMonitor:
         baseline: Baseline,
         on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
-        n = len(scene.joints)
-        self._n, self._settings = n, settings
-        channels = channels_of(n)
-        self.names = (*channels[Stream.ANGLES], *channels[Stream.IMU])
-        self._low = np.array([np.radians(joint.range_deg[0]) for joint in scene.joints])
-        self._high = np.array([np.radians(joint.range_deg[1]) for joint in scene.joints])
-        absolute = np.array([mount is not None for mount in mounts])
-        self._low[absolute], self._high[absolute] = -np.inf, np.inf
-        self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+        self._settings, self._channels = settings, channels_of(len(scene.joints))
+        self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
-        self._angle_watch = SensorMonitor(channels[Stream.ANGLES], "rad")
-        self._stroke_watch = SensorMonitor(channels[Stream.STROKES], "m")
+        self._ranges = sensor_ranges(scene, mounts)
+        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream].unit) for stream in CHECKED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -62,9 +57,11 @@ class HealthMonitor:
         """The boom starts from rest; alarms of sensors go on."""
         settings = self._settings
         self._blocks = BlockBuilder()
-        self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
-        zero = np.zeros(self._n)
-        self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
+        fastest = {Stream.STROKES: settings.stroke_rate}
+        self._checks = {
+            stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
+            for stream in CHECKED
+        }
         ended = self.residuals.close(self._told)
         if ended is not None:
             self._ended.append(ended)
@@ -96,44 +93,54 @@ class HealthMonitor:
         if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
             return None
         self._told = done[-1].end
-        lasting = (*self._stroke_watch.alarms, *self._angle_watch.alarms)
+        alarms = [alarm for alarm in news if alarm.until is not None]
+        for monitor in self._sensors.values():
+            alarms += monitor.alarms
         if self.residuals.alarm is not None:
-            lasting = (*lasting, self.residuals.alarm)
-        ended = tuple(alarm for alarm in news if alarm.until is not None)
-        return Health(self._told, (*ended, *lasting), self.names, self.residuals.levels, self._tip_sigmas())
+            alarms.append(self.residuals.alarm)
+        return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas())
 
     def _judge(self, block: Block) -> list[Alarm]:
-        n, start = self._n, block.number * BLOCK
-        stamps, raw, left = stacked(block.angles, n)
-        before = self._angle_watch.masked
-        news = self._angle_watch.take(self._angles.look(stamps, raw, raw - left, block.end * NANO), start, block.end)
-        if (self._angle_watch.masked & ~before).any():
-            self.residuals.forget()
-        stroke_stamps = np.array([prediction.stamp for prediction in block.predictions]) * NANO
-        readings = np.array(block.strokes)
-        strokes = self._strokes.look(stroke_stamps, readings, np.zeros_like(readings), block.end * NANO)
-        news += self._stroke_watch.take(strokes, start, block.end)
-        if self._stroke_watch.masked.any() or self._noise is None:
+        start, news = block.number * BLOCK, []
+        readings = {stream: stacked(block.readings.get(stream, []), len(names)) for stream, names in self._channels.items()}
+        for stream, (stamps, raw, left) in readings.items():
+            if stream in CHECKED and stream is not Stream.STROKES:
+                news += self._check(stream, block, stamps, raw, raw - left)
+        stamps, strokes = np.array([p.stamp for p in block.predictions]) * NANO, np.array(block.strokes)
+        news += self._check(Stream.STROKES, block, stamps, strokes, np.zeros_like(strokes))
+        if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
             ended = self.residuals.close(start)
             self.residuals.begin()
             return news if ended is None else [*news, ended]
-        told = self.residuals.take(self._means(block, left), self._noise)
+        told = self.residuals.take(self._means(block, {stream: left for stream, (_, _, left) in readings.items()}), self._noise)
         return news if told is None else [*news, told]
 
-    def _means(self, block: Block, left: Array) -> BlockMeans:
-        settings, predictions = self._settings, block.predictions
-        _, _, forces = stacked(block.forces, 2)
-        angle, angle_count = means(left, settings.angle_variance**0.5)
-        angle[self._angle_watch.masked] = np.nan
-        force, force_count = means(forces, settings.imu_sigma)
+    def _check(self, stream: Stream, block: Block, stamps: Array, raw: Array, expected: Array) -> list[Alarm]:
+        """Check the sensors of a stream: stamps (k,) in s, readings and what they should be (k, channels); gives the news."""
+        monitor = self._sensors[stream]
+        before = monitor.masked
+        findings = self._checks[stream].look(stamps, raw, expected, block.end * NANO)
+        news = monitor.take(findings, block.number * BLOCK, block.end)
+        if stream in JUDGED and (monitor.masked & ~before).any():
+            self.residuals.forget()
+        return news
+
+    def _means(self, block: Block, left: dict[Stream, Array]) -> BlockMeans:
+        """Means of the residuals (k, channels) of every stream that is judged."""
+        predictions, found = block.predictions, []
+        for stream in JUDGED:
+            mean, count = means(left[stream], self._settings.variance(SENSORS[stream]) ** 0.5)
+            if stream in self._sensors:
+                mean[self._sensors[stream].masked] = np.nan
+            found.append((mean, count))
         first, last = predictions[0], predictions[-1]
         span = (last.stamp - first.stamp) * NANO
-        rates = (last.joints - first.joints) / span if span > 0.0 else np.zeros(self._n)
+        rates = (last.joints - first.joints) / span if span > 0.0 else np.zeros_like(first.joints)
         accelerations = np.array([prediction.tip_acceleration for prediction in predictions])
         return BlockMeans(
             start=block.number * BLOCK,
-            left=np.concatenate([angle, force]),
-            counts=np.concatenate([angle_count, force_count]),
+            left=np.concatenate([mean for mean, _ in found]),
+            counts=np.concatenate([count for _, count in found]),
             strokes=predictions[len(predictions) // 2].strokes,
             variances=self._variances,
             rates=rates,

@@ -29,13 +29,12 @@ def history_of(recording: Recording, scene: Scene) -> History:
     """Everything a replay predicted, as arrays; times from the first prediction."""
     predictions = recording.predictions
     first = predictions[0].stamp
-    angles = [residuals for residuals in recording.residuals if residuals.stream is Stream.ANGLES]
-    force = [residuals for residuals in recording.residuals if residuals.stream is Stream.IMU]
+    groups = {stream: recording.of(stream) for stream in Stream}
     stamps = _seconds([prediction.stamp for prediction in predictions], first)
     acceleration = np.array([prediction.tip_acceleration for prediction in predictions])
     gravity = gravity_in_base(scene)
     felt = np.array([tip_specific_force(prediction, gravity) for prediction in predictions])
-    names, times, values, sigmas = _channels([angles, force], first)
+    names, times, values, sigmas = _channels(list(groups.values()), first)
     return History(
         stamps_s=stamps,
         tip_displacement=np.array([prediction.tip_displacement for prediction in predictions]),
@@ -48,7 +47,7 @@ def history_of(recording: Recording, scene: Scene) -> History:
         residual_names=names,
         residual_values=values,
         residual_sigmas=sigmas,
-        imu=_imu(force, stamps, felt, first),
+        imu=_imu(groups[Stream.IMU], stamps, felt, first),
         shapes=[((p.stamp - first) * NANO, p.shape) for p in predictions if p.shape is not None],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
         alarms=_alarms(recording, first),

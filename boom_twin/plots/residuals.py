@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import welch
 
-from ..types import Array
+from ..types import Array, sensor_kind
 from .history import History
 from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_alarms, shade_gaps
 
@@ -38,14 +38,9 @@ def residual_picture(path: Path, session: str, history: History, note: str) -> N
         )
 
 
-def unit_of(name: str) -> tuple[float, str]:
-    """Factor from SI, and the unit that a residual channel is shown in."""
-    return (1e3, "mrad") if name.startswith("joint_") else (1.0, "m/s²")
-
-
 def _channel(axes: Axes, history: History, channel: int) -> None:
     name = history.residual_names[channel]
-    factor, unit = unit_of(name)
+    factor, unit = sensor_kind(name).shown_unit
     measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
     stamps = history.residual_stamps_s[measured]
     values = factor * history.residual_values[measured, channel]

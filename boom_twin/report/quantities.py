@@ -15,14 +15,14 @@ import numpy as np
 from ..analysis.bending_moments import Station, stations
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..health.baseline import Baseline
+from ..health.baseline import Baseline, judged_channels
 from ..offline.replay import Recording
 from ..plots import History
 from ..plots.health import slow_part
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
-from ..types import Array, Stream, channels_of
+from ..types import Array, sensor_kind
 from .vibration import HoldInterval
 
 FILE_NAME = "quantities.json"
@@ -56,20 +56,23 @@ def quantities(
 
 
 def _residuals(history: History, baseline: Baseline, joints: int) -> Iterator[Quantity]:
-    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean."""
-    named = channels_of(joints)
-    channels = [*named[Stream.ANGLES], *named[Stream.IMU]]
-    errors = dict(zip(channels, baseline.errors(joints), strict=True))
+    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
+
+    Where the baseline does not have that error, it is not known how sure the figures are.
+    """
+    errors = dict(zip(judged_channels(joints), baseline.errors(joints).tolist(), strict=True))
     for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
-        values, unit = column[np.isfinite(column)], "rad" if name.startswith("joint") else "m/s^2"
+        values, unit = column[np.isfinite(column)], sensor_kind(name).unit
         if len(values) < BATCHES:
             continue
         mean, mean_sigma = batch_mean(values)
         square, square_sigma = batch_mean(values**2)
-        rms = sqrt(square)
-        yield Quantity(f"residual_mean_{name}", mean, hypot(mean_sigma, errors[name]), unit)
-        sigma = hypot(square_sigma, 2.0 * mean * errors[name]) / (2.0 * rms) if rms else 0.0
-        yield Quantity(f"residual_rms_{name}", rms, sigma, unit)
+        rms, mean_error, rms_error = sqrt(square), None, None
+        if (error := errors.get(name)) is not None:
+            mean_error = hypot(mean_sigma, error)
+            rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
+        yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
+        yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
 
 
 def batch_mean(values: Array) -> tuple[float, float]:

@@ -11,7 +11,8 @@ import numpy as np
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...scene.schema import Scene
-from ...types import NANO, Array, Mount, Prediction, Residuals, Stream
+from ...types import NANO, Array, Mount, Prediction, Residuals, Stream, sensor_kind
+from ..baseline import judged_channels
 from .fault_catalogue import Form, Parameter
 from .innovation_filter import ModalStates, modes_of
 from .sensitivities import Signature, Signatures
@@ -31,15 +32,14 @@ class Block:
     predictions : list of Prediction
     strokes : list of ndarray
         As measured, m, one for each prediction.
-    angles, forces : list of (Residuals, ndarray)
-        With what was measured (rad, m/s^2).
+    readings : dict of Stream to list of (Residuals, ndarray)
+        Residuals of every sample with what was measured, SI.
     """
 
     number: int
     predictions: list[Prediction] = field(default_factory=list)
     strokes: list[Array] = field(default_factory=list)
-    angles: list[tuple[Residuals, Array]] = field(default_factory=list)
-    forces: list[tuple[Residuals, Array]] = field(default_factory=list)
+    readings: dict[Stream, list[tuple[Residuals, Array]]] = field(default_factory=dict)
 
     @property
     def end(self) -> int:
@@ -62,13 +62,10 @@ class BlockBuilder:
             block.strokes.append(strokes)
 
     def measured(self, residuals: Residuals, values: Array) -> None:
-        """Residuals of one sample with its values; those of other streams than angles and IMU do not matter."""
+        """Residuals of one sample with its values."""
         block = self._at(residuals.stamp)
         if block is not None:
-            if residuals.stream is Stream.ANGLES:
-                block.angles.append((residuals, values))
-            elif residuals.stream is Stream.IMU:
-                block.forces.append((residuals, values))
+            block.readings.setdefault(residuals.stream, []).append((residuals, values))
 
     def close(self, stamp: int) -> list[Block]:
         """Blocks that nothing is waited for any more once a stroke has come with `stamp` (ns); they may be empty."""
@@ -217,7 +214,7 @@ class LinearModel:
     ) -> None:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
-        self._sensor2 = np.array([settings.angle_variance] * n + [settings.imu_sigma**2] * 2)
+        self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
         self._drifts = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DRIFT]
         self._late = [i for i, each in enumerate(known) if each.form is Form.DELAY]
         self.begin()
