@@ -29,9 +29,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..types import SENSORS
 from .data.dropped_messages import DroppedMessages
 from .data.status import HEALTH, Alarm, Level, StatusLamp, overall, worst
 from .data.store import Store
+from .data.topic_rows import RESIDUALS
 
 ROWS, SPECTRUM, SPECTROGRAM = 1, 2, 3
 HEAD = struct.Struct("<BBHI")
@@ -60,9 +62,17 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 
 
 def layout(store: Store) -> dict[str, Any]:
-    """The tables that there are."""
-    tables = [{"name": table.name, "columns": table.columns} for table in store.tables.values()]
+    """The tables that there are; of those of residuals also what they are of, and the unit that they are shown in."""
+    tables = [{"name": name, "columns": table.columns, "residuals": _residuals(name)} for name, table in store.tables.items()]
     return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
+
+
+def _residuals(table: str) -> dict[str, Any] | None:
+    kind = next((SENSORS[stream] for stream, name in RESIDUALS.items() if name == table), None)
+    if kind is None:
+        return None
+    factor, unit = kind.shown_unit
+    return {"title": kind.title, "factor": factor, "unit": unit}
 
 
 def alarms(found: list[Alarm]) -> dict[str, Any]:

@@ -196,8 +196,7 @@ class _Twin:
         if self._looked is None:
             self._watch.begin()
             self._looked = self._time
-        if sample.stream is Stream.IMU:
-            self._feed.topic_rows.measure(sample)
+        self._feed.topic_rows.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))

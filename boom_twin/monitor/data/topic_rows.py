@@ -5,7 +5,6 @@ Nothing is known of who sent a message. Here, and nowhere after it, one that can
 
 from __future__ import annotations
 
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
@@ -13,9 +12,9 @@ from typing import Any
 
 from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
-from ...messages.topic_table import Output, Topics, stream_of
+from ...messages.topic_table import Output, Topics
 from ...messages.type_store import decode
-from ...types import NANO, Sample, Stream, channels_of
+from ...types import NANO, SENSORS, Sample, Stream, stream_of
 from . import message_checks as checks
 from .dropped_messages import DroppedMessages, MalformedError
 from .row_order import Row, RowOrder
@@ -32,10 +31,10 @@ WAITING = 1000
 """Measured samples, and residuals, that may wait for each other."""
 GAP = 0.1
 """A longer pause between strokes (s) is told as an alarm."""
-IMU = channels_of(0)[Stream.IMU]
-NOT_SHOWN = frozenset(Stream) - {Stream.STROKES, Stream.ANGLES, Stream.IMU}
-"""Sensors whose residuals the page has no place for."""
-CYLINDER = re.compile(r"cylinder_[1-9][0-9]{0,2}")
+COMPARED = Stream.IMU
+"""The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
+RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
+"""Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
 """Of `SampleDecoder`: an Imu that says that it has none is nothing odd."""
 PLANE = ("x_m", "z_m")
@@ -52,7 +51,8 @@ class TopicRows:
     ``position``       the same
     ``acceleration``   the same
     ``force``          specific force at the tip, x and z of the IMU: measured, predicted, expected deviation of the two
-    ``joints``         residual of every joint, then the same over its expected deviation
+    ``joints``         residual of every joint, then the same over its expected deviation; likewise a table of every further
+                       stream of sensors, by the stream's name
     ``uncertainty``    standard deviation of the predicted tip, x and z of ``base_link``
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
@@ -74,7 +74,7 @@ class TopicRows:
         self._strokes: list[float] = []
         self._scene = ""
         taken = [(topics.outputs[role], take) for role, take in self._by_role().items()]
-        taken += [(topics.inputs[Stream.IMU], self._take_measured), (topics.events, self._take_event)]
+        taken += [(topics.inputs[COMPARED], self._take_measured), (topics.events, self._take_event)]
         self._takers = {topic.absolute: take for topic, take in taken}
         self._types = {topic.absolute: topic.type for topic, _ in taken}
         self.names = frozenset(self._takers)
@@ -109,9 +109,10 @@ class TopicRows:
             self._takers[topic](decode(data, self._types[topic]), now)
 
     def measure(self, sample: Sample) -> None:
-        """Put the measured specific force beside its residual, whichever comes first."""
-        self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
-        self._join(sample.stamp)
+        """Put the measured specific force beside its residual, whichever comes first; other samples are passed over."""
+        if sample.stream is COMPARED:
+            self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
+            self._join(sample.stamp)
 
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
@@ -136,7 +137,7 @@ class TopicRows:
 
     def _take_measured(self, msg: Any, now: float) -> None:
         before = self._decoder.oddities.copy()
-        sample = self._decoder.put(Stream.IMU, stamp_of(msg), msg)
+        sample = self._decoder.put(COMPARED, stamp_of(msg), msg)
         odd = self._decoder.oddities - before
         if sample is not None:
             self.measure(sample)
@@ -162,21 +163,20 @@ class TopicRows:
 
     def _take_cylinders(self, msg: Any, now: float) -> None:
         checks.named(msg, "position", "effort")
-        places = [place for place, name in enumerate(msg.name) if CYLINDER.fullmatch(name)]
+        places = [place for place, name in enumerate(msg.name) if stream_of(name) is Stream.STROKES]
         strokes = checks.numbers([msg.position[place] for place in places])
         self._strokes, self._forces = strokes, checks.numbers([msg.effort[place] for place in places])
 
     def _take_residuals(self, msg: Any, now: float) -> None:
         checks.named(msg, "position", "velocity", "effort")
-        stamp, names = checks.stamp(msg), list(msg.name)
+        stamp, stream = checks.stamp(msg), checks.stream_of_residuals(msg.name)
         values, ratios, sigmas = (checks.numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
-        if names == list(IMU):
+        if stream is COMPARED:
             self._residuals[stamp] = (values, sigmas)
             self._join(stamp)
-        elif not names or stream_of(names[0]) not in NOT_SHOWN:
-            checks.joint_names(names)
-            columns = [f"{name}_rad" for name in names] + [f"{name}_normalised" for name in names]
-            self._append("joints", columns, stamp, values + ratios)
+        else:
+            ends = (SENSORS[stream].unit_suffix, "normalised")
+            self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join(self, stamp: int) -> None:
         """Make the row of a measurement and its residual, once both are there; forget what has waited long."""
