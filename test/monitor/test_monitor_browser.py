@@ -211,7 +211,8 @@ def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
 
 def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
     go(page, 35.0)
-    broken = page.evaluate("import('/page/decimation.js').then(m => m.decimate(twin.connection.table('displacement'), [0, 1], 29, 32, 2000))")
+    rows = "m.decimate(twin.connection.table('displacement'), [0, 1], 29, 32, 2000)"
+    broken = page.evaluate(f"import('/page/decimation.js').then(m => {rows})")
     times, values = np.array(broken[0]), broken[1]
     place = values.index(None)
     assert times[place - 1] == pytest.approx(30.0, abs=0.02) and times[place] == pytest.approx(30.6, abs=0.02)
