@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Okabe and Ito: told apart by every kind of colour vision
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
+TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
+"""Colour and marker of one curve among others."""
 DPI = 100
 MARGIN = 0.08  # of the height of an axis, above and below what is shown
 NOTE = 70  # characters of small print that fit beside a title

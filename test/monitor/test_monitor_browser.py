@@ -267,7 +267,7 @@ def test_every_lamp_and_alarm_is_listed_and_can_be_acknowledged(page: Any, feed:
     page.keyboard.press("5")
     page.wait_for_timeout(1200)
     lamps = cells(page, "#lamps")
-    groups = feed.store.board(FAULT).groups(FAULT).values()
+    groups = feed.store.statuses(FAULT).groups(FAULT).values()
     assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group} - {"health"} | {"joint_3"}
     judged = next(row for row in cells(page, "#alarms") if row[0] == "joint_3")
     assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00", "lasts"]

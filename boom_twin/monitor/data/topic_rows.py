@@ -17,8 +17,8 @@ from ...messages.type_store import decode
 from ...types import NANO, SENSORS, Sample, Stream, stream_of
 from . import message_checks as checks
 from .dropped_messages import DroppedMessages, MalformedError
-from .row_order import Row, RowOrder
-from .status import MOST_NODES, Level
+from .row_order import RowOrder, TableRow
+from .status import MOST_NODES, Severity
 from .store import Store
 
 Taker = Callable[[Any, float], None]
@@ -117,7 +117,7 @@ class TopicRows:
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
         self._store.check(table, columns)
-        step = self._order.put(table, Row(stamp, columns, values))
+        step = self._order.put(table, TableRow(stamp, columns, values))
         if step.is_set_back:
             self._store.clear()
             self._measured.clear()
@@ -133,7 +133,7 @@ class TopicRows:
         store, known = self._store, self._store.tables.get("displacement")
         time = store.time(stamp)
         if known is not None and time - known.newest > GAP:
-            store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
+            store.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
 
     def _take_measured(self, msg: Any, now: float) -> None:
         before = self._decoder.oddities.copy()
@@ -159,7 +159,7 @@ class TopicRows:
 
     def _take_event(self, msg: Any, now: float) -> None:
         time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
-        self._store.alarms.add("event", Level.OK, checks.text(msg.msg), time, time)
+        self._store.alarms.add("event", Severity.OK, checks.text(msg.msg), time, time)
 
     def _take_cylinders(self, msg: Any, now: float) -> None:
         checks.named(msg, "position", "effort")
@@ -220,9 +220,9 @@ class TopicRows:
     def _take_state(self, msg: Any, now: float) -> None:
         checks.count("statuses", len(msg.status), MOST_STATUSES)
         store = self._store
-        board = store.board(now).told(now, msg.status, stamp_of(msg) * NANO)
-        checks.count("nodes on one topic", len(board.nodes), MOST_NODES)
+        statuses = store.statuses(now).told(now, msg.status, stamp_of(msg) * NANO)
+        checks.count("nodes on one topic", len(statuses.nodes), MOST_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
-        store.light(now, board)
+        store.set_statuses(now, statuses)
