@@ -246,9 +246,7 @@ def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
     ]
 
 
-def _remarks(
-    problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object]
-) -> list[str]:
+def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object]) -> list[str]:
     found = []
     if fit.misfit > MISFIT:
         found.append(

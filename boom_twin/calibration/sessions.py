@@ -126,7 +126,7 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
                 f"{session.path}: no usable value of {SENSORS[stream].stem}_1..{joints} (met: {_told(samples)}). "
                 "Is it a session of this boom? If its sensors have other names, give a mapping."
             )
-    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(_shares_missing(series[Stream.STROKES]) > MISSING)]
+    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > MISSING)]
     if lacking:
         raise BagError(
             f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
@@ -139,10 +139,6 @@ def _series(samples: list[Sample]) -> Series:
     """Samples by stamp, the first of equal ones."""
     stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
     return Series(stamps, np.array([samples[i].values for i in first]))
-
-
-def _shares_missing(series: Series) -> Array:
-    return np.asarray(np.isnan(series.values).mean(axis=0))
 
 
 def _told(samples: SampleReader) -> str:

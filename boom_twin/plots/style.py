@@ -107,6 +107,16 @@ def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tup
     return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
 
 
+def extent(times: Array) -> tuple[float, float]:
+    """From the first of `times` (k,) to the last, at least a millisecond: the limits of an axis."""
+    return float(times[0]), float(max(times[-1], times[0] + 1e-3))
+
+
+def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:
+    """Legend above the right end of an axes; `top` as a share of its height."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
+
+
 def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:
     """Limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
     values = np.concatenate([np.ravel(array) for array in arrays])

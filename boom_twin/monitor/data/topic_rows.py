@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,7 +40,13 @@ RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for s
 NO_MEASUREMENT = "no measurement"
 """Of `SampleDecoder`: an Imu that says that it has none is nothing odd."""
 PLANE = ("x_m", "z_m")
-ACCELERATION = ("x_m_s2", "z_m_s2")
+VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
+    Output.TIP_DISPLACEMENT: ("displacement", PLANE, attrgetter("vector")),
+    Output.TIP_POSITION: ("position", PLANE, attrgetter("point")),
+    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2"), attrgetter("accel.linear")),
+    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE, attrgetter("vector")),
+}
+"""Outputs that are a vector in the plane of the boom: table, its columns, and where the vector is in a message."""
 
 
 class TopicRows:
@@ -86,14 +94,11 @@ class TopicRows:
 
     def _by_role(self) -> dict[Output, Taker]:
         return {
-            Output.TIP_DISPLACEMENT: self._take_displacement,
-            Output.TIP_POSITION: self._take_position,
-            Output.TIP_ACCELERATION: self._take_acceleration,
+            **{role: partial(self._take_vector, role) for role in VECTORS},
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
             Output.HEALTH: self._take_health,
-            Output.TIP_UNCERTAINTY: self._take_uncertainty,
             Output.DIAGNOSTICS: self._take_state,
         }
 
@@ -144,18 +149,10 @@ class TopicRows:
         elif NO_MEASUREMENT not in odd:
             raise MalformedError(", ".join(odd))
 
-    def _take_displacement(self, msg: Any, now: float) -> None:
-        self._append("displacement", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
-
-    def _take_position(self, msg: Any, now: float) -> None:
-        self._append("position", PLANE, checks.stamp(msg), checks.numbers((msg.point.x, msg.point.z)))
-
-    def _take_acceleration(self, msg: Any, now: float) -> None:
-        linear = msg.accel.linear
-        self._append("acceleration", ACCELERATION, checks.stamp(msg), checks.numbers((linear.x, linear.z)))
-
-    def _take_uncertainty(self, msg: Any, now: float) -> None:
-        self._append("uncertainty", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
+    def _take_vector(self, role: Output, msg: Any, now: float) -> None:
+        table, columns, vector_of = VECTORS[role]
+        vector = vector_of(msg)
+        self._append(table, columns, checks.stamp(msg), checks.numbers((vector.x, vector.z)))
 
     def _take_event(self, msg: Any, now: float) -> None:
         time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
