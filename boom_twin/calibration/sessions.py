@@ -101,7 +101,8 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[Me
 def _wanted(session: Session, topics: Topics) -> list[str]:
     """Topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
     names = []
-    for stream, topic in topics.inputs.items():
+    for stream in Stream:
+        topic = topics.inputs[stream]
         found = session.find(topic.name)
         if stream in NEEDED:
             check_topic(session, topic.name, topic.type)

@@ -50,7 +50,7 @@ def quantities(
         *_residuals(history, baseline, len(scene.joints)),
         *_frequencies(still, baseline.detuning),
         *_tip(recording, history),
-        *_loads(history, scene),
+        *_moments(history, scene),
         *_travels(history, settings),
     ]
 
@@ -111,12 +111,10 @@ def _tip(recording: Recording, history: History) -> Iterator[Quantity]:
     yield Quantity("tip_acceleration_max", float(np.hypot(*history.tip_acceleration.T).max()), None, "m/s^2")
 
 
-def _loads(history: History, scene: Scene) -> Iterator[Quantity]:
+def _moments(history: History, scene: Scene) -> Iterator[Quantity]:
     """Largest bending moment of every flexible section."""
-    sections = np.array([station.section for station in stations(scene)], dtype=np.int64)
-    for section in np.unique(sections):
-        moments = np.abs(history.moments[:, sections == section])
-        yield Quantity(f"bending_moment_max_section_{section + 1}", float(moments.max()), None, "N m")
+    for load in loads(history, scene, None):
+        yield Quantity(f"bending_moment_max_section_{load.station.section + 1}", abs(load.moment), None, "N m")
 
 
 def _travels(history: History, settings: Settings) -> Iterator[Quantity]:
