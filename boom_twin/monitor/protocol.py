@@ -63,16 +63,16 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 
 def layout(store: Store) -> dict[str, Any]:
     """The tables that there are; of those of residuals also what they are of, and the unit that they are shown in."""
-    tables = [{"name": name, "columns": table.columns, "residuals": _residuals(name)} for name, table in store.tables.items()]
+    tables = [{"name": name, "columns": table.columns, **_residuals(name)} for name, table in store.tables.items()]
     return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
 
 
-def _residuals(table: str) -> dict[str, Any] | None:
-    kind = next((SENSORS[stream] for stream, name in RESIDUALS.items() if name == table), None)
-    if kind is None:
-        return None
-    factor, unit = kind.shown_unit
-    return {"title": kind.title, "factor": factor, "unit": unit}
+def _residuals(table: str) -> dict[str, Any]:
+    stream = next((stream for stream, name in RESIDUALS.items() if name == table), None)
+    if stream is None:
+        return {}
+    factor, unit = SENSORS[stream].shown_unit
+    return {"residuals": {"title": SENSORS[stream].title, "factor": factor, "unit": unit}}
 
 
 def alarms(found: list[ListedAlarm]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 export const CAPACITY = 1 << 17; // rows: ten minutes at 200 Hz
 
 export class Table {
-  // residuals: what they are of, factor and unit in which they are shown; null in all other tables
+  // residuals: what they are of, factor and unit in which they are shown; only tables of residuals have it
   constructor(name, columns, residuals) {
     this.name = name;
     this.columns = columns;
