@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import Enum
 from math import pi
@@ -49,6 +50,8 @@ class SensorKind:
 
     Attributes
     ----------
+    title : str
+        What people call them.
     message : str
         Type of its messages: a JointState, whose ``position`` is read by names, or an Imu, whose ``linear_acceleration`` is
         read by axes.
@@ -62,8 +65,14 @@ class SensorKind:
         The fields of `boom_twin.config.settings.Settings` that have them; an empty one stands for 0.
     lack : str
         What there is not without these sensors.
+    shown : str
+        The unit, one of `units`, in which pictures and the live page show residuals; by default the SI unit.
+    is_smooth : bool
+        Whether what is measured changes little from one reading to the next, so that jumps, spikes and more noise than stated
+        are the sensor's own: then they give an alarm.
     """
 
+    title: str
     message: str
     stem: str
     ends: tuple[str, ...]
@@ -71,6 +80,8 @@ class SensorKind:
     noise: str
     resolution: str
     lack: str
+    shown: str = ""
+    is_smooth: bool = True
 
     @property
     def is_imu(self) -> bool:
@@ -82,6 +93,17 @@ class SensorKind:
         """The SI unit."""
         return next(iter(self.units))
 
+    @property
+    def unit_suffix(self) -> str:
+        """The SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
+        return self.unit.replace("/", "_").replace("^", "")
+
+    @property
+    def shown_unit(self) -> tuple[float, str]:
+        """Factor from SI to the unit that residuals are shown in, and that unit as it is printed."""
+        unit = self.shown or self.unit
+        return 1.0 / self.units[unit], unit.replace("^2", "²")
+
     def channels(self, joints: int) -> tuple[str, ...]:
         """Names of the channels in the order of a sample, of a boom with so many joints."""
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
@@ -89,6 +111,7 @@ class SensorKind:
 
 SENSORS: dict[Stream, SensorKind] = {
     Stream.STROKES: SensorKind(
+        title="cylinder strokes",
         message="sensor_msgs/msg/JointState",
         stem="cylinder",
         ends=(),
@@ -98,6 +121,7 @@ SENSORS: dict[Stream, SensorKind] = {
         lack="nothing can be replayed",
     ),
     Stream.ANGLES: SensorKind(
+        title="joint angles",
         message="sensor_msgs/msg/JointState",
         stem="joint",
         ends=(),
@@ -105,8 +129,10 @@ SENSORS: dict[Stream, SensorKind] = {
         noise="angle_sigma",
         resolution="angle_resolution",
         lack="there are no joint residuals",
+        shown="mrad",
     ),
     Stream.IMU: SensorKind(
+        title="tip IMU",
         message="sensor_msgs/msg/Imu",
         stem="tip_imu",
         ends=("x", "z"),
@@ -114,6 +140,7 @@ SENSORS: dict[Stream, SensorKind] = {
         noise="imu_sigma",
         resolution="",
         lack="there are no residuals of the tip's acceleration (optional)",
+        is_smooth=False,
     ),
 }
 """What they should read is in `boom_twin.twin.expected_readings.READINGS`, their topics are in ``topics.yaml``."""
@@ -122,6 +149,26 @@ SENSORS: dict[Stream, SensorKind] = {
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
     """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
     return {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
+
+
+NUMBER = re.compile(r"[1-9]\d{0,3}")
+
+
+def stream_of(channel: str) -> Stream | None:
+    """The stream that a channel comes by; None if there can be no such channel."""
+    stem, _, end = channel.rpartition("_")
+    for stream, kind in SENSORS.items():
+        if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
+            return stream
+    return None
+
+
+def sensor_kind(channel: str) -> SensorKind:
+    """The row of `SENSORS` that a channel belongs to; KeyError if there can be no such channel."""
+    stream = stream_of(channel)
+    if stream is None:
+        raise KeyError(channel)
+    return SENSORS[stream]
 
 
 LIMIT = 1e6

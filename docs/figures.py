@@ -1,46 +1,31 @@
-"""Draws the pictures of the guide from the geometry of the default scene: `python docs/figures.py`."""
+"""Draws the pictures of the guide from the geometry of the default scene: `python docs/figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from dimensions import angle, dimension, frame, leader, mass_centre, name, span
 
 from boom_twin.analysis.equilibrium import statics
-from boom_twin.scene import Scene
-from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import stroke_curve
-from boom_twin.scene.schema import Joint
-from boom_twin.plots.boom import boom_picture
-from boom_twin.plots.boom import depth
-from boom_twin.plots.boom import section_parts
-from boom_twin.plots.dimensions import angle
-from boom_twin.plots.dimensions import dimension
-from boom_twin.plots.dimensions import frame
-from boom_twin.plots.dimensions import leader
-from boom_twin.plots.dimensions import mass_centre
-from boom_twin.plots.dimensions import name
-from boom_twin.plots.dimensions import span
-from boom_twin.plots.boom import draw_base
-from boom_twin.plots.boom import draw_cylinder
-from boom_twin.plots.boom import draw_link
-from boom_twin.plots.boom import draw_pin
-from boom_twin.plots.boom import draw_section
-from boom_twin.scene.kinematics import JointPins
-from boom_twin.scene.kinematics import Skeleton
-from boom_twin.scene.kinematics import skeleton
-from boom_twin.plots.style import BLUE
-from boom_twin.plots.style import GREEN
-from boom_twin.plots.style import GREY
-from boom_twin.plots.style import INK
-from boom_twin.plots.style import ORANGE
-from boom_twin.plots.style import PURPLE
-from boom_twin.plots.style import picture
+from boom_twin.plots.boom import (
+    boom_picture,
+    draw_base,
+    draw_cylinder,
+    draw_link,
+    draw_pin,
+    draw_section,
+    section_parts,
+)
+from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+from boom_twin.scene import Scene, load_scene
+from boom_twin.scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
+from boom_twin.scene.schema import Joint, section_depth
 
-HERE = Path(__file__).parent
 SURROGATE = "drawn from the default scene (surrogate parameters)"
 
 
@@ -82,7 +67,7 @@ def section_figure(scene: Scene, path: Path) -> None:
     assert section.beam and section.root and section.head and section.rod_pin
     title = "A section: everything is measured from its inboard pivot"
     with sheet(path, title, [((-0.5, 4.35), (-0.58, 0.78))], 4.4) as (axes,):
-        draw_section(axes, section_parts(scene, bones, 0), depth(scene, 0))
+        draw_section(axes, section_parts(scene, bones, 0), section_depth(scene, 0))
         inboard, outboard, (x0, x1) = bones.point(0, 0), bones.point(0, section.length), section.beam
         rod, root, head = (bones.point(0, *p) for p in (section.rod_pin, section.root.com, section.head.com))
         axes.plot(*np.array([inboard, outboard]).T, color=GREY, linestyle=(0, (9, 3, 2, 3)), linewidth=1.0, zorder=3)
@@ -111,7 +96,7 @@ def joint_a_figure(scene: Scene, path: Path) -> None:
     joint = bones.joints[0]
     title = "Joint 1, kind A"
     with sheet(path, title, [((-1.45, 2.0), (-1.6, 0.98))], 8.0) as (axes,):
-        draw_section(axes, section_parts(scene, bones, 0), depth(scene, 0))
+        draw_section(axes, section_parts(scene, bones, 0), section_depth(scene, 0))
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[0].cylinder.closed_length, 0.1)
         draw_base(axes, joint.pivot, 0.24)
         draw_base(axes, joint.barrel_pin, 0.18)
@@ -148,7 +133,7 @@ def six_bar_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
 def _linkage(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
     joint = bones.joints[i]
     for k in (i - 1, i):
-        draw_section(axes, section_parts(scene, bones, k), 0.75 * depth(scene, k), 0.6)
+        draw_section(axes, section_parts(scene, bones, k), 0.75 * section_depth(scene, k), 0.6)
     draw_link(axes, joint.links[0], GREEN, 7.0)
     draw_link(axes, joint.links[1], PURPLE, 7.0)
     draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[i].cylinder.closed_length, 0.07)
@@ -215,15 +200,17 @@ def _rod_pin(axes: Any, joint: JointPins) -> None:
 
 
 def main() -> None:
-    """Write every picture beside this script."""
+    """Write every picture into the folder that is given, by default beside this script."""
+    out = Path(sys.argv[1] if len(sys.argv) > 1 else __file__)
+    out = out if out.is_dir() else out.parent
     scene = load_scene()
     title = "Default boom, posture arch: at rest under gravity"
-    boom_picture(scene, statics(scene, posture="arch"), HERE / "boom.png", title, "surrogate parameters")
-    section_figure(scene, HERE / "symbols_section.png")
-    joint_a_figure(scene, HERE / "symbols_joint_a.png")
+    boom_picture(scene, statics(scene, posture="arch"), out / "boom.png", title, "surrogate parameters")
+    section_figure(scene, out / "symbols_section.png")
+    joint_a_figure(scene, out / "symbols_joint_a.png")
     for i, degrees in ((1, -42.0), (2, -42.0), (3, -42.0)):
         assert np.isfinite(stroke_curve(scene, i, np.radians([degrees]))).all()
-        six_bar_figure(scene, i, float(np.radians(degrees)), HERE / f"symbols_b{i}.png")
+        six_bar_figure(scene, i, float(np.radians(degrees)), out / f"symbols_b{i}.png")
 
 
 if __name__ == "__main__":

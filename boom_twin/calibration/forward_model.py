@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,15 +12,31 @@ from ..compiler.plan import taken_apart
 from ..config.settings import Settings
 from ..errors import BagError, SolverError
 from ..estimation.sensor_model import specific_force
+from ..kernels.result_row import Results
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
 from ..scene.schema import Scene
-from ..types import Array, Stream, channels_of
+from ..types import Array, Stream, channels_of, sensor_kind, stream_of
 from .noise_model import NoiseModel, ResidualBlocks
 from .sessions import SessionCourse
 from .unknowns import Unknown
 
 Values = Mapping[str, float]
+
+
+Readings = dict[Stream, Array]
+
+
+def _specific_force(results: Results, gravity: Array) -> Array:
+    felt, angle = results.tip[..., 2, :2] - gravity, results.tip[..., 0, 2]
+    return np.stack(specific_force(felt[..., 0], felt[..., 1], np.cos(angle), np.sin(angle)), axis=-1)
+
+
+READINGS: dict[Stream, Callable[[Results, Array], Array]] = {
+    Stream.ANGLES: lambda results, gravity: results.joints,
+    Stream.IMU: _specific_force,
+}
+"""What the sensors of the streams that a fit can compare should read, shape (.., channels), given gravity (m/s^2)."""
 
 
 class ForwardModel:
@@ -41,7 +57,7 @@ class ForwardModel:
         strokes = channels_of(len(scene.joints))[Stream.STROKES]
         self._zeros = np.array([[trial.get(f"{name}.zero", 0.0) for name in strokes] for trial in trials])
 
-    def move(self, course: SessionCourse, noise: Array | None = None) -> tuple[Array, Array]:
+    def move(self, course: SessionCourse, noise: Array | None = None) -> Readings:
         """Readings along a course.
 
         Parameters
@@ -51,9 +67,8 @@ class ForwardModel:
 
         Returns
         -------
-        angles : ndarray, shape (trials, m, n)
-        force : ndarray, shape (trials, m, 2)
-            Specific force of the tip.
+        dict of Stream to ndarray, shape (trials, m, channels)
+            What the sensors of the streams of `READINGS` should read, SI.
 
         Raises
         ------
@@ -70,18 +85,16 @@ class ForwardModel:
             raise SolverError(f"the model fails within the session: {next(iter(failures.values()))}. Is it one of this boom?")
         return self._readings(np.concatenate([first[:, None], rows], axis=1))
 
-    def rest(self, strokes: Array) -> tuple[Array, Array]:
-        """Readings at rest with strokes (n,) in m; shapes (trials, 1, n) and (trials, 1, 2)."""
+    def rest(self, strokes: Array) -> Readings:
+        """Readings at rest with strokes (n,) in m; shape (trials, 1, channels) for each stream."""
         return self._readings(self._settled(strokes, strokes - self._zeros)[:, None])
 
     def _settled(self, near: Array, strokes: Array) -> Array:
         return self._batch.settle(strokes, joint_angles_of_strokes(self._scene, near))
 
-    def _readings(self, rows: Array) -> tuple[Array, Array]:
+    def _readings(self, rows: Array) -> Readings:
         found = taken_apart(self._batch.plans[0], rows)
-        felt, angle = found.tip[..., 2, :2] - self._gravity, found.tip[..., 0, 2]
-        force = specific_force(felt[..., 0], felt[..., 1], np.cos(angle), np.sin(angle))
-        return found.joints, np.stack(force, axis=-1)
+        return {stream: reading(found, self._gravity) for stream, reading in READINGS.items()}
 
 
 DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths
@@ -130,8 +143,7 @@ class CalibrationProblem:
         if not len(self.used):
             raise BagError("no angle sensor has values throughout all sessions. Record strokes and joint angles together.")
         self.channels = tuple(channels[int(i)] for i in self.used)
-        variances = [settings.imu_sigma**2 if name.startswith("tip") else settings.angle_variance for name in self.channels]
-        self.deviations = np.sqrt(variances)
+        self.deviations = np.sqrt([settings.variance(sensor_kind(name)) for name in self.channels])
         self._direct = [self._effect(unknown) for unknown in unknowns]
         self.length = float(np.diff(parts[0][1].times[:2])[0])
         self._stroke_deviation = float(np.sqrt(settings.stroke_variance))
@@ -150,7 +162,7 @@ class CalibrationProblem:
         forward = ForwardModel(self.scene, self._trials(deviations))
         residuals, slopes = [], []
         for course, blocks in self.parts:
-            means = np.array([blocks.averaged(*streams) for streams in zip(*forward.move(course), strict=True)])
+            means = blocks.averaged(forward.move(course))
             predicted, slope = self._with_slopes(means, deviations)
             left = blocks.measured[:, self.used] - predicted
             gaps = np.where(np.isfinite(left), 0.0, np.nan)
@@ -161,8 +173,9 @@ class CalibrationProblem:
     def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
         """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
         forward = ForwardModel(self.scene, self._trials(deviations))
-        angles, force = (np.concatenate(each, axis=1) for each in zip(*map(forward.rest, strokes), strict=True))
-        return self._with_slopes(np.concatenate([angles, force], axis=2), deviations)
+        streams = self.parts[0][1].means
+        rows = [np.concatenate([readings[stream] for stream in streams], axis=2) for readings in map(forward.rest, strokes)]
+        return self._with_slopes(np.concatenate(rows, axis=1), deviations)
 
     def noise(self, deviations: Array) -> list[Array]:
         """Realisations of the noise of block means, one array (k, b, c) for every session.
@@ -177,7 +190,7 @@ class CalibrationProblem:
             noise = np.zeros((len(course.stamps), count + 1, course.strokes.shape[1]))
             noise[:, 1:] = self._stroke_deviation * rng.standard_normal(noise[:, 1:].shape)
             readings = forward.move(course, course.smoothed(noise).swapaxes(0, 1))
-            means = np.array([blocks.averaged(*streams) for streams in zip(*readings, strict=True)])[..., self.used]
+            means = blocks.averaged(readings)[..., self.used]
             own = self.deviations / np.sqrt(np.maximum(blocks.counts[:, self.used], 1.0))
             found.append(means[1:] - means[0] + own * rng.standard_normal(means[1:].shape))
         return found
@@ -200,7 +213,7 @@ class CalibrationProblem:
         return readings[0] + zeros, slopes
 
     def _effect(self, unknown: Unknown) -> Array | None:
-        """What a prior deviation adds to each channel (c,), for a zero of an angle sensor or of the IMU; else None."""
-        if unknown.channel is None or unknown.channel.startswith("cylinder"):
+        """What a prior deviation adds to each channel (c,), for a zero of a sensor that is compared; else None."""
+        if unknown.channel is None or stream_of(unknown.channel) is Stream.STROKES:
             return None
         return unknown.kind.prior * np.array([channel == unknown.channel for channel in self.channels], dtype=float)

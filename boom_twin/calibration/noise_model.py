@@ -10,7 +10,7 @@ with w of unit variance and white (Luetkepohl, New Introduction to Multiple Time
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,6 @@ from .sessions import MeasuredSession, Series, SessionCourse, filled
 SHORTEST = 0.05  # s
 END = 0.25  # s before the end of a course that are not used, for smoothing ends there
 LEAST = 0.5  # of the values of a block that must be there
-STREAMS = (Stream.ANGLES, Stream.IMU)
 
 
 @dataclass(frozen=True)
@@ -38,50 +37,44 @@ class ResidualBlocks:
         NaN where too little was measured.
     counts : ndarray, shape (b, c)
         How many samples are in each.
-    means : tuple of sparse array, shape (b, m)
-        For the angles, and for the IMU if there is one.
+    means : dict of Stream to sparse array, shape (b, m)
     """
 
     times: Array
     measured: Array
     counts: Array
-    means: tuple[csr_array, ...]
+    means: dict[Stream, csr_array]
 
-    def averaged(self, angles: Array, force: Array) -> Array:
-        """Means of predicted joint angles (m, n) and specific force (m, 2), shape (b, c)."""
-        parts = [mean @ values for mean, values in zip(self.means, (angles, force), strict=False)]
-        return np.concatenate(parts, axis=1)
-
-
-def has_imu(sessions: Sequence[MeasuredSession]) -> bool:
-    """Whether every session has a tip IMU; if one lacks it, it is left out of all."""
-    return all(Stream.IMU in session.series for session in sessions)
+    def averaged(self, readings: Mapping[Stream, Array]) -> Array:
+        """Means of predicted readings (k, m, channels) of every stream, shape (k, b, c)."""
+        count = len(next(iter(readings.values())))
+        rows = [[mean @ readings[stream][k] for stream, mean in self.means.items()] for k in range(count)]
+        return np.array([np.concatenate(parts, axis=1) for parts in rows])
 
 
-def block_length(sessions: Sequence[MeasuredSession], imu: bool) -> float:
-    """Time (s) that holds samples of every stream of every session."""
-    intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in used(imu)]
+def block_length(sessions: Sequence[MeasuredSession], streams: Sequence[Stream]) -> float:
+    """Time (s) that holds samples of every one of the streams of every session."""
+    intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in streams]
     return max(SHORTEST, 2.0 * float(max(intervals)))
 
 
-def used(imu: bool) -> tuple[Stream, ...]:
-    """The streams that are compared."""
-    return STREAMS if imu else STREAMS[:1]
-
-
-def channel_names(joints: int, imu: bool) -> tuple[str, ...]:
-    """Of the columns."""
+def channel_names(joints: int, streams: Sequence[Stream]) -> tuple[str, ...]:
+    """Names of the channels of the streams, in the order of `ResidualBlocks`."""
     known = channels_of(joints)
-    return tuple(name for stream in used(imu) for name in known[stream])
+    return tuple(name for stream in streams for name in known[stream])
 
 
 def blocks_of(
-    session: MeasuredSession, course: SessionCourse, length: float, imu: bool, mounts: Sequence[Mount | None]
+    session: MeasuredSession,
+    course: SessionCourse,
+    length: float,
+    streams: Sequence[Stream],
+    mounts: Sequence[Mount | None],
 ) -> ResidualBlocks:
     """Average a session over blocks of `length` (s); the angles of inclinometers are left out."""
     count = int((course.duration - END) / length)
-    measured, counts, means = [], [], []
-    for stream in used(imu):
+    measured, counts, means = [], [], {}
+    for stream in streams:
         series = session.series[stream].of(course.start, course.start + round((count * length) / NANO))
         values = series.values.copy()
         if stream is Stream.ANGLES:
@@ -89,9 +82,9 @@ def blocks_of(
         found, number, mean = _averages(Series(series.stamps, values), course, length, count)
         measured.append(found)
         counts.append(number)
-        means.append(mean)
+        means[stream] = mean
     times: Array = np.asarray(length * (0.5 + np.arange(count)))
-    return ResidualBlocks(times, np.concatenate(measured, axis=1), np.concatenate(counts, axis=1), tuple(means))
+    return ResidualBlocks(times, np.concatenate(measured, axis=1), np.concatenate(counts, axis=1), means)
 
 
 def _averages(series: Series, course: SessionCourse, length: float, count: int) -> tuple[Array, Array, csr_array]:

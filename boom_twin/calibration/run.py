@@ -13,10 +13,10 @@ from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import NANO, Stream
-from .forward_model import CalibrationProblem
+from ..types import NANO, SENSORS, Stream
+from .forward_model import READINGS, CalibrationProblem
 from .least_squares import Fit, Group, fitted, groups_of
-from .noise_model import block_length, blocks_of, channel_names, has_imu
+from .noise_model import block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
 from .unknowns import Unknown, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
@@ -137,8 +137,8 @@ def calibrate(
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
     sessions = read_sessions(paths, mapped.topics, joints)
-    imu = has_imu(sessions)
-    names = choice.names or usual_names(scene, imu, choice.load, choice.damping, choice.stiffness, choice.zeros)
+    streams = (Stream.STROKES, *_compared(sessions))
+    names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
     unknowns = unknowns_of(scene, names)
     problem, kept_from = _problem(scene, unknowns, sessions, mapped, settings)
     progress(0.1, "fit, holds")
@@ -161,7 +161,7 @@ def calibrate(
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
         better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, sessions, mounts, imu) + _worse(before, after)),
+        tuple(_remarks(problem, fit, sessions, mounts) + _worse(before, after)),
     )  # fmt: skip
 
 
@@ -185,7 +185,7 @@ def _problem(
     scene: Scene, unknowns: Sequence[Unknown], sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings
 ) -> tuple[CalibrationProblem, int]:
     """What is fitted, and the stamp from which on the last session is held out."""
-    joints, imu = len(scene.joints), has_imu(sessions)
+    joints, streams = len(scene.joints), _compared(sessions)
     courses = [course_of(session, settings) for session in sessions]
     _refuse_other_boom(scene, sessions, courses)
     kept_from = courses[-1].start
@@ -202,10 +202,15 @@ def _problem(
             f"{', '.join(session.name for session, _ in fitting)}: no stroke moves by more than {1e3 * MOVED:g} mm, so loads "
             "do not change and stiffness looks like a zero. Record moves of every cylinder, with holds between them."
         )
-    length = block_length(sessions, imu)
+    length = block_length(sessions, streams)
     mounts = mapped.topics.mounts(joints)
-    parts = [(course, blocks_of(session, course, length, imu, mounts)) for session, course in fitting]
-    return CalibrationProblem(scene, unknowns, parts, channel_names(joints, imu), settings), kept_from
+    parts = [(course, blocks_of(session, course, length, streams, mounts)) for session, course in fitting]
+    return CalibrationProblem(scene, unknowns, parts, channel_names(joints, streams), settings), kept_from
+
+
+def _compared(sessions: Sequence[MeasuredSession]) -> tuple[Stream, ...]:
+    """The streams that are compared; what one session lacks is left out of all."""
+    return tuple(stream for stream in READINGS if all(stream in session.series for session in sessions))
 
 
 def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], courses: Sequence[SessionCourse]) -> None:
@@ -241,9 +246,7 @@ def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
     ]
 
 
-def _remarks(
-    problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object], imu: bool
-) -> list[str]:
+def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object]) -> list[str]:
     found = []
     if fit.misfit > MISFIT:
         found.append(
@@ -254,9 +257,11 @@ def _remarks(
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")
     if any(mounts):
         found.append("Inclinometers are not used by the fit, only encoders.")
-    if not imu and any(Stream.IMU in session.series for session in sessions):
-        found.append("Not every session has a tip IMU, so none is used.")
-    lacking = [name for name in channel_names(len(problem.scene.joints), imu) if name not in problem.channels]
+    compared = _compared(sessions)
+    for stream in READINGS:
+        if stream not in compared and any(stream in session.series for session in sessions):
+            found.append(f"Not every session has a {SENSORS[stream].title}, so none is used.")
+    lacking = [name for name in channel_names(len(problem.scene.joints), compared) if name not in problem.channels]
     if lacking:
         found.append(f"Not measured throughout, and left out: {', '.join(lacking)}.")
     return found

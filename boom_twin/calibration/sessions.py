@@ -25,8 +25,9 @@ from ..errors import BagError
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..system.received_files import open_received
-from ..types import NANO, Array, Change, Sample, Stream, channels_of
+from ..types import NANO, SENSORS, Array, Change, Sample, Stream, channels_of
 
+NEEDED = (Stream.STROKES, Stream.ANGLES)  # streams without which nothing can be estimated
 SHOWN = 12  # hex digits of a hash
 LOADS = ("payload", "line_fill")
 MISSING = 0.5  # largest share of values of a channel that may be missing
@@ -98,14 +99,16 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[Me
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Topics of strokes and angles, which must be there, and of the IMU if it is."""
+    """Topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
     names = []
-    for stream in (Stream.STROKES, Stream.ANGLES):
+    for stream in Stream:
         topic = topics.inputs[stream]
-        check_topic(session, topic.name, topic.type)
-        names.append(topic.name)
-    imu = session.find(topics.inputs[Stream.IMU].name)
-    return list(dict.fromkeys([*names, *([topics.inputs[Stream.IMU].name] if imu and imu.count else [])]))
+        found = session.find(topic.name)
+        if stream in NEEDED:
+            check_topic(session, topic.name, topic.type)
+        if stream in NEEDED or (found is not None and found.count):
+            names.append(topic.name)
+    return list(dict.fromkeys(names))
 
 
 def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredSession:
@@ -118,13 +121,13 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
         elif sample is not None:
             found[sample.stream].append(sample)
     series = {stream: _series(group) for stream, group in found.items() if group}
-    for stream, word in ((Stream.STROKES, "cylinder"), (Stream.ANGLES, "joint")):
+    for stream in NEEDED:
         if stream not in series:
             raise BagError(
-                f"{session.path}: no usable value of {word}_1..{joints} (met: {_told(samples)}). "
+                f"{session.path}: no usable value of {SENSORS[stream].stem}_1..{joints} (met: {_told(samples)}). "
                 "Is it a session of this boom? If its sensors have other names, give a mapping."
             )
-    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(_shares_missing(series[Stream.STROKES]) > MISSING)]
+    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > MISSING)]
     if lacking:
         raise BagError(
             f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
@@ -137,10 +140,6 @@ def _series(samples: list[Sample]) -> Series:
     """Samples by stamp, the first of equal ones."""
     stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
     return Series(stamps, np.array([samples[i].values for i in first]))
-
-
-def _shares_missing(series: Series) -> Array:
-    return np.asarray(np.isnan(series.values).mean(axis=0))
 
 
 def _told(samples: SampleReader) -> str:

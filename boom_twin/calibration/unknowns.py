@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import UsageError
 from ..scene.edit import parameter, parameter_names
 from ..scene.schema import Scene
-from ..types import Stream, channels_of
+from ..types import Stream, channels_of, stream_of
 
 LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
@@ -42,13 +41,15 @@ KINDS = {
     "mass": UnknownKind("kg", 0.1, 0.05, relative=True),
     "tip.payload": UnknownKind("kg", 50.0, 5.0),
     "line_fill": UnknownKind("kg/m", 10.0, 1.0),
-    "joint": UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
-    "cylinder": UnknownKind("m", 0.01, 5e-4),
-    "tip_imu": UnknownKind("m/s^2", 0.3, 0.03),
 }
-"""By the last word of a parameter's name; of zeros, by the sensor's."""
+"""By the last word of a parameter's name."""
 
-_ZERO = re.compile(r"(?P<channel>(?P<sensor>joint|cylinder|tip_imu)_\w+)\.zero")
+ZEROS = {
+    Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
+    Stream.STROKES: UnknownKind("m", 0.01, 5e-4),
+    Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
+}
+"""Of the zeros of sensors, by their stream, in the order in which they are estimated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +62,15 @@ class Unknown:
     @property
     def channel(self) -> str | None:
         """The channel whose zero it is; None for a parameter of the scene."""
-        match = _ZERO.fullmatch(self.name)
-        return match["channel"] if match else None
+        channel = self.name.removesuffix(".zero")
+        return None if channel == self.name else channel
 
     @property
     def kind(self) -> UnknownKind:
         """Unit and likely deviations."""
-        match = _ZERO.fullmatch(self.name)
-        return KINDS[match["sensor"] if match else self.name if self.name in KINDS else self.name.rpartition(".")[2]]
+        if self.channel is not None and (stream := stream_of(self.channel)) is not None:
+            return ZEROS[stream]
+        return KINDS[self.name if self.name in KINDS else self.name.rpartition(".")[2]]
 
     @property
     def least(self) -> float:
@@ -82,14 +84,19 @@ class Unknown:
 
 
 def usual_names(
-    scene: Scene, imu: bool, load: str | None = None, damping: str | None = None, stiffness: bool = False, zeros: str = "all"
+    scene: Scene,
+    streams: Sequence[Stream],
+    load: str | None = None,
+    damping: str | None = None,
+    stiffness: bool = False,
+    zeros: str = "all",
 ) -> list[str]:
     """What is estimated if nobody names it: stiffness of every cylinder, zero of every sensor, and what is asked for.
 
     Parameters
     ----------
-    imu : bool
-        Whether there is one.
+    streams : sequence of Stream
+        That are there.
     load : {"payload", "line_fill"}, optional
     damping : {"d", "beta"}, optional
         Of cylinders, or of sections.
@@ -101,15 +108,14 @@ def usual_names(
     ends = [".k", *([f".{damping}"] if damping else []), *([".EI"] if stiffness else [])]
     names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
     names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[load]
-    trusted = {"all": (), "angles": ("cylinder",), "none": ("joint", "cylinder", "tip_imu")}[zeros]
-    return names + [name for name in zero_names(scene, imu) if not name.startswith(trusted)]
+    trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[zeros]
+    return names + zero_names(scene, [stream for stream in streams if stream not in trusted])
 
 
-def zero_names(scene: Scene, imu: bool = True) -> list[str]:
-    """Zeros of angle sensors, stroke transducers, and the IMU."""
+def zero_names(scene: Scene, streams: Sequence[Stream] = tuple(Stream)) -> list[str]:
+    """Zeros of the sensors of some of the streams of `ZEROS`."""
     channels = channels_of(len(scene.joints))
-    streams = [Stream.ANGLES, Stream.STROKES, *([Stream.IMU] if imu else [])]
-    return [f"{channel}.zero" for stream in streams for channel in channels[stream]]
+    return [f"{channel}.zero" for stream in ZEROS if stream in streams for channel in channels[stream]]
 
 
 def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:

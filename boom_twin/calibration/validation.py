@@ -61,7 +61,7 @@ def judged(
         The twin predicts nothing there.
     """
     twin = Twin(scene, settings, mounts)
-    found: dict[Stream, list[Residuals]] = {Stream.ANGLES: [], Stream.IMU: []}
+    found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
     for step in drive(twin, session.samples(zeros)):
         for residuals in (each for report in step.report.all for each in report.residuals):
             if residuals.stamp >= start:

@@ -139,14 +139,14 @@ def _bar() -> Iterator[Progress]:
 def _draw(found: Calibration, out: Path) -> list[Path]:
     """Pictures beside the scene."""
     from ..calibration.output import picture_paths, shown
-    from ..plots.session import Interval, parameters_picture, residuals_picture
+    from ..plots.session import Interval, held_out_picture, parameters_picture
 
     note = f"held out: {found.held_out}"
     judged = (found.before, found.after)
     paths = picture_paths(out)
     times = (found.before.times, found.after.times)
     normalised = (found.before.values / found.before.sigmas, found.after.values / found.after.sigmas)
-    residuals_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)
+    held_out_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)
     intervals = []
     for estimate in found.estimates:
         factor, unit = shown(estimate)

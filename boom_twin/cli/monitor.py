@@ -57,12 +57,12 @@ def run(args: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
-    from ..monitor.actions import Recording, ViewerActions
+    from ..monitor.actions import RecorderProcess, ViewerActions
     from ..monitor.log_limit import write_log
 
     _give_way()
     write_log()
-    recording = Recording(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
+    recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
         with _feed(args) as feed:
             _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))

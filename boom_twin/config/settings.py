@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import UsageError
+from ..types import SensorKind
 from .yaml_text import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)
@@ -147,6 +148,15 @@ class Settings(BaseModel):
             known = ", ".join(self.live_names())
             raise UsageError(f"{', '.join(fixed)}: fixed while the twin runs. What can change: {known}.")
         return settings_from({**self.model_dump(), **live}, "change of settings")
+
+    def noise(self, kind: SensorKind) -> tuple[float, float]:
+        """Standard deviation of the noise and resolution of the sensors of a stream, in their SI unit."""
+        return getattr(self, kind.noise), getattr(self, kind.resolution) if kind.resolution else 0.0
+
+    def variance(self, kind: SensorKind) -> float:
+        """Noise and rounding of one reading of the sensors of a stream, in the square of their SI unit."""
+        sigma, resolution = self.noise(kind)
+        return sigma**2 + resolution**2 / 12.0
 
     @property
     def stroke_variance(self) -> float:

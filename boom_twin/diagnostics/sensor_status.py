@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isnan, radians
+from math import inf, isnan
 
 from ..config.settings import Settings, Thresholds
-from ..health.sensor_monitor import readings_of_frozen
+from ..health.sensor_monitor import readings_of_frozen, sensor_ranges
 from ..scene.schema import Scene
 from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
@@ -94,7 +94,7 @@ def sensors_of(
     Parameters
     ----------
     scene : Scene
-        Gives the ranges: strokes 0 to ``max_stroke``, angles as in ``range_deg``.
+        Gives the ranges, see `boom_twin.health.sensor_monitor.sensor_ranges`.
     settings : Settings
         Noise and resolution.
     required : dict of Stream to bool
@@ -102,15 +102,12 @@ def sensors_of(
     mounts : sequence of Mount or None
         Of the sensor of each joint; an inclinometer (not None) has no range of its own.
     """
-    joints, found = len(scene.joints), {}
-    travels = [(0.0, joint.cylinder.max_stroke) for joint in scene.joints]
-    turns = [(radians(joint.range_deg[0]), radians(joint.range_deg[1])) for joint in scene.joints]
-    angles = [(-inf, inf) if mount is not None else turn for turn, mount in zip(turns, mounts, strict=True)]
-    ranges = {Stream.STROKES: travels, Stream.ANGLES: angles}
+    found = {}
+    ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
-        sigma, resolution = (getattr(settings, name) if name else 0.0 for name in (kind.noise, kind.resolution))
-        unit, over, channels = kind.unit.replace("/", "_").replace("^", ""), SLACK * sigma, kind.channels(joints)
-        bounds = zip(channels, ranges.get(stream, [(-inf, inf)] * len(channels)), strict=True)
+        sigma, resolution = settings.noise(kind)
+        unit, over = kind.unit_suffix, SLACK * sigma
+        bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         about = sigma, resolution, required[stream]
-        found[stream] = [Sensor(name, unit, low - over, high + over, *about) for name, (low, high) in bounds]
+        found[stream] = [Sensor(name, unit, low - over, high + over, *about) for name, low, high in bounds]
     return found

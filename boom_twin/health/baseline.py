@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..config.settings import checked
 from ..config.yaml_text import read_plain
 from ..errors import UsageError
-from ..types import Array
+from ..types import Array, Stream, channels_of
 from .inference.fault_catalogue import Parameter, variances
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "baseline.yaml"))
@@ -23,8 +23,18 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = list[Finite]
 
 
+JUDGED = {Stream.ANGLES: "angle", Stream.IMU: "force"}
+"""The streams whose residuals are judged, and how the keys of a baseline begin that are of them."""
+
+
+def judged_channels(joints: int) -> tuple[str, ...]:
+    """Names of the channels whose residuals are judged: ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``."""
+    known = channels_of(joints)
+    return tuple(name for stream in JUDGED for name in known[stream])
+
+
 class Baseline(BaseModel):
-    """A baseline as its file has it; SI units. Channels are ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``.
+    """A baseline as its file has it; SI units. Its channels are those of `judged_channels`, c of them.
 
     Without learning, parameters may be off by what `boom_twin.health.inference.fault_catalogue` calls healthy.
     """
@@ -43,12 +53,16 @@ class Baseline(BaseModel):
     detuning: Positive = Field(default=0.01, description="share by which natural frequencies may be wrong")
 
     def errors(self, joints: int) -> Array:
-        """Deviation of the model's error of every channel, shape (joints + 2,)."""
-        return np.array([self.angle_error] * joints + [self.force_error] * 2)
+        """Deviation of the model's error of every channel, shape (c,)."""
+        return self._by_channel("error", joints)
 
     def noise(self, joints: int) -> Array:
-        """Factors on the noise of every channel, shape (joints + 2,)."""
-        return np.array([self.angle_noise] * joints + [self.force_noise] * 2)
+        """Factors on the noise of every channel, shape (c,)."""
+        return self._by_channel("noise", joints)
+
+    def _by_channel(self, what: str, joints: int) -> Array:
+        known = channels_of(joints)
+        return np.array([getattr(self, f"{key}_{what}") for stream, key in JUDGED.items() for _ in known[stream]])
 
     def healthy(self, known: tuple[Parameter, ...]) -> tuple[Array, Array]:
         """Mean (parameters,) and covariance (parameters, parameters) of all parameters while all is well.

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, Alarm, Array, Health, Mount, Stream, channels_of
-from .baseline import Baseline
+from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
+from .baseline import JUDGED, Baseline, judged_channels
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, Compared, Followed, means
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import SensorCheck, SensorMonitor
+from .sensor_monitor import SensorCheck, SensorMonitor, sensor_ranges
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
+CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.is_smooth)
+"""The streams whose single sensors are checked."""
 
 
 class HealthMonitor:
@@ -42,18 +45,11 @@ class HealthMonitor:
         baseline: Baseline,
         on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
-        n = len(scene.joints)
-        self._n, self._settings = n, settings
-        channels = channels_of(n)
-        self.names = (*channels[Stream.ANGLES], *channels[Stream.IMU])
-        self._low = np.array([np.radians(joint.range_deg[0]) for joint in scene.joints])
-        self._high = np.array([np.radians(joint.range_deg[1]) for joint in scene.joints])
-        absolute = np.array([mount is not None for mount in mounts])
-        self._low[absolute], self._high[absolute] = -np.inf, np.inf
-        self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+        self._settings, self._channels = settings, channels_of(len(scene.joints))
+        self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
-        self._angle_watch = SensorMonitor(channels[Stream.ANGLES], "rad")
-        self._stroke_watch = SensorMonitor(channels[Stream.STROKES], "m")
+        self._ranges = sensor_ranges(scene, mounts)
+        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream].unit) for stream in CHECKED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -62,9 +58,11 @@ class HealthMonitor:
         """The boom starts from rest; alarms of sensors go on."""
         settings = self._settings
         self._blocks = BlockBuilder()
-        self._angles = SensorCheck(settings.angle_sigma, settings.angle_resolution, self._low, self._high, 0.0)
-        zero = np.zeros(self._n)
-        self._strokes = SensorCheck(settings.stroke_sigma, settings.stroke_resolution, zero, self._travel, settings.stroke_rate)
+        fastest = {Stream.STROKES: settings.stroke_rate}
+        self._checks = {
+            stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
+            for stream in CHECKED
+        }
         ended = self.residuals.close(self._told)
         if ended is not None:
             self._ended.append(ended)
@@ -75,9 +73,8 @@ class HealthMonitor:
         self._blocks.predicted(followed)
 
     def measured(self, stream: Stream, compared: Compared) -> None:
-        """Samples of one stream with their residuals, at least one; only angles and IMU matter."""
-        if stream in (Stream.ANGLES, Stream.IMU):
-            self._blocks.measured(stream, compared)
+        """Samples of one stream with their residuals, at least one."""
+        self._blocks.measured(stream, compared)
 
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
@@ -102,41 +99,54 @@ class HealthMonitor:
         if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
             return None
         self._told = done[-1].end
-        lasting = (*self._stroke_watch.alarms, *self._angle_watch.alarms)
+        alarms = [alarm for alarm in news if alarm.until is not None]
+        for monitor in self._sensors.values():
+            alarms += monitor.alarms
         if self.residuals.alarm is not None:
-            lasting = (*lasting, self.residuals.alarm)
-        ended = tuple(alarm for alarm in news if alarm.until is not None)
-        return Health(self._told, (*ended, *lasting), self.names, self.residuals.levels, self._tip_sigmas())
+            alarms.append(self.residuals.alarm)
+        return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas())
 
     def _judge(self, block: Block) -> list[Alarm]:
-        start, predictions = block.number * BLOCK, block.predictions()
-        stamps, raw, left = block.readings(Stream.ANGLES, self._n)
-        times, stroke_times = np.asarray(stamps * NANO, float), np.asarray(predictions.stamps * NANO, float)
-        before = self._angle_watch.masked
-        news = self._angle_watch.take(self._angles.look(times, raw, raw - left, block.end * NANO), start, block.end)
-        if (self._angle_watch.masked & ~before).any():
-            self.residuals.forget()
-        readings = predictions.measured
-        strokes = self._strokes.look(stroke_times, readings, np.zeros_like(readings), block.end * NANO)
-        news += self._stroke_watch.take(strokes, start, block.end)
-        if self._stroke_watch.masked.any() or self._noise is None:
+        start, predictions, news = block.number * BLOCK, block.predictions(), []
+        readings = {stream: block.readings(stream, len(names)) for stream, names in self._channels.items()}
+        for stream, (stamps, raw, left) in readings.items():
+            if stream in CHECKED and stream is not Stream.STROKES:
+                news += self._check(stream, block, stamps, raw, raw - left)
+        strokes = predictions.measured
+        news += self._check(Stream.STROKES, block, predictions.stamps, strokes, np.zeros_like(strokes))
+        if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
             ended = self.residuals.close(start)
             self.residuals.begin()
             return news if ended is None else [*news, ended]
-        told = self.residuals.take(self._means(block, predictions, left), self._noise)
+        averaged = self._means(block, predictions, {stream: rows.left for stream, rows in readings.items()})
+        told = self.residuals.take(averaged, self._noise)
         return news if told is None else [*news, told]
 
-    def _means(self, block: Block, predictions: Followed, left: Array) -> BlockMeans:
-        settings, stamps = self._settings, predictions.stamps
-        angle, angle_count = means(left, settings.angle_variance**0.5)
-        angle[self._angle_watch.masked] = np.nan
-        force, force_count = means(block.readings(Stream.IMU, 2).left, settings.imu_sigma)
+    def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
+        """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
+        monitor = self._sensors[stream]
+        before = monitor.masked
+        findings = self._checks[stream].look(np.asarray(stamps * NANO, float), raw, expected, block.end * NANO)
+        news = monitor.take(findings, block.number * BLOCK, block.end)
+        if stream in JUDGED and (monitor.masked & ~before).any():
+            self.residuals.forget()
+        return news
+
+    def _means(self, block: Block, predictions: Followed, left: dict[Stream, Array]) -> BlockMeans:
+        """Means of the residuals (k, channels) of every stream that is judged."""
+        stamps, found = predictions.stamps, []
+        for stream in JUDGED:
+            mean, count = means(left[stream], self._settings.variance(SENSORS[stream]) ** 0.5)
+            if stream in self._sensors:
+                mean[self._sensors[stream].masked] = np.nan
+            found.append((mean, count))
         span = int(stamps[-1] - stamps[0]) * NANO
-        rates = (predictions.joints[-1] - predictions.joints[0]) / span if span > 0.0 else np.zeros(self._n)
+        joints = predictions.joints
+        rates = (joints[-1] - joints[0]) / span if span > 0.0 else np.zeros_like(joints[0])
         return BlockMeans(
             start=block.number * BLOCK,
-            left=np.concatenate([angle, force]),
-            counts=np.concatenate([angle_count, force_count]),
+            left=np.concatenate([mean for mean, _ in found]),
+            counts=np.concatenate([count for _, count in found]),
             strokes=predictions.strokes[len(stamps) // 2],
             variances=self._variances,
             rates=rates,

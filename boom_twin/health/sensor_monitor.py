@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import Alarm, Array
+from ..scene.schema import Scene
+from ..types import Alarm, Array, Mount, Stream, channels_of
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -53,6 +55,31 @@ REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to r
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s
 MISSING = 0.1  # share of the readings
+
+
+def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
+    """Lowest and highest values that the sensors of every stream can measure.
+
+    Parameters
+    ----------
+    scene : Scene
+        Strokes are from 0 to ``max_stroke``, angles as in ``range_deg``; others have no bounds.
+    mounts : sequence of Mount or None
+        Of the sensor of each joint; an inclinometer (not None) has no bounds either.
+
+    Returns
+    -------
+    dict of Stream to (ndarray, ndarray)
+        SI, shape (channels,) each; infinite where there is no bound.
+    """
+    joints = scene.joints
+    found = {stream: (np.full(len(c), -np.inf), np.full(len(c), np.inf)) for stream, c in channels_of(len(joints)).items()}
+    found[Stream.STROKES] = np.zeros(len(joints)), np.array([joint.cylinder.max_stroke for joint in joints])
+    for i, (joint, mount) in enumerate(zip(joints, mounts, strict=True)):
+        if mount is None:
+            for bound, degrees in zip(found[Stream.ANGLES], joint.range_deg, strict=True):
+                bound[i] = math.radians(degrees)
+    return found
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS
+from ..types import SENSORS, stream_of
 from .topic_table import (
     TYPES,
     Qos,
@@ -23,7 +23,6 @@ from .topic_table import (
     kind_faults,
     load_topics,
     set_faults,
-    stream_of,
     usual,
 )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from functools import cache
@@ -13,10 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Mount, Stream, channels_of
+from ..types import SENSORS, Mount, Stream, channels_of, sensor_kind, stream_of
 
 AXES = ("x", "y", "z")
-NUMBER = re.compile(r"[1-9]\d{0,3}")
 
 
 class Sensor(BaseModel):
@@ -32,15 +30,6 @@ class Sensor(BaseModel):
     absolute: Mount | None = None
 
 
-def stream_of(channel: str) -> Stream | None:
-    """Where a channel comes by; None if there can be no such channel."""
-    stem, _, end = channel.rpartition("_")
-    for stream, kind in SENSORS.items():
-        if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
-            return stream
-    return None
-
-
 def number_of(channel: str) -> int:
     """Of a channel ``cylinder_i`` or ``joint_i``: i."""
     return int(channel.rpartition("_")[2])
@@ -53,27 +42,21 @@ def channels(stream: Stream, joints: int) -> list[str]:
 
 def usual(channel: str) -> dict[str, Any]:
     """Name and unit of a channel that no mapping names."""
-    stream = stream_of(channel)
-    assert stream is not None
-    kind = SENSORS[stream]
+    kind = sensor_kind(channel)
     return {"name": channel.rpartition("_")[2] if kind.is_imu else channel, "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
     """By what reading minus zero is multiplied."""
-    stream = stream_of(channel)
-    assert stream is not None
-    return sensor.sign * sensor.scale * SENSORS[stream].units[sensor.unit]
+    return sensor.sign * sensor.scale * sensor_kind(channel).units[sensor.unit]
 
 
 def kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
     """What a channel of this kind cannot have, of the keys as they stand in the file."""
-    stream, place = stream_of(channel), f"sensors.{channel}"
-    assert stream is not None
-    kind = SENSORS[stream]
+    kind, place = sensor_kind(channel), f"sensors.{channel}"
     if (unit := given.get("unit", kind.unit)) not in list(kind.units):
         yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
-    if stream is not Stream.ANGLES and (mount := given.get("absolute")) is not None:
+    if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
         yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
     if kind.is_imu and (name := given.get("name", "x")) not in AXES:
         yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")

@@ -14,11 +14,11 @@ from ..bag.async_writer import PATIENCE
 from ..system.child_process import python_command
 from .data.feed import Feed
 
-PARTING = 2 * PATIENCE
+RECORDER_TIMEOUT = 2 * PATIENCE
 """Seconds that a recorder may take to end: longer than it waits for its disk, or a slow disk would cost messages."""
 
 
-class Recording:
+class RecorderProcess:
     """Runs one recorder at a time.
 
     Parameters
@@ -63,7 +63,7 @@ class Recording:
         if self._process is not None:
             self.stop()
             try:
-                self._process.wait(PARTING)
+                self._process.wait(RECORDER_TIMEOUT)
             except subprocess.TimeoutExpired:
                 self._process.kill()
 
@@ -85,11 +85,11 @@ class ViewerActions:
     feed : Feed
     permitted : set of str
         Of `ACTS`, and `AT_NODE`.
-    recording : Recording, optional
+    recording : RecorderProcess, optional
         What ``record`` starts and stops.
     """
 
-    def __init__(self, feed: Feed, permitted: frozenset[str], recording: Recording | None = None) -> None:
+    def __init__(self, feed: Feed, permitted: frozenset[str], recording: RecorderProcess | None = None) -> None:
         self._feed, self._recording = feed, recording
         self.permitted = permitted if recording is not None else permitted - {"record"}
         if AT_NODE in permitted:
@@ -130,7 +130,7 @@ class ViewerActions:
         if self._feed.end is None:
             self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
         is_kept_by_node = bool(alarm.causes) and alarm.end is not None
-        asked = f"; {self._feed.let_go()}" if is_kept_by_node and AT_NODE in self.permitted else ""
+        asked = f"; {self._feed.release_alarms()}" if is_kept_by_node and AT_NODE in self.permitted else ""
         return f"acknowledged: {alarm.name}{asked}"
 
     def _record(self, request: dict[str, Any]) -> str:

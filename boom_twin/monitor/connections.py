@@ -67,7 +67,7 @@ class Connections:
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
-        self._silent, self._let_in = ConnectionCount(), ConnectionCount()
+        self._silent, self._accepted = ConnectionCount(), ConnectionCount()
 
     def __call__(self) -> Connection:
         """A new one, as `asyncio.loop.create_server` asks for it."""
@@ -75,23 +75,23 @@ class Connections:
 
     def begin(self, connection: Connection) -> None:
         """It was made, and has sent nothing yet."""
-        self._cut(self._silent.take(connection), "a newer one")
+        self._disconnect(self._silent.take(connection), "a newer one")
 
-    def let_in(self, connection: Connection) -> None:
+    def accept(self, connection: Connection) -> None:
         """A request of it was let in."""
         self._silent.leave(connection)
-        self._cut(self._let_in.take(connection), "a newer one")
+        self._disconnect(self._accepted.take(connection), "a newer one")
 
     def end(self, connection: Connection) -> None:
         """It needs no place any more: it is closed, or a viewer's."""
         self._silent.leave(connection)
-        self._let_in.leave(connection)
+        self._accepted.leave(connection)
 
     def expire(self, connection: Connection) -> None:
         """Its time is over."""
-        self._cut(connection, f"it sent no request within {REQUEST_TIME:g} s")
+        self._disconnect(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
-    def _cut(self, connection: Connection | None, reason: str) -> None:
+    def _disconnect(self, connection: Connection | None, reason: str) -> None:
         if connection is not None:
             self.end(connection)
             LOG.warning("cut off a connection of %s: %s", connection.address, reason)
@@ -121,14 +121,14 @@ class Connection(web.RequestHandler):
 
     def connection_lost(self, exc: BaseException | None) -> None:
         """Give its place to another."""
-        self._wait_no_more()
+        self._cancel_deadline()
         self._all.end(self)
         super().connection_lost(exc)
 
-    def let_in(self) -> None:
+    def accept(self) -> None:
         """A whole request came, and was let in."""
-        self._wait_no_more()
-        self._all.let_in(self)
+        self._cancel_deadline()
+        self._all.accept(self)
 
     def become_viewer(self) -> None:
         """It is a WebSocket from now on."""
@@ -136,7 +136,7 @@ class Connection(web.RequestHandler):
 
     def abort(self) -> None:
         """Close it without a word."""
-        self._wait_no_more()
+        self._cancel_deadline()
         if self._link is not None:
             self._link.abort()
 
@@ -153,7 +153,7 @@ class Connection(web.RequestHandler):
         response.headers.update(POLICY)
         return response
 
-    def _wait_no_more(self) -> None:
+    def _cancel_deadline(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None

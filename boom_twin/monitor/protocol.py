@@ -29,9 +29,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..types import SENSORS
 from .data.dropped_messages import DroppedMessages
-from .data.status import HEALTH, Alarm, Level, StatusLamp, overall, worst
+from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
 from .data.store import Store
+from .data.topic_rows import RESIDUALS
 
 ROWS, SPECTRUM, SPECTROGRAM = 1, 2, 3
 HEAD = struct.Struct("<BBHI")
@@ -49,23 +51,31 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 
     All is not well where messages were dropped, whatever the lamps say: they may have told otherwise.
     """
-    groups = store.board(now).groups(now)
+    groups = store.statuses(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
     losses = [] if dropped is None else dropped.told()
-    if losses and level == Level.OK:
-        level, reason = Level.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
+    if losses and level == Severity.OK:
+        level, reason = Severity.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
     return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told, "dropped": losses}
 
 
 def layout(store: Store) -> dict[str, Any]:
-    """The tables that there are."""
-    tables = [{"name": table.name, "columns": table.columns} for table in store.tables.values()]
+    """The tables that there are; of those of residuals also what they are of, and the unit that they are shown in."""
+    tables = [{"name": name, "columns": table.columns, **_residuals(name)} for name, table in store.tables.items()]
     return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
 
 
-def alarms(found: list[Alarm]) -> dict[str, Any]:
+def _residuals(table: str) -> dict[str, Any]:
+    stream = next((stream for stream, name in RESIDUALS.items() if name == table), None)
+    if stream is None:
+        return {}
+    factor, unit = SENSORS[stream].shown_unit
+    return {"residuals": {"title": SENSORS[stream].title, "factor": factor, "unit": unit}}
+
+
+def alarms(found: list[ListedAlarm]) -> dict[str, Any]:
     """All alarms, oldest first."""
     return {"kind": "alarms", "alarms": [{**asdict(alarm), "level": alarm.level.name} for alarm in found]}
 
@@ -78,7 +88,7 @@ def dump(message: Any) -> str:
 def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[StatusLamp]:
     """Lamps with the rig's health as the alarms that last; a lamp that stands for them goes, unless its node is silent."""
     health = next((lamp for lamp in lamps if lamp.name == HEALTH), None)
-    if not alarms or (health is not None and health.level == Level.STALE):
+    if not alarms or (health is not None and health.level == Severity.STALE):
         return lamps
     return [*alarms, *(lamp for lamp in lamps if lamp is not health)]
 
@@ -86,8 +96,8 @@ def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[Stat
 def _group(lamps: list[StatusLamp]) -> dict[str, Any]:
     lamp = worst(lamps)
     if lamp is None:
-        return {"level": Level.OFF.name, "reason": "not there", "lamps": []}
-    reason = f"{len(lamps)} as expected" if lamp.level == Level.OK and len(lamps) > 1 else lamp.reason
+        return {"level": Severity.OFF.name, "reason": "not there", "lamps": []}
+    reason = f"{len(lamps)} as expected" if lamp.level == Severity.OK and len(lamps) > 1 else lamp.reason
     return {"level": lamp.level.name, "reason": reason, "lamps": [{**asdict(each), "level": each.level.name} for each in lamps]}
 
 

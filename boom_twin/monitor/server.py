@@ -20,9 +20,9 @@ PAGE = Path(__file__).parent / "page"
 MOST_VIEWERS = 16
 LONGEST = 4096
 """Bytes of a request of the page."""
-POLL = 1.0 / 60.0
+POLL_PERIOD = 1.0 / 60.0
 """Seconds between looks at what has come."""
-LOOK = 10.0
+PEAK_PERIOD = 10.0
 """Seconds between looks at the spectrum of a live session when nobody looks."""
 HEARTBEAT = 60.0
 """Seconds without an answer after which a viewer is taken to have gone."""
@@ -51,14 +51,14 @@ class Server:
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
         application.cleanup_ctx.append(self._run)
-        application.on_shutdown.append(self._part)
+        application.on_shutdown.append(self._close_viewers)
         return application
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         self._access.check(request)
         if isinstance(request.protocol, Connection):
-            request.protocol.let_in()
+            request.protocol.accept()
         return await handler(request)
 
     async def _index(self, request: web.Request) -> web.FileResponse:
@@ -88,7 +88,7 @@ class Server:
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         """Let the feed take what comes, as long as the server runs."""
         self._analyst = Analyst(self._feed)
-        tasks = [asyncio.create_task(each()) for each in (self._poll, self._look)]
+        tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks)]
         tasks[0].add_done_callback(_stop_on_fault)
         yield
         for task in tasks:
@@ -99,15 +99,15 @@ class Server:
     async def _poll(self) -> None:
         while True:
             self._feed.poll()
-            await asyncio.sleep(POLL)
+            await asyncio.sleep(POLL_PERIOD)
 
-    async def _look(self) -> None:
+    async def _track_peaks(self) -> None:
         """Know where the peaks of a live session were at first, whether or not a page is open."""
         while self._feed.end is None:
-            await self._analyst.look(self._feed.store.newest)
-            await asyncio.sleep(LOOK)
+            await self._analyst.spectrum_at(self._feed.store.newest)
+            await asyncio.sleep(PEAK_PERIOD)
 
-    async def _part(self, application: web.Application) -> None:
+    async def _close_viewers(self, application: web.Application) -> None:
         for socket in set(self._viewers):
             await socket.close()
 

@@ -1,7 +1,7 @@
 """One viewer of the live page: what it is sent and what it asks for.
 
-Nothing is queued for it. What it is owed follows from what it has got: rows by their numbers, lamps and alarms by their newest
-state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
+Nothing is queued for it. What it is still to be sent follows from what it has got: rows by their numbers, lamps and alarms by
+their newest state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ class Viewer:
         self._generation = -1
         self._tables = 0
         self._alarms = ""
-        self._past = -inf
+        self._spectrogram_until = -inf
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
-        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectrum, self._hear)]
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectrum, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
@@ -68,7 +68,7 @@ class Viewer:
 
     async def _send(self) -> None:
         feed, told = self._feed, -STATE_PERIOD
-        await self._say(
+        await self._send_text(
             {
                 "kind": "hello",
                 "title": feed.title,
@@ -78,16 +78,16 @@ class Viewer:
             }
         )
         last = time.monotonic()
-        board = None
+        statuses = None
         while not self._socket.closed:
             now = time.monotonic()
             position = self._advance(now - last)
             last = now
             await self._restart_if_cleared()
-            newest = feed.store.board(position)
-            if newest is not board or now - told >= STATE_PERIOD:
-                board, told = newest, now
-                await self._say_state(position)
+            newest = feed.store.statuses(position)
+            if newest is not statuses or now - told >= STATE_PERIOD:
+                statuses, told = newest, now
+                await self._send_state(position)
             await self._send_rows(position)
             await asyncio.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
 
@@ -98,13 +98,13 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent, self._past = store.generation, 0, {}, -inf
-            await self._say({"kind": "reset"})
+            self._generation, self._tables, self._sent, self._spectrogram_until = store.generation, 0, {}, -inf
+            await self._send_text({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
-            await self._say(layout(store))
+            await self._send_text(layout(store))
 
-    async def _say_state(self, position: float) -> None:
+    async def _send_state(self, position: float) -> None:
         feed, play = self._feed, self._playback
         now = feed.now() if play is None else position
         message = state(feed.store, now, position, feed.topic_rows.dropped)
@@ -112,30 +112,30 @@ class Viewer:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
         message |= {"trouble": feed.trouble, "is_recording": self._actions.is_recording}
-        await self._say(message)
+        await self._send_text(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
             self._alarms = told
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """All rows that are owed now, in messages of bounded size; what comes meanwhile waits for the lamps' next turn."""
+        """All rows that are not sent yet, in messages of bounded size; what comes meanwhile waits for the lamps' next turn."""
         tables = list(self._feed.store.tables.values())[: self._tables]
-        owed = {number: self._owed(table, position) for number, table in enumerate(tables)}
-        while owed:
+        unsent = {number: self._unsent(table, position) for number, table in enumerate(tables)}
+        while unsent:
             blocks = []
-            for number, (first, end) in list(owed.items()):
+            for number, (first, end) in list(unsent.items()):
                 last = min(end, first + CHUNK)
                 if last > first:
                     blocks.append(pack(ROWS, number, *tables[number].rows(first, last)))
                 self._sent[tables[number].name] = last
-                owed[number] = (last, end)
+                unsent[number] = (last, end)
                 if last == end:
-                    del owed[number]
+                    del unsent[number]
             if blocks:
                 await self._socket.send_bytes(b"".join(blocks))
 
-    def _owed(self, table: Table, position: float) -> tuple[int, int]:
+    def _unsent(self, table: Table, position: float) -> tuple[int, int]:
         """Numbers of the first row to send and of the one after the last."""
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
@@ -155,28 +155,28 @@ class Viewer:
     async def _send_spectrum(self) -> None:
         while not self._socket.closed:
             position = self._feed.store.newest if self._playback is None else self._playback.position
-            found = await self._analyst.look(position)
+            found = await self._analyst.spectrum_at(position)
             if found is not None and self._tables:
                 lines, block = found
-                await self._say(lines)
+                await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            await self._send_past(position)
+            await self._send_spectrogram(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
-    async def _send_past(self, position: float) -> None:
-        """The columns of the spectrogram that are owed."""
+    async def _send_spectrogram(self, position: float) -> None:
+        """The columns of the spectrogram that are not sent yet."""
         generation = self._generation
-        found = await self._analyst.past(max(self._past, position - HISTORY), position)
+        found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
-            self._past, block = found
+            self._spectrogram_until, block = found
             await self._socket.send_bytes(block)
 
-    async def _say(self, message: dict[str, Any]) -> None:
+    async def _send_text(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(dump(message))
 
     # -- in -----------------------------------------------------------------------------------------------------------
 
-    async def _hear(self) -> None:
+    async def _receive(self) -> None:
         """Carry out requests; a page that sends anything else is sent away."""
         second, count = 0.0, 0
         async for message in self._socket:
@@ -190,7 +190,7 @@ class Viewer:
                 await self._socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"not a request of this page")
                 return
             if answer is not None:
-                await self._say(answer)
+                await self._send_text(answer)
 
     def _do(self, request: Any) -> dict[str, Any] | None:
         if not isinstance(request, dict):
@@ -202,11 +202,11 @@ class Viewer:
             value = float(request["value"])
             if not isfinite(value):
                 raise ValueError("not a number")
-            self._steer(play, request["do"], value)
+            self._control_playback(play, request["do"], value)
             return None
         return self._actions.act(request)
 
-    def _steer(self, play: Playback, what: str, value: float) -> None:
+    def _control_playback(self, play: Playback, what: str, value: float) -> None:
         if what == "seek":
             play.seek(value)
             self._generation = -1
@@ -214,5 +214,5 @@ class Viewer:
             play.pace(value)
         else:
             if play.is_at_end and not value:
-                self._steer(play, "seek", 0.0)
+                self._control_playback(play, "seek", 0.0)
             play.is_held = bool(value)

@@ -31,10 +31,10 @@ def history_of(recording: Recording, scene: Scene) -> History:
     """Everything a replay predicted, as arrays; times from the first prediction."""
     predictions = recording.predictions
     first = int(predictions.stamps[0])
-    force = recording.of(Stream.IMU)
+    groups = {stream: recording.of(stream) for stream in Stream}
     stamps = _seconds(predictions.stamps, first)
     felt = tip_specific_force(predictions.tip_acceleration, predictions.tip_angle, gravity_in_base(scene))
-    names, times, values, sigmas = _channels([recording.of(Stream.ANGLES), force], first)
+    names, times, values, sigmas = _channels(list(groups.values()), first)
     return History(
         stamps_s=stamps,
         tip_displacement=predictions.tip_displacement,
@@ -47,7 +47,7 @@ def history_of(recording: Recording, scene: Scene) -> History:
         residual_names=names,
         residual_values=values,
         residual_sigmas=sigmas,
-        imu=_imu(force, stamps, felt, first),
+        imu=_imu(groups[Stream.IMU], stamps, felt, first),
         shapes=[(float(stamps[row]), outline.shape) for row, outline in predictions.outlines.items()],
         gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
         alarms=_alarms(recording, first),

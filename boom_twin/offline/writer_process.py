@@ -15,8 +15,8 @@ from ..errors import BoomTwinError
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
-from ..twin.blocks import CODES, Outline, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Report
+from ..twin.blocks import CODES, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import Outline, Report
 from .process_pipe import END, Pipe, received, say_ready
 
 BATCH = 200  # single reports in one pickle

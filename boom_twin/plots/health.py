@@ -10,7 +10,7 @@ import numpy as np
 from ..types import Array
 from .history import AlarmSpan, History
 from .residuals import running_mean
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, limits, picture, shade_gaps
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ def timeline_picture(
     levels: Array,
     note: str,
 ) -> None:
-    """Write it.
+    """Write the picture of the alarms of a session, and of the levels of its channels.
 
     Parameters
     ----------
@@ -85,13 +85,13 @@ def _levels(axes: Axes, stamps: Array, names: tuple[str, ...], levels: Array) ->
     axes.axhline(1.0, color=ORANGE, linewidth=1.6)
     axes.set_ylim(SMALLEST, max(2.0, float(levels.max(initial=1.0)) * 1.5))
     if names:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderaxespad=0.1, handlelength=1.2)
+        legend_above(axes, 8, handlelength=1.2)
 
 
 def frequency_picture(
     path: Path, session: str, times: Array, model: Array, measured: list[tuple[float, float]], note: str
 ) -> None:
-    """Write it.
+    """Write the picture of natural frequencies, the model's and measured ones, over time.
 
     Parameters
     ----------
@@ -111,10 +111,10 @@ def frequency_picture(
             lines[0].set_label("model, in the posture of the moment")
         if measured:
             axes.plot(*zip(*measured, strict=True), "o", color=ORANGE, markersize=8, label="measured")
-        axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
+        axes.set_xlim(extent(times))
         axes.set_ylabel("frequency, Hz")
         axes.set_xlabel("time since first sample, s")
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
+        legend_above(axes, 2)
 
 
 SLOW = 4.0
@@ -122,7 +122,7 @@ SLOW = 4.0
 
 
 def moment_picture(path: Path, session: str, history: History, rows: list[tuple[str, int]], note: str) -> None:
-    """Write it; `rows` are a name and the column of `history.moments` of every section."""
+    """Write the picture of bending moments; `rows` are a name and the column of `history.moments` of every section."""
     title, size = f"{session}: bending moment where each section is loaded most", (16.0, 1.4 + 2.1 * len(rows))
     with picture(path, title, note, size) as figure:
         panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
@@ -134,8 +134,8 @@ def moment_picture(path: Path, session: str, history: History, rows: list[tuple[
             axes.set_ylim(*limits(moment))
             axes.set_title(name)
             axes.set_ylabel("moment, kN m")
-        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
-        panels[-1].set_xlim(history.stamps_s[0], max(history.stamps_s[-1], history.stamps_s[0] + 1e-3))
+        legend_above(panels[0], 2)
+        panels[-1].set_xlim(extent(history.stamps_s))
         panels[-1].set_xlabel("time since first sample, s")
 
 

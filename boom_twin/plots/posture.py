@@ -9,7 +9,7 @@ import numpy as np
 
 from .boom import draw_base
 from .history import History, Orbits
-from .style import GREEN, GREY, INK, ORANGE, broken, picture
+from .style import GREEN, GREY, INK, ORANGE, broken, extent, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
         axes = figure.add_subplot()
         axes.set_aspect("equal", adjustable="datalim")
         chosen = [history.shapes[k] for k in spread(len(history.shapes), MOST_LINES)]
-        span = Normalize(float(history.stamps_s[0]), float(max(history.stamps_s[-1], history.stamps_s[0] + 1e-3)))
+        span = Normalize(*extent(history.stamps_s))
         for stamp, line in chosen[1:-1]:
             axes.plot(line[:, 0], line[:, 1], color=colours(span(stamp)), linewidth=1.4)
         _, tip = broken(history.stamps_s, history.tip_position, history.gaps)
@@ -73,7 +73,7 @@ def orbits_picture(path: Path, title: str, orbits: Orbits, note: str = "") -> No
                 _panel(axes, orbits, number, colours)
             else:
                 axes.axis("off")
-        span = Normalize(float(orbits.times[0]), float(max(orbits.times[-1], orbits.times[0] + 1e-3)))
+        span = Normalize(*extent(orbits.times))
         bar = figure.colorbar(ScalarMappable(span, colours), ax=panels, shrink=0.8, pad=0.01)
         bar.set_label("time, s (orange: in flight)")
         bar.outline.set_edgecolor(GREY)

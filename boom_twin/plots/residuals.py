@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import welch
 
-from ..types import Array
+from ..types import Array, sensor_kind
 from .history import History
-from .style import BLUE, GREY, INK, ORANGE, SKY, picture, shade_alarms, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, SKY, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,19 +33,12 @@ def residual_picture(path: Path, session: str, history: History, note: str) -> N
         panels[-1, 0].set_xlabel("time since first sample, s")
         panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
         panels[0, 1].set_title("against the unit normal")
-        panels[0, 0].legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.4, markerscale=4
-        )
-
-
-def unit_of(name: str) -> tuple[float, str]:
-    """Factor from SI, and the unit that a residual channel is shown in."""
-    return (1e3, "mrad") if name.startswith("joint_") else (1.0, "m/s²")
+        legend_above(panels[0, 0], 5, handlelength=1.4, markerscale=4)
 
 
 def _channel(axes: Axes, history: History, channel: int) -> None:
     name = history.residual_names[channel]
-    factor, unit = unit_of(name)
+    factor, unit = sensor_kind(name).shown_unit
     measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
     stamps = history.residual_stamps_s[measured]
     values = factor * history.residual_values[measured, channel]
@@ -63,7 +56,7 @@ def _channel(axes: Axes, history: History, channel: int) -> None:
     axes.plot(stamps, running_mean(stamps, values), color=ORANGE, linewidth=1.6, label="mean over 1 s")
     reach = max(4.2 * float(np.median(sigma)), 1.1 * float(np.quantile(np.abs(values), 0.9995)))
     axes.set_ylim(-reach, reach)
-    axes.set_xlim(float(stamps[0]), float(max(stamps[-1], stamps[0] + 1e-3)))
+    axes.set_xlim(extent(stamps))
 
 
 def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array:

@@ -12,7 +12,7 @@ from ..types import Array
 from .history import History, Truth
 from .posture import orbits_picture, posture_picture
 from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
-from .style import BLUE, GREEN, GREY, ORANGE, SKY, picture
+from .style import BLUE, GREEN, GREY, ORANGE, SKY, legend_above, picture
 from .tip import tip_picture
 
 
@@ -65,7 +65,7 @@ SHOWN = 30.0
 
 
 def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float, note: str = "") -> None:
-    """Write it: a bar for every figure.
+    """Write the comparison of two sessions: a bar for every figure.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def compare_picture(path: Path, title: str, names: list[str], apart: list[float]
         axes.set_xlim(-SHOWN - 4.0, SHOWN + 4.0)
         axes.grid(axis="y", visible=False)
         axes.set_xlabel("B minus A, standard deviations")
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
+        legend_above(axes)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Interval:
     told: bool
 
 
-def residuals_picture(
+def held_out_picture(
     path: Path, title: str, note: str, names: Sequence[str], times: tuple[Array, Array], normalised: tuple[Array, Array]
 ) -> None:
     """Residuals over their expected deviation, before on the left and after on the right.

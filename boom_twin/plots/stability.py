@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture
+from .style import BLUE, GREY, INK, ORANGE, SKY, TONES, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches
 
 
 @dataclass(frozen=True)
-class Line:
+class MatrixRow:
     """A row of the matrix: `marks` (keys of MARKS), one a method."""
 
     group: str
@@ -37,7 +37,7 @@ class Line:
     marks: Sequence[str]
 
 
-def matrix_picture(path: Path, title: str, methods: Sequence[str], lines: Sequence[Line], note: str = "") -> None:
+def matrix_picture(path: Path, title: str, methods: Sequence[str], lines: Sequence[MatrixRow], note: str = "") -> None:
     """Write the matrix as PNG."""
     width, height = NAMES + METHODS * len(methods) + ASIDE, TOP + ROW * len(lines) + BELOW
     with picture(path, title, note, (width, height)) as figure:
@@ -63,7 +63,7 @@ def _frame(axes: Axes, methods: Sequence[str], rows: int) -> None:
     axes.set_yticks([])
 
 
-def _row(axes: Axes, row: int, line: Line, new_group: bool) -> None:
+def _row(axes: Axes, row: int, line: MatrixRow, new_group: bool) -> None:
     from matplotlib.patches import Rectangle
 
     left = -NAMES / METHODS
@@ -129,7 +129,6 @@ def _digits(axes: Axes, counts: Array, digits: dict[str, Array]) -> None:
     axes.legend(loc="center right")
 
 
-TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
 BEFORE = 0.2  # s that are shown before a stop
 LOOKS = {"ideal": (GREY, 2.4), "contact": (ORANGE, 1.3), "spring-damper": (BLUE, 1.0)}
 

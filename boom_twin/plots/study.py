@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, SKY, picture
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, SKY, TONES, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
 STAR: dict[str, Any] = {"marker": "*", "markersize": 20, "color": PURPLE, "markeredgecolor": "white", "linewidth": 0}
 RING: dict[str, Any] = {"marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgewidth": 1.2}
 SMALL = 10.5  # points, of notes and of long legends

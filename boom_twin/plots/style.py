@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Okabe and Ito: told apart by every kind of colour vision
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
+TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
+"""Colour and marker of one curve among others."""
 DPI = 100
 MARGIN = 0.08  # of the height of an axis, above and below what is shown
 NOTE = 70  # characters of small print that fit beside a title
@@ -103,6 +105,16 @@ def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tup
     middles = np.array([0.5 * (start + stop) for start, stop in gaps])
     places = np.searchsorted(stamps, middles)
     return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
+
+
+def extent(times: Array) -> tuple[float, float]:
+    """From the first of `times` (k,) to the last, at least a millisecond: the limits of an axis."""
+    return float(times[0]), float(max(times[-1], times[0] + 1e-3))
+
+
+def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:
+    """Legend above the right end of an axes; `top` as a share of its height."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
 
 
 def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:

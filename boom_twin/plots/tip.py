@@ -9,7 +9,7 @@ import numpy as np
 
 from ..types import Array
 from .history import History, ImuTrace, Truth
-from .style import BLUE, GREY, INK, ORANGE, PALE, broken, limits, picture, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, PALE, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,8 +103,8 @@ def _truth_lines(axes: Axes, stamps: Array, values: Array, label: str) -> None:
 
 def _finish(axes: Axes, history: History) -> None:
     shade_gaps(axes, history.gaps)
-    axes.set_xlim(history.stamps_s[0], max(history.stamps_s[-1], history.stamps_s[0] + 1e-3))
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=5, borderaxespad=0.1, handlelength=1.6)
+    axes.set_xlim(extent(history.stamps_s))
+    legend_above(axes, 5, 0.99, handlelength=1.6)
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:
@@ -152,4 +152,4 @@ def _window(axes: Axes, history: History, window: tuple[float, float]) -> None:
     shade_gaps(axes, [gap for gap in history.gaps if gap[0] < window[1] and gap[1] > window[0]])
     axes.set_xlim(*window)
     axes.set_xlabel("time since first sample, s")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderaxespad=0.1, handlelength=1.6)
+    legend_above(axes, 3, 0.99, handlelength=1.6)

@@ -17,7 +17,7 @@ from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..twin.twin import EVENTS
-from ..types import NANO, SECOND, Alarm, Array
+from ..types import NANO, SECOND, SENSORS, Alarm, Array, Stream
 from .html import heading, image, page, paragraph, table
 from .quantities import BOX, Load, loads
 from .vibration import LEAST, NEAR, HoldInterval, Vibration, course
@@ -189,7 +189,7 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
     peaks = [(0.5 * (hold.start + hold.stop), each.frequency) for hold in subject.still for each in hold.measured.values()]
     path = folder / "frequencies.png"
     frequency_picture(path, subject.name, *course(subject.history, subject.scene), peaks, subject.origin)
-    source = "tip IMU" if subject.history.imu is not None else "joint angles"
+    source = SENSORS[Stream.ANGLES if subject.history.imu is None else Stream.IMU].title
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
         f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "

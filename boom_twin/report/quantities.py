@@ -15,14 +15,14 @@ import numpy as np
 from ..analysis.bending_moments import Station, stations
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..health.baseline import Baseline
+from ..health.baseline import Baseline, judged_channels
 from ..offline.recording import Recording
 from ..plots import History
 from ..plots.health import slow_part
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
-from ..types import Array, Stream, channels_of
+from ..types import Array, sensor_kind
 from .vibration import HoldInterval
 
 FILE_NAME = "quantities.json"
@@ -50,26 +50,29 @@ def quantities(
         *_residuals(history, baseline, len(scene.joints)),
         *_frequencies(still, baseline.detuning),
         *_tip(recording, history),
-        *_loads(history, scene),
+        *_moments(history, scene),
         *_travels(history, settings),
     ]
 
 
 def _residuals(history: History, baseline: Baseline, joints: int) -> Iterator[Quantity]:
-    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean."""
-    named = channels_of(joints)
-    channels = [*named[Stream.ANGLES], *named[Stream.IMU]]
-    errors = dict(zip(channels, baseline.errors(joints), strict=True))
+    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
+
+    Where the baseline does not have that error, it is not known how sure the figures are.
+    """
+    errors = dict(zip(judged_channels(joints), baseline.errors(joints).tolist(), strict=True))
     for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
-        values, unit = column[np.isfinite(column)], "rad" if name.startswith("joint") else "m/s^2"
+        values, unit = column[np.isfinite(column)], sensor_kind(name).unit
         if len(values) < BATCHES:
             continue
         mean, mean_sigma = batch_mean(values)
         square, square_sigma = batch_mean(values**2)
-        rms = sqrt(square)
-        yield Quantity(f"residual_mean_{name}", mean, hypot(mean_sigma, errors[name]), unit)
-        sigma = hypot(square_sigma, 2.0 * mean * errors[name]) / (2.0 * rms) if rms else 0.0
-        yield Quantity(f"residual_rms_{name}", rms, sigma, unit)
+        rms, mean_error, rms_error = sqrt(square), None, None
+        if (error := errors.get(name)) is not None:
+            mean_error = hypot(mean_sigma, error)
+            rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
+        yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
+        yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
 
 
 def batch_mean(values: Array) -> tuple[float, float]:
@@ -108,12 +111,10 @@ def _tip(recording: Recording, history: History) -> Iterator[Quantity]:
     yield Quantity("tip_acceleration_max", float(np.hypot(*history.tip_acceleration.T).max()), None, "m/s^2")
 
 
-def _loads(history: History, scene: Scene) -> Iterator[Quantity]:
+def _moments(history: History, scene: Scene) -> Iterator[Quantity]:
     """Largest bending moment of every flexible section."""
-    sections = np.array([station.section for station in stations(scene)], dtype=np.int64)
-    for section in np.unique(sections):
-        moments = np.abs(history.moments[:, sections == section])
-        yield Quantity(f"bending_moment_max_section_{section + 1}", float(moments.max()), None, "N m")
+    for load in loads(history, scene, None):
+        yield Quantity(f"bending_moment_max_section_{load.station.section + 1}", abs(load.moment), None, "N m")
 
 
 def _travels(history: History, settings: Settings) -> Iterator[Quantity]:

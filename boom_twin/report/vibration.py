@@ -16,7 +16,7 @@ from scipy.signal import decimate
 from ..monitor.data.analyst import ModeList
 from ..plots import History
 from ..scene.schema import Scene
-from ..types import Array
+from ..types import Array, Stream, stream_of
 
 ORDER = 14
 """Eigenvalues that are looked for: two a mode, and some that take up noise."""
@@ -154,7 +154,7 @@ def measured_motion(history: History) -> tuple[Array, Array]:
     """Times (k,) and values (k, c): the IMU's specific force (m/s^2), or without one the angles (rad)."""
     if history.imu is not None:
         return history.imu.stamps_s, history.imu.measured
-    places = [i for i, name in enumerate(history.residual_names) if name.startswith("joint_")]
+    places = [i for i, name in enumerate(history.residual_names) if stream_of(name) is Stream.ANGLES]
     there = np.isfinite(history.residual_values[:, places]).any(axis=1)
     times, left = history.residual_stamps_s[there], history.residual_values[there][:, places]
     predicted = [np.interp(times, history.stamps_s, history.joints[:, i]) for i in range(len(places))]

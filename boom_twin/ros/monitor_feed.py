@@ -88,7 +88,7 @@ class TopicFeed(Feed):
         message.stamp.sec, message.stamp.nanosec = divmod(stamp, SECOND)
         self._events.publish(message)
 
-    def let_go(self) -> str:
+    def release_alarms(self) -> str:
         """Ask it; the answer becomes an event."""
         if not self._asked.service_is_ready():
             return "the node is not there to let go of it"

@@ -26,13 +26,14 @@ from boom_twin.types import Stream
 from boom_twin.validation import rig
 
 FIRST = 100  # seed
+COMPARED = (Stream.ANGLES, Stream.IMU)
 
 
 def run(sets: int) -> None:
     """Fit every set; print the share of intervals that hold the truth as it grows."""
     scene, settings = cut_to(2), Settings()
     short = made(off(scene, 0.92, 1.1), "arch", 30.0, 4)
-    unknowns = unknowns_of(scene, usual_names(scene, imu=True))
+    unknowns = unknowns_of(scene, usual_names(scene, tuple(Stream)))
     truth = np.array([0.0 if u.name.endswith(".zero") else parameter(short.truth, u.name) for u in unknowns])
     scale = [u.kind.prior * (at if u.kind.relative else 1.0) for u, at in zip(unknowns, truth, strict=True)]
     scores = []
@@ -41,8 +42,9 @@ def run(sets: int) -> None:
         values = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: seen.imu}
         session = MeasuredSession("made", "", {stream: Series(seen.stamps, rows) for stream, rows in values.items()})
         course = course_of(session, settings)
-        blocks = blocks_of(session, course, 0.05, True, [None, None])
-        fit = fitted(CalibrationProblem(scene, unknowns, [(course, blocks)], channel_names(2, True), settings), lambda: None)
+        blocks = blocks_of(session, course, 0.05, COMPARED, [None, None])
+        problem = CalibrationProblem(scene, unknowns, [(course, blocks)], channel_names(2, COMPARED), settings)
+        fit = fitted(problem, lambda: None)
         found = np.array([u.value(d) for u, d in zip(unknowns, fit.deviations, strict=True)])
         scores.append((found - truth) / scale / np.sqrt(np.diag(fit.covariance())))
         print(f"{len(scores)} sets: {100 * np.mean(np.abs(scores) < 1.96):.0f} % of {np.size(scores)}", flush=True)

@@ -110,7 +110,7 @@ def one_page(page: Any, seconds: int) -> bool:
         (frames,) = watch([page], max(seconds // 4, 5))
         found += frames
         heaps.append(heap(page))
-        words = page.locator("#link").inner_text()
+        words = page.locator("#connection").inner_text()
         print(f"one page: {median(frames):.0f} frames/s median, {min(frames)} worst second; {words}; heap {heaps[-1]:.2f} MiB")
     return median(found) >= 30 and heaps[-1] - heaps[0] <= LARGEST
 

@@ -16,7 +16,7 @@ from health.recorded import written
 from hostile import Trap
 
 import boom_twin
-from boom_twin.monitor.actions import Recording
+from boom_twin.monitor.actions import RecorderProcess
 
 PACKAGE = Path(boom_twin.__file__).parent
 BUNDLED = PACKAGE.parent / "bags" / "arch_session"
@@ -64,7 +64,7 @@ def test_the_page_of_a_session_runs_nothing_of_the_folder(trap: Trap, tmp_path: 
 def test_a_recorder_of_the_page_runs_nothing_of_the_folder(trap: Trap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path / "received")
     (tmp_path / "taken").write_text("")  # it ends at once: it cannot make its folder there
-    recording = Recording(tmp_path / "taken")
+    recording = RecorderProcess(tmp_path / "taken")
     recording.start()
     assert recording._process is not None and recording._process.wait(240.0) == 1
     assert trap.sprung() == ""

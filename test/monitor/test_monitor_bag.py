@@ -20,7 +20,7 @@ from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import RosbagsTypes, jazzy
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
-from boom_twin.monitor.data.status import Alarm, Level, overall
+from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
 from boom_twin.monitor.protocol import state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
@@ -57,16 +57,16 @@ def test_the_cause_is_named_from_when_it_shows(feed: Feed) -> None:
     assert state(feed.store, 14.0, 14.0)["level"] == "OK"
 
 
-def judged(feed: Feed) -> list[Alarm]:
+def judged(feed: Feed) -> list[ListedAlarm]:
     return [alarm for alarm in feed.store.alarms.all if alarm.causes]
 
 
-def assert_same(alarms: list[Alarm], told: list[dict[str, Any]]) -> None:
+def assert_same(alarms: list[ListedAlarm], told: list[dict[str, Any]]) -> None:
     for alarm, expected in zip(sorted(alarms, key=lambda alarm: alarm.begin), told, strict=True):
         assert (alarm.name, alarm.reason) == (expected["channel"], expected["told"])
         assert alarm.begin == pytest.approx(expected["from_s"], abs=2e-3)
         assert alarm.end == (None if expected["to_s"] is None else pytest.approx(expected["to_s"], abs=2e-3))
-        assert alarm.level == (Level.WARN if expected["cause"] is None else Level.ERROR)
+        assert alarm.level == (Severity.WARN if expected["cause"] is None else Severity.ERROR)
         assert expected["cause"] in (None, alarm.causes[0][0])
         if expected["ranked"]:
             assert [cause for cause, _ in alarm.causes] == [each["cause"] for each in expected["ranked"]]
@@ -103,12 +103,12 @@ def test_the_baseline_is_that_which_is_given(drifting: Path, tmp_path: Path) -> 
 
 
 def test_the_wrong_encoder_is_told_and_nothing_before_it(feed: Feed) -> None:
-    level, reason = overall(feed.store.board(14.0).groups(14.0))
-    assert level == Level.OK
-    level, reason = overall(feed.store.board(25.0).groups(25.0))
-    assert level == Level.ERROR and reason.startswith("health: joint_3")
+    level, reason = overall(feed.store.statuses(14.0).groups(14.0))
+    assert level == Severity.OK
+    level, reason = overall(feed.store.statuses(25.0).groups(25.0))
+    assert level == Severity.ERROR and reason.startswith("health: joint_3")
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
-    assert 15.0 < alarm.begin < 20.0 and alarm.level == Level.ERROR
+    assert 15.0 < alarm.begin < 20.0 and alarm.level == Severity.ERROR
 
 
 def test_measured_and_predicted_force_differ_by_the_residual(feed: Feed, replayed: Path) -> None:
@@ -125,8 +125,8 @@ def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, replayed: Path) -
         for ours, theirs in zip(*rows, strict=True):
             assert ours == pytest.approx(theirs), name
     assert published.strokes(20.0) == pytest.approx(feed.strokes(20.0)) and len(published.strokes(20.0)) == 4
-    level, reason = overall(published.store.board(20.0).groups(20.0))
-    assert (level, reason) == (Level.STALE, "no word from the twin")
+    level, reason = overall(published.store.statuses(20.0).groups(20.0))
+    assert (level, reason) == (Severity.STALE, "no word from the twin")
 
 
 def test_a_session_without_anything_to_show_is_refused(tmp_path: Path) -> None:

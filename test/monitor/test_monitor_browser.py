@@ -194,7 +194,7 @@ def test_the_tip_has_a_band_of_what_it_may_be_off_by(page: Any, feed: Feed) -> N
     sigma = feed.store.tables["uncertainty"]
     row = sigma.until(FAULT - 2.0) - 1
     assert 0.0 < sigma.rows(row, row + 1)[1].min() < sigma.rows(row, row + 1)[1].max() < 0.1
-    assert page.evaluate(f"twin.link.table('uncertainty').at(0, {row})") == float(sigma.rows(row, row + 1)[1][0, 0])
+    assert page.evaluate(f"twin.connection.table('uncertainty').at(0, {row})") == float(sigma.rows(row, row + 1)[1][0, 0])
 
 
 def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
@@ -211,7 +211,8 @@ def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
 
 def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
     go(page, 35.0)
-    broken = page.evaluate("import('/page/thin.js').then(m => m.thin(twin.link.table('displacement'), [0, 1], 29, 32, 2000))")
+    rows = "m.decimate(twin.connection.table('displacement'), [0, 1], 29, 32, 2000)"
+    broken = page.evaluate(f"import('/page/decimation.js').then(m => {rows})")
     times, values = np.array(broken[0]), broken[1]
     place = values.index(None)
     assert times[place - 1] == pytest.approx(30.0, abs=0.02) and times[place] == pytest.approx(30.6, abs=0.02)
@@ -266,7 +267,7 @@ def test_every_lamp_and_alarm_is_listed_and_can_be_acknowledged(page: Any, feed:
     page.keyboard.press("5")
     page.wait_for_timeout(1200)
     lamps = cells(page, "#lamps")
-    groups = feed.store.board(FAULT).groups(FAULT).values()
+    groups = feed.store.statuses(FAULT).groups(FAULT).values()
     assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group} - {"health"} | {"joint_3"}
     judged = next(row for row in cells(page, "#alarms") if row[0] == "joint_3")
     assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00", "lasts"]
@@ -348,7 +349,7 @@ def test_the_page_itself_says_that_the_monitor_is_gone_and_comes_back(browser: A
     monitor = Monitor("--bag", str(replayed / "bag"))
     page = browser.new_page()
     page.goto(monitor.url)
-    wait(page, "twin.link.table('displacement')?.count > 0")
+    wait(page, "twin.connection.table('displacement')?.count > 0")
     assert page.locator("#notice").is_hidden()
     assert page.locator("#overall .word").inner_text() == "STALE"  # no node is in a result bag
     assert monitor.stop() == 0

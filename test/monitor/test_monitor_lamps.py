@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from boom_twin.monitor.data.dropped_messages import DroppedMessages, MalformedError
-from boom_twin.monitor.data.status import MOST, SILENCE, Alarms, Level, StatusTable, overall, worst
+from boom_twin.monitor.data.status import MOST, SILENCE, AlarmList, Severity, StatusTable, overall, worst
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.types import Alarm, Ranked
@@ -25,9 +25,9 @@ def status(name: str, level: int = OK, message: str = "well", **values: Any) -> 
 
 def test_every_status_lights_the_lamp_of_its_group() -> None:
     names = ["model", "sensor cylinder_1", "residual joint_1", "health", "cylinder_strokes", "outputs"]
-    board = StatusTable().told(1.0, [status(f"boom_twin: {name}") for name in names], 0.0)
-    board = board.told(1.0, [status("boom_twin_recorder: recording")], 0.0)
-    groups = {group: [lamp.name for lamp in lamps] for group, lamps in board.groups(1.0).items()}
+    statuses = StatusTable().told(1.0, [status(f"boom_twin: {name}") for name in names], 0.0)
+    statuses = statuses.told(1.0, [status("boom_twin_recorder: recording")], 0.0)
+    groups = {group: [lamp.name for lamp in lamps] for group, lamps in statuses.groups(1.0).items()}
     assert groups == {
         "sensors": ["sensor cylinder_1"],
         "model": ["model"],
@@ -50,33 +50,33 @@ def test_the_worst_lamp_is_the_state_of_all(levels: list[int], expected: str) ->
 
 def test_without_a_word_from_the_twin_nothing_is_well() -> None:
     recorder = StatusTable().told(0.0, [status("boom_twin_recorder: recording")], 0.0)
-    for board in (StatusTable(), recorder):
-        assert overall(board.groups(0.0)) == (Level.STALE, "no word from the twin")
+    for statuses in (StatusTable(), recorder):
+        assert overall(statuses.groups(0.0)) == (Severity.STALE, "no word from the twin")
 
 
 def test_a_silent_node_is_stale_and_never_green() -> None:
-    board = StatusTable().told(10.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0)
-    assert overall(board.groups(10.0 + SILENCE))[0] == Level.ERROR
-    level, reason = overall(board.groups(10.1 + SILENCE))
-    assert level == Level.STALE and "no word from n" in reason
+    statuses = StatusTable().told(10.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0)
+    assert overall(statuses.groups(10.0 + SILENCE))[0] == Severity.ERROR
+    level, reason = overall(statuses.groups(10.1 + SILENCE))
+    assert level == Severity.STALE and "no word from n" in reason
 
 
 def test_a_recorder_that_said_that_it_ended_is_not_missed() -> None:
     """What it ended by stays to be seen; the twin beside it is as it is."""
     for level, reason in ((OK, "ended"), (ERROR, "the disk is full")):
-        board = (
+        statuses = (
             StatusTable().told(0.0, [status("r: recording", level, reason, ended=1)], 0.0).told(10.0, [status("n: model")], 0.0)
         )
-        (lamp,) = board.groups(10.0)["recorder"]
-        assert (lamp.level, lamp.reason) == (Level.ERROR if level == ERROR else Level.OK, reason)
-        assert overall(board.groups(10.0))[0] == lamp.level
+        (lamp,) = statuses.groups(10.0)["recorder"]
+        assert (lamp.level, lamp.reason) == (Severity.ERROR if level == ERROR else Severity.OK, reason)
+        assert overall(statuses.groups(10.0))[0] == lamp.level
 
 
 def test_a_status_that_is_told_no_more_goes_out() -> None:
-    board = (
+    statuses = (
         StatusTable().told(0.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0).told(1.0, [status("n: model")], 0.0)
     )
-    assert not board.groups(1.0)["sensors"]
+    assert not statuses.groups(1.0)["sensors"]
 
 
 def test_the_quantity_nearest_to_its_limit_is_told() -> None:
@@ -95,7 +95,7 @@ def test_of_the_disk_a_low_value_is_the_bad_one() -> None:
 
 def test_what_is_not_known_is_null_in_json() -> None:
     store = Store(10)
-    store.light(0.0, StatusTable().told(0.0, [status("n: model", age_s="nan", age_s_stale=2.0)], 0.0))
+    store.set_statuses(0.0, StatusTable().told(0.0, [status("n: model", age_s="nan", age_s_stale=2.0)], 0.0))
     assert "NaN" not in dump(state(store, 0.0, float("inf")))
 
 
@@ -103,12 +103,12 @@ def seconds(stamp: int) -> float:
     return stamp * 1e-9
 
 
-def judge(alarms: Alarms, time: float, *told: Alarm) -> None:
+def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:
     alarms.judge(time, told, seconds)
 
 
 def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
-    alarms, ranked = Alarms(), (Ranked("a.k", 0.6, ()), Ranked("b.k", 0.4, ()))
+    alarms, ranked = AlarmList(), (Ranked("a.k", 0.6, ()), Ranked("b.k", 0.4, ()))
     unknown = Alarm("joint_2", "residual", 2 * 10**9, None, None, "cannot be told apart", ranked)
     named = replace(unknown, cause="b.k", told="b.k off", ranked=(Ranked("b.k", 0.97, ()),))
     judge(alarms, 3.0, unknown)
@@ -118,9 +118,9 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     assert alarms.acknowledge(found.number) is found
     judge(alarms, 4.0, unknown)
     assert found.is_acknowledged and [lamp.reason for lamp in alarms.lamps(3.5)] == ["cannot be told apart"]
-    assert found.level == Level.WARN
+    assert found.level == Severity.WARN
     judge(alarms, 5.0, named)
-    assert found.level == Level.ERROR and not found.is_acknowledged and found.causes == (("b.k", 0.97),)
+    assert found.level == Severity.ERROR and not found.is_acknowledged and found.causes == (("b.k", 0.97),)
     assert alarms.acknowledge(found.number) is found
     judge(alarms, 6.0, replace(named, until=round(5.5e9)))
     assert found.end == 5.5 and not found.is_acknowledged and list(alarms.lamps(5.6)) == [] and list(alarms.lamps(1.9)) == []
@@ -132,7 +132,7 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
 
 
 def test_two_alarms_of_one_channel_are_two() -> None:
-    alarms, stuck = Alarms(), Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck")
+    alarms, stuck = AlarmList(), Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck")
     for time in (3.0, 4.0, 5.0):
         judge(alarms, time, stuck, replace(stuck, kind="residual", since=3 * 10**9))
     assert [(each.begin, each.end) for each in alarms.all] == [(2.0, None), (3.0, None)]
@@ -144,7 +144,7 @@ def test_alarms_that_last_stand_in_place_of_the_lamp_for_them() -> None:
         return {lamp["name"]: lamp["level"] for lamp in lamps}
 
     store = Store(10)
-    store.light(0.0, StatusTable().told(0.0, [status("n: model"), status("n: health", ERROR)], 0.0))
+    store.set_statuses(0.0, StatusTable().told(0.0, [status("n: model"), status("n: health", ERROR)], 0.0))
     assert told(0.0) == {"health": "ERROR"} and not store.alarms.all
     judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
     assert told(0.0) == {"joint_3": "ERROR"}
@@ -161,7 +161,7 @@ def test_an_alarm_is_seen_without_a_word_from_the_twin() -> None:
 def test_all_is_not_well_where_messages_were_dropped() -> None:
     """They may have told of a fault: the headline says so, a fault that is known goes before it."""
     store, dropped = Store(10), DroppedMessages()
-    store.light(0.0, StatusTable().told(0.0, [status("n: model")], 0.0))
+    store.set_statuses(0.0, StatusTable().told(0.0, [status("n: model")], 0.0))
     found = state(store, 0.0, 0.0, dropped)
     assert (found["level"], found["reason"], found["dropped"]) == ("OK", "everything as expected", [])
     for _ in range(2):
@@ -170,23 +170,23 @@ def test_all_is_not_well_where_messages_were_dropped() -> None:
     found = state(store, 0.0, 0.0, dropped)
     assert (found["level"], found["reason"]) == ("WARN", "messages dropped: 2, see below")
     assert found["dropped"] == [{"topic": "/diagnostics", "count": 2, "reason": "no stamp"}]
-    store.light(0.0, StatusTable().told(0.0, [status("n: model", ERROR)], 0.0))
+    store.set_statuses(0.0, StatusTable().told(0.0, [status("n: model", ERROR)], 0.0))
     assert state(store, 0.0, 0.0, dropped)["reason"].startswith("model: ")
 
 
 def test_an_alarm_lasts_until_its_lamp_is_well_or_out() -> None:
-    alarms, well = Alarms(), status("n: model")
+    alarms, well = AlarmList(), status("n: model")
     for time, level in ((1.0, OK), (2.0, WARN), (3.0, ERROR), (4.0, WARN), (5.0, OK), (6.0, STALE)):
         alarms.follow(time, StatusTable().told(0.0, [well, status("n: sensor 1", level, f"level {level}")], 0.0))
     alarms.follow(7.0, StatusTable().told(0.0, [well], 0.0))
     assert [(a.level, a.reason, a.begin, a.end) for a in alarms.all] == [
-        (Level.ERROR, "level 2", 2.0, 5.0),
-        (Level.STALE, "level 3", 6.0, 7.0),
+        (Severity.ERROR, "level 2", 2.0, 5.0),
+        (Severity.STALE, "level 3", 6.0, 7.0),
     ]
 
 
 def test_an_acknowledged_alarm_that_gets_worse_asks_again() -> None:
-    alarms = Alarms()
+    alarms = AlarmList()
     alarms.follow(0.0, StatusTable().told(0.0, [status("n: model", WARN)], 0.0))
     assert alarms.acknowledge(alarms.all[0].number) is alarms.all[0] and alarms.all[0].is_acknowledged
     alarms.follow(1.0, StatusTable().told(0.0, [status("n: model", ERROR)], 0.0))
@@ -194,9 +194,9 @@ def test_an_acknowledged_alarm_that_gets_worse_asks_again() -> None:
 
 
 def test_alarms_that_are_kept_are_bounded_and_the_newest() -> None:
-    alarms = Alarms()
+    alarms = AlarmList()
     for time in range(2 * MOST):
         alarms.follow(time, StatusTable().told(0.0, [status("n: model", WARN if time % 2 else OK)], 0.0))
-        alarms.add("event", Level.OK, "", time, time)
+        alarms.add("event", Severity.OK, "", time, time)
     assert len(alarms.all) <= MOST and alarms.all[-1].begin == 2 * MOST - 1
     assert worst([]) is None

@@ -261,8 +261,8 @@ def test_a_burst_of_stamps_costs_neither_memory_nor_work(name: str, monkeypatch:
         for row in range(3000):
             bench.send(Output.TIP_ACCELERATION, vector(Output.TIP_ACCELERATION, row % 7), EPOCH + BURSTS[name](row))
             if row % 500 == 499:
-                await analyst.look(bench.store.newest)
-                await analyst.past(bench.store.newest - 600.0, bench.store.newest)
+                await analyst.spectrum_at(bench.store.newest)
+                await analyst.spectrogram_between(bench.store.newest - 600.0, bench.store.newest)
 
     tracemalloc.start()
     asyncio.run(look())
@@ -299,9 +299,9 @@ def test_nodes_without_end_do_not_fill_the_board_and_the_twin_stays() -> None:
         bench.send(Output.DIAGNOSTICS, statuses(f"node{number}: x", text="long " * 1000))
         if number % 100 == 0:
             bench.send(Output.DIAGNOSTICS, GOOD[Output.DIAGNOSTICS]())
-    board = bench.store.board(bench.now)
-    assert len(board.nodes) <= MOST_NODES and "boom_twin" in board.nodes
-    assert all(len(lamp.reason) <= 500 for _, lamps in board.nodes.values() for lamp in lamps)
+    table = bench.store.statuses(bench.now)
+    assert len(table.nodes) <= MOST_NODES and "boom_twin" in table.nodes
+    assert all(len(lamp.reason) <= 500 for _, lamps in table.nodes.values() for lamp in lamps)
 
 
 def test_no_scene_is_opened_that_a_message_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,11 +8,11 @@ from threading import Thread
 
 import pytest
 
-from boom_twin.monitor.actions import Recording
+from boom_twin.monitor.actions import RecorderProcess
 
 
 def test_a_recording_that_is_being_completed_is_not_called_one_that_goes_on(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "bags")
+    recording = RecorderProcess(tmp_path / "bags")
     recording.start()
     assert recording._process is not None
     recording._process.send_signal(signal.SIGSTOP)  # it takes its time to end
@@ -28,7 +28,7 @@ def test_a_recording_that_is_being_completed_is_not_called_one_that_goes_on(tmp_
 @pytest.mark.slow
 def test_a_recorder_may_take_as_long_as_its_disk(tmp_path: Path) -> None:
     """The page ends while it does; before, it was killed after 10 s."""
-    recording = Recording(tmp_path / "bags")
+    recording = RecorderProcess(tmp_path / "bags")
     recording.start()
     process = recording._process
     assert process is not None

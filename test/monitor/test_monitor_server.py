@@ -29,7 +29,7 @@ class Made(Feed):
     """A live feed of made-up rows, 200 a second of two columns."""
 
     def __init__(self, end: float | None = None) -> None:
-        super().__init__("made", Store(20_000, keeps_boards=end is not None), load_topics(), load_scene(), end)
+        super().__init__("made", Store(20_000, keeps_statuses=end is not None), load_topics(), load_scene(), end)
         self.published: list[str] = []
         self.rows(2000)
         self.tell(OK)
@@ -42,7 +42,7 @@ class Made(Feed):
 
     def tell(self, level: int) -> None:
         statuses = [status("boom_twin: model"), status("boom_twin: sensor joint_1", level, "frozen")]
-        self.store.light(self.now(), self.store.board(self.now()).told(self.now(), statuses, 0.0))
+        self.store.set_statuses(self.now(), self.store.statuses(self.now()).told(self.now(), statuses, 0.0))
 
     def now(self) -> float:
         return self.store.newest if self.end is not None else 0.0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,3 +120,11 @@ def test_table_of_what_leaving_out_does(boom: Path) -> None:
         found = statics(load_scene(boom), posture="reach")
         assert found.tip_rigid[1] - found.tip[1] == pytest.approx(1e-3 * float(row[1]), abs=1e-4), name
         assert (f"{found.frequencies[0]:.2f}" if len(found.frequencies) else "none") == row[2], name
+
+
+@pytest.mark.slow
+def test_the_pictures_of_the_guide_are_drawn(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, DOCS / "figures.py", tmp_path], check=True)
+    drawn = {path.name for path in tmp_path.glob("*.png")}
+    assert drawn == {"boom.png", *(f"symbols_{part}.png" for part in ("b1", "b2", "b3", "joint_a", "section"))}
+    assert all((DOCS / name).is_file() for name in drawn)

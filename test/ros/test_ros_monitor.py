@@ -14,7 +14,7 @@ import pytest
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
-from boom_twin.monitor.data.status import Level, overall
+from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.types import Alarm, Health, Ranked, Stream
 
 TOPICS = load_topics()
@@ -121,10 +121,10 @@ def test_lamps_come_from_diagnostics_and_go_stale_with_them(pair: tuple[Any, Rig
         message.status = [DiagnosticStatus(name="boom_twin: model", level=DiagnosticStatus.ERROR, message="no pivot")]
 
     rig.send(Output.DIAGNOSTICS, 0, told)
-    until(feed, lambda: feed.store.board(0.0).nodes)
+    until(feed, lambda: feed.store.statuses(0.0).nodes)
     now = feed.now()
-    assert overall(feed.store.board(now).groups(now)) == (Level.ERROR, "model: no pivot")
-    assert overall(feed.store.board(now).groups(now + 10.0))[0] == Level.STALE
+    assert overall(feed.store.statuses(now).groups(now)) == (Severity.ERROR, "model: no pivot")
+    assert overall(feed.store.statuses(now).groups(now + 10.0))[0] == Severity.STALE
 
 
 def test_an_event_is_published_with_the_stamp_of_the_newest_row_and_shown(pair: tuple[Any, Rig]) -> None:
@@ -153,7 +153,7 @@ def test_alarms_and_the_band_of_the_tip_come_from_their_topics(pair: tuple[Any, 
     until(feed, lambda: "uncertainty" in feed.store.tables and judged(feed))
     assert feed.store.tables["uncertainty"].rows(0, 1)[1].tolist() == [[0.0, pytest.approx(0.002)]]
     alarm = judged(feed)
-    assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Level.ERROR, ALARM.told, None)
+    assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Severity.ERROR, ALARM.told, None)
     assert alarm.causes == (("joint_3.sensor", 0.9), ("cylinder_3.k", 0.1)) and alarm.begin == pytest.approx(0.02, abs=1e-3)
 
 
@@ -164,12 +164,12 @@ def test_only_with_permission_the_node_lets_go_and_only_of_what_ended(pair: tupl
     feed, rig = pair
     asked: list[Any] = []
 
-    def let_go(request: Any, response: Any) -> Any:
+    def acknowledge(request: Any, response: Any) -> Any:
         asked.append(request)
         response.success, response.message = True, "joint_3: it jumped"
         return response
 
-    service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", let_go)
+    service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", acknowledge)
     usual, permitted = ViewerActions(feed, frozenset({"acknowledge"})), ViewerActions(feed, frozenset({AT_NODE}))
     request = {"do": "acknowledge", "number": judged(feed).number}
     assert usual.act(request)["words"] == permitted.act(request)["words"] == "acknowledged: joint_3"

@@ -163,7 +163,7 @@ def held(page: Any) -> Iterator[Any]:
 def chosen(page: Any, stamps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times (s) and values of what is shown."""
     low, high = page.evaluate("twin.view.span")
-    times = (stamps - int(page.evaluate("String(twin.link.epoch)"))) * 1e-9
+    times = (stamps - int(page.evaluate("String(twin.connection.epoch)"))) * 1e-9
     inside = (times >= low) & (times < high)
     return times[inside], values[inside]
 
@@ -222,9 +222,9 @@ def test_alarms_and_the_band_of_the_tip_are_those_of_their_topics(page: Any, wit
     shown = {(row[0].strip(), row[2].strip(), row[3].strip()) for row in rows}
     assert told and told & shown and {channel for channel, *_ in told} <= {row[0].strip() for row in rows}
     stamps, sigmas = witness.rows(Output.TIP_UNCERTAINTY, lambda msg: [msg.vector.x, msg.vector.z])
-    table = "twin.link.table('uncertainty')"
+    table = "twin.connection.table('uncertainty')"
     time_s, *values = page.evaluate(f"(r => [r.time(r.count - 3), r.at(0, r.count - 3), r.at(1, r.count - 3)])({table})")
-    place = np.abs((stamps - int(page.evaluate("String(twin.link.epoch)"))) * 1e-9 - time_s).argmin()
+    place = np.abs((stamps - int(page.evaluate("String(twin.connection.epoch)"))) * 1e-9 - time_s).argmin()
     assert values == pytest.approx(sigmas[place], rel=1e-6)
 
 

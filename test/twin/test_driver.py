@@ -67,7 +67,8 @@ def test_there_is_one_loop() -> None:
     """Node, replay, live page, held-out check and baseline all drive by it; none updates a twin itself."""
     root = Path(boom_twin.__file__).parent
     texts = {file.relative_to(root).as_posix(): file.read_text() for file in root.rglob("*.py")}
-    users = {name for name, text in texts.items() if re.search(r"\bdrive(_blocks)?\(.*twin", text, re.I) and "twin.driver import" in text}
+    drives = re.compile(r"\bdrive(_blocks)?\(.*twin", re.I)
+    users = {name for name, text in texts.items() if drives.search(text) and "twin.driver import" in text}
     assert users == {
         "calibration/baseline.py", "calibration/validation.py", "monitor/data/bag_feed.py", "offline/replay.py",
         "ros/node/node.py",

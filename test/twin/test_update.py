@@ -85,7 +85,8 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int) -> None:
 def test_blocks_keep_samples_and_reports_as_they_are() -> None:
     samples = stream(9, 100, 0.0)
     again = samples_in(block_of(samples, N), N)
-    assert [(s.stream, s.stamp, s.values.tobytes()) for s in again] == [(s.stream, s.stamp, s.values.tobytes()) for s in samples]
+    for one, other in zip(again, samples, strict=True):
+        assert (one.stream, one.stamp, one.values.tobytes()) == (other.stream, other.stamp, other.values.tobytes())
     twin = Twin(load_scene())
     reports = [twin.update(sample) for sample in samples]
     whole = report_block(reports, N)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...scene.schema import Scene
-from ...types import NANO, Array, Mount, Stream
+from ...types import NANO, Array, Mount, Stream, sensor_kind
+from ..baseline import judged_channels
 from .fault_catalogue import Form, Parameter
 from .innovation_filter import ModalStates, modes_of
 from .sensitivities import Signature, Signatures
@@ -269,7 +270,7 @@ class LinearModel:
     ) -> None:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
-        self._sensor2 = np.array([settings.angle_variance] * n + [settings.imu_sigma**2] * 2)
+        self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
         self._drifts = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DRIFT]
         self._late = [i for i, each in enumerate(known) if each.form is Form.DELAY]
         self.begin()

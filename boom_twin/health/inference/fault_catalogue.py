@@ -75,7 +75,7 @@ COMPLIANCE = (0.02, 0.5)
 BENDING = (0.02, 0.3)
 
 
-def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Everything that may be wrong with this boom and its sensors, in a fixed order."""
     names, joints = set(parameter_names(scene)), len(scene.joints)
     each = range(joints)
@@ -99,8 +99,7 @@ def parameters(scene: Scene, has_imu: bool = True) -> tuple[Parameter, ...]:
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, True, 0.1) for i in each]
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
-    if has_imu:
-        found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
+    found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
     found += [
         Parameter(f"section_{i + 1}.mass", "changed", Form.SCENE, i, "", 0.02, 0.0)
         for i in each

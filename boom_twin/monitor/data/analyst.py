@@ -71,7 +71,7 @@ class Analyst:
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
         self._firsts: dict[int, tuple[float, float]] = {}
 
-    async def look(self, time: float) -> tuple[dict[str, Any], bytes] | None:
+    async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
         """Text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
         async with self._turn:
             store = self._feed.store
@@ -92,7 +92,7 @@ class Analyst:
                 self._known = key, ({"kind": "lines", "natural": natural, "peaks": peaks}, block)
             return self._known[1]
 
-    async def past(self, after: float, until: float) -> tuple[float, bytes] | None:
+    async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
         ends = STEP * np.arange(floor(after / STEP) + 1.0, floor(until / STEP) + 1.0)
         ends = ends[ends > SEGMENT]

@@ -117,7 +117,7 @@ def bag_feed(
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
-    store = Store(max(counts.values(), default=1), keeps_boards=True)
+    store = Store(max(counts.values(), default=1), keeps_statuses=True)
     if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs strokes, or outputs of the twin.")
     feed = BagFeed(_title(session, is_published), store, topics, scene, (session.end - session.start) * NANO)
@@ -196,8 +196,7 @@ class _Twin:
         if self._looked is None:
             self._watch.begin()
             self._looked = self._time
-        if sample.stream is Stream.IMU:
-            self._feed.topic_rows.measure(sample)
+        self._feed.topic_rows.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
         self._watch.took(sample, report, 0.0)
         self._refuse(self._other_boom.took(sample, report))
@@ -218,7 +217,7 @@ class _Twin:
     def _look(self) -> None:
         found = self._watch.look(self.twin.counts, True, self._peers, (), self._time)
         store, now = self._feed.store, self._feed.now()
-        store.light(now, store.board(now).told(now, map(_as_message, found), self._time))
+        store.set_statuses(now, store.statuses(now).told(now, map(_as_message, found), self._time))
         self._looked = self._time
 
 

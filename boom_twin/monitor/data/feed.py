@@ -46,7 +46,7 @@ class Feed:
         """Tell an event, so that a recording of the session holds it."""
         raise NotImplementedError
 
-    def let_go(self) -> str:
+    def release_alarms(self) -> str:
         """Ask the node to let go of alarms that ended; says whether that could be asked."""
         raise NotImplementedError
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from math import isnan
 from typing import Any
 
 from ...messages.sample_decoder import LATEST, LONGEST, stamp_of
 from ...system.terminal_text import printable
+from ...types import SENSORS, Stream, stream_of
 from .dropped_messages import MalformedError
 
 LARGEST = 1e12
@@ -17,7 +17,6 @@ MOST_COLUMNS = 1000
 """Most numbers of one stamp; a boom of nine sections has some two hundred."""
 LONGEST_TEXT = 500
 """Characters of a text that are kept."""
-JOINT = re.compile(r"joint_[1-9][0-9]{0,2}")
 
 
 def stamp(msg: Any) -> int:
@@ -47,11 +46,15 @@ def count(what: str, found: int, most: int) -> None:
         raise MalformedError(f"{found} {what}, at most {most} are possible")
 
 
-def joint_names(names: Sequence[str]) -> None:
-    """``joint_1`` and the like, each once."""
-    odd = next((name for name in names if JOINT.fullmatch(name) is None), None)
-    if odd is not None or len(set(names)) != len(names) or not names:
-        raise MalformedError(f"names of joints, each once, are expected; not {odd if odd is not None else list(names)!r}")
+def stream_of_residuals(names: Sequence[str]) -> Stream:
+    """The stream whose channels they are: ``joint_1`` and the like, each once; of an IMU both axes in their order."""
+    stream = stream_of(names[0]) if names else None
+    odd = next((name for name in names if stream in (None, Stream.STROKES) or stream_of(name) is not stream), None)
+    if odd is not None or stream is None or len(set(names)) != len(names):
+        raise MalformedError(f"names of sensors, each once, are expected; not {odd if odd is not None else list(names)!r}")
+    if SENSORS[stream].ends and tuple(names) != SENSORS[stream].channels(0):
+        raise MalformedError(f"{', '.join(SENSORS[stream].channels(0))} are expected; not {', '.join(map(repr, names))}")
+    return stream
 
 
 def named(msg: Any, *fields: str) -> None:

@@ -15,7 +15,7 @@ AHEAD = 60_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TableRow:
     """Numbers of one stamp (ns), and the names of their columns."""
 
     stamp: int
@@ -24,12 +24,12 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class OrderedRows:
     """What a row leads to.
 
     Attributes
     ----------
-    rows : tuple of Row
+    rows : tuple of TableRow
         To be stored now, in this order.
     is_set_back : bool
         Whether time was set back, so that everything begins anew before that.
@@ -37,7 +37,7 @@ class Step:
         Why a row that had been held back is dropped; empty if none is.
     """
 
-    rows: tuple[Row, ...] = ()
+    rows: tuple[TableRow, ...] = ()
     is_set_back: bool = False
     stray: str = ""
 
@@ -51,9 +51,9 @@ class RowOrder:
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
-        self._held: dict[str, Row] = {}
+        self._held: dict[str, TableRow] = {}
 
-    def put(self, table: str, row: Row) -> Step:
+    def put(self, table: str, row: TableRow) -> OrderedRows:
         """What `row` leads to; raises MalformedError if its stamp is not after that of the row before."""
         last, held = self._last.get(table, row.stamp - 1), self._held.get(table)
         if not -BACK <= row.stamp - last <= AHEAD:
@@ -62,20 +62,20 @@ class RowOrder:
             raise MalformedError(f"its stamp is not after the last one but {(last - row.stamp) * NANO:.9g} s before it")
         self._last[table] = row.stamp
         self._held.pop(table, None)
-        return Step((row,), stray=_stray(held, last))
+        return OrderedRows((row,), stray=_stray(held, last))
 
-    def _leap(self, table: str, row: Row, last: int, held: Row | None) -> Step:
+    def _leap(self, table: str, row: TableRow, last: int, held: TableRow | None) -> OrderedRows:
         if held is None or not 0 < row.stamp - held.stamp <= AHEAD:
             self._held[table] = row
-            return Step(stray=_stray(held, last))
+            return OrderedRows(stray=_stray(held, last))
         is_set_back = row.stamp < last
         if is_set_back:
             self._last.clear()
             self._held.clear()
         self._held.pop(table, None)
         self._last[table] = row.stamp
-        return Step((held, row), is_set_back)
+        return OrderedRows((held, row), is_set_back)
 
 
-def _stray(held: Row | None, last: int) -> str:
+def _stray(held: TableRow | None, last: int) -> str:
     return "" if held is None else f"its stamp leaps by {(held.stamp - last) * NANO:.9g} s, and the next one's does not"

@@ -8,8 +8,8 @@ from enum import IntEnum
 from math import inf, isfinite, isnan, nan
 from typing import Any
 
-from ... import types as records
 from ...diagnostics.recorder_status import ENDED
+from ...types import Alarm
 from .message_checks import text
 
 SILENCE = 3.0
@@ -22,7 +22,7 @@ HEALTH = "health"
 _LIMITS = ("_error", "_warn", "_stale")
 
 
-class Level(IntEnum):
+class Severity(IntEnum):
     """By rising severity, which is not the order of diagnostic_msgs."""
 
     OFF = 0
@@ -32,7 +32,7 @@ class Level(IntEnum):
     ERROR = 4
 
 
-LEVELS = (Level.OK, Level.WARN, Level.ERROR, Level.STALE)
+LEVELS = (Severity.OK, Severity.WARN, Severity.ERROR, Severity.STALE)
 """By the number in diagnostic_msgs/DiagnosticStatus."""
 
 
@@ -43,7 +43,7 @@ class StatusLamp:
     Attributes
     ----------
     name, group, reason : str
-    level : Level
+    level : Severity
     quantity : str
         What was judged, its unit at the end; empty if nothing was.
     value, limit : float
@@ -55,7 +55,7 @@ class StatusLamp:
 
     name: str
     group: str
-    level: Level
+    level: Severity
     reason: str
     quantity: str = ""
     value: float = nan
@@ -71,7 +71,7 @@ class StatusTable:
     nodes: Mapping[str, tuple[float, tuple[StatusLamp, ...]]] = field(default_factory=dict)
 
     def told(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
-        """The board after one DiagnosticArray of one or more nodes.
+        """The table after one DiagnosticArray of one or more nodes.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class StatusTable:
             for lamp in lamps:
                 if silence > SILENCE and not lamp.is_last:
                     words = f"no word from {node}"
-                    lamp = StatusLamp(lamp.name, lamp.group, Level.STALE, words, "silence_s", silence, SILENCE, silence)
+                    lamp = StatusLamp(lamp.name, lamp.group, Severity.STALE, words, "silence_s", silence, SILENCE, silence)
                 found[lamp.group].append(lamp)
         return found
 
@@ -108,12 +108,12 @@ def worst(lamps: Iterable[StatusLamp]) -> StatusLamp | None:
     return max(lamps, key=lambda lamp: lamp.level, default=None)
 
 
-def overall(groups: Mapping[str, list[StatusLamp]]) -> tuple[Level, str]:
-    """Level and reason of everything; without a word about the model nothing is well."""
+def overall(groups: Mapping[str, list[StatusLamp]]) -> tuple[Severity, str]:
+    """Severity and reason of everything; without a word about the model nothing is well."""
     lamp = worst(lamp for lamps in groups.values() for lamp in lamps)
-    if lamp is None or (lamp.level < Level.ERROR and not groups["model"]):
-        return Level.STALE, "no word from the twin"
-    return lamp.level, "everything as expected" if lamp.level == Level.OK else f"{lamp.name}: {lamp.reason}"
+    if lamp is None or (lamp.level < Severity.ERROR and not groups["model"]):
+        return Severity.STALE, "no word from the twin"
+    return lamp.level, "everything as expected" if lamp.level == Severity.OK else f"{lamp.name}: {lamp.reason}"
 
 
 def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
@@ -135,10 +135,10 @@ def _group(name: str) -> str:
     return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")
 
 
-def _judged(values: Mapping[str, float], level: Level) -> tuple[str, float]:
+def _judged(values: Mapping[str, float], level: Severity) -> tuple[str, float]:
     """The quantity that is nearest to, or farthest beyond, a limit of the present level; its name and that limit."""
     best, found = -inf, ("", nan)
-    kinds = {Level.ERROR: ("_error",), Level.STALE: ("_stale",)}.get(level, _LIMITS)
+    kinds = {Severity.ERROR: ("_error",), Severity.STALE: ("_stale",)}.get(level, _LIMITS)
     for key, limit in values.items():
         kind = next((kind for kind in kinds if key.endswith(kind)), None)
         if kind is None or isnan(value := values.get(key.removesuffix(kind), nan)) or not limit > 0.0:
@@ -161,7 +161,7 @@ MOST = 500
 
 
 @dataclass(slots=True)
-class Alarm:
+class ListedAlarm:
     """A lamp that was not well, or what the judge of the rig's health found.
 
     Attributes
@@ -170,7 +170,7 @@ class Alarm:
         By which it is acknowledged.
     name, reason : str
         The reason is that of the worst level; the judge's are as it told them last.
-    level : Level
+    level : Severity
         The worst; of the judge ERROR where the cause is named, else WARN.
     begin : float
         Session time, s.
@@ -184,7 +184,7 @@ class Alarm:
 
     number: int
     name: str
-    level: Level
+    level: Severity
     reason: str
     begin: float
     end: float | None = None
@@ -192,41 +192,41 @@ class Alarm:
     causes: tuple[tuple[str, float], ...] = ()
 
 
-class Alarms:
+class AlarmList:
     """Follows the lamps from well to not well and back.
 
     Attributes
     ----------
-    all : list of Alarm
+    all : list of ListedAlarm
         The newest `MOST` of them, by their begin.
     """
 
     def __init__(self) -> None:
-        self.all: list[Alarm] = []
-        self._open: dict[str, Alarm] = {}
-        self._judged: dict[tuple[str, int], Alarm] = {}
+        self.all: list[ListedAlarm] = []
+        self._open: dict[str, ListedAlarm] = {}
+        self._judged: dict[tuple[str, int], ListedAlarm] = {}
         self._number = 0
 
-    def follow(self, time: float, board: StatusTable) -> None:
+    def follow(self, time: float, statuses: StatusTable) -> None:
         """The lamps at `time` (s), but for that of the rig's health, whose alarms `judge` is told of."""
-        told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in board.nodes.items() for lamp in lamps)
+        told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in statuses.nodes.items() for lamp in lamps)
         lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH}
-        for key in [key for key in self._open if key not in lamps or lamps[key].level <= Level.OK]:
+        for key in [key for key in self._open if key not in lamps or lamps[key].level <= Severity.OK]:
             self._open.pop(key).end = time
         for key, lamp in lamps.items():
-            if lamp.level > Level.OK:
+            if lamp.level > Severity.OK:
                 self._raise(key, lamp.name, lamp.level, lamp.reason, time)
 
-    def judge(self, now: float, told: Sequence[records.Alarm], time: Callable[[int], float]) -> None:
+    def judge(self, now: float, told: Sequence[Alarm], time: Callable[[int], float]) -> None:
         """The alarms of the rig's health at `now` (s), those that last and those that have just ended.
 
         `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen it is asked again where its
         most probable cause is another, and when it ends.
         """
-        lasting: dict[tuple[str, int], Alarm] = {}
+        lasting: dict[tuple[str, int], ListedAlarm] = {}
         for found in told:
             key = found.channel, found.since
-            alarm = self._judged.pop(key, None) or self._keep(Alarm(self._next(), text(found.channel), Level.WARN, "", 0.0))
+            alarm = self._judged.pop(key, None) or self.add(text(found.channel), Severity.WARN, "", 0.0)
             _renew(alarm, found, time)
             if found.until is None:
                 lasting[key] = alarm
@@ -240,11 +240,14 @@ class Alarms:
             if alarm.causes and alarm.begin <= time and (alarm.end is None or time < alarm.end):
                 yield StatusLamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
 
-    def add(self, name: str, level: Level, reason: str, begin: float, end: float) -> None:
-        """An alarm that is over, such as a gap."""
-        self._keep(Alarm(self._next(), name, level, reason, begin, end))
+    def add(self, name: str, level: Severity, reason: str, begin: float, end: float | None = None) -> ListedAlarm:
+        """Add an alarm, with its end (s) if it is over, such as a gap."""
+        self._number += 1
+        alarm = ListedAlarm(self._number, name, level, reason, begin, end)
+        self.all = [*self.all[-MOST + 1 :], alarm]
+        return alarm
 
-    def acknowledge(self, number: int) -> Alarm | None:
+    def acknowledge(self, number: int) -> ListedAlarm | None:
         """Note that somebody has seen it; None if there is none of that number."""
         alarm = next((each for each in self.all if each.number == number), None)
         if alarm is not None:
@@ -256,27 +259,19 @@ class Alarms:
         for alarm in self.all:
             alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
 
-    def _raise(self, key: str, name: str, level: Level, reason: str, time: float) -> None:
+    def _raise(self, key: str, name: str, level: Severity, reason: str, time: float) -> None:
         alarm = self._open.get(key)
         if alarm is None:
-            self._open[key] = self._keep(Alarm(self._next(), name, level, reason, time))
+            self._open[key] = self.add(name, level, reason, time)
         elif level > alarm.level:
             alarm.level, alarm.reason, alarm.is_acknowledged = level, reason, False
 
-    def _next(self) -> int:
-        self._number += 1
-        return self._number
 
-    def _keep(self, alarm: Alarm) -> Alarm:
-        self.all = [*self.all[-MOST + 1 :], alarm]
-        return alarm
-
-
-def _renew(alarm: Alarm, found: records.Alarm, time: Callable[[int], float]) -> None:
+def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
     """As the judge tells it now."""
     causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
     is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
     alarm.is_acknowledged &= is_same and found.until is None
-    alarm.level = Level.WARN if found.cause is None else Level.ERROR
+    alarm.level = Severity.WARN if found.cause is None else Severity.ERROR
     alarm.reason, alarm.begin, alarm.causes = text(found.told), time(found.since), causes
     alarm.end = None if found.until is None else time(found.until)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...types import NANO
 from .dropped_messages import MalformedError
-from .status import Alarms, StatusTable
+from .status import AlarmList, StatusTable
 
 FIRST = 1024
 """Rows that there is room for at first."""
@@ -77,7 +77,7 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MOST_BOARDS = 100_000
+MOST_STATUSES = 100_000
 """Earlier states of the lamps that are kept: a day of them."""
 
 
@@ -88,7 +88,7 @@ class Store:
     ----------
     capacity : int
         Rows kept of every table.
-    keeps_boards : bool
+    keeps_statuses : bool
         Whether earlier states of the lamps are kept, as a replay needs them.
 
     Attributes
@@ -99,15 +99,15 @@ class Store:
         Raised when all is forgotten because time was set back.
     tables : dict of str to Table
         In order of their first row.
-    alarms : Alarms
+    alarms : AlarmList
     """
 
-    def __init__(self, capacity: int, keeps_boards: bool = False) -> None:
-        self._capacity, self._keeps_boards = capacity, keeps_boards
+    def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
+        self._capacity, self._keeps_statuses = capacity, keeps_statuses
         self.generation, self.epoch = 0, 0
         self.tables: dict[str, Table] = {}
-        self.alarms = Alarms()
-        self._boards: list[tuple[float, StatusTable]] = []
+        self.alarms = AlarmList()
+        self._statuses: list[tuple[float, StatusTable]] = []
 
     def clear(self) -> None:
         """Forget the numbers; the lamps stay as they are."""
@@ -139,19 +139,19 @@ class Store:
         """Newest time of all tables, s; 0 without any."""
         return max((table.newest for table in self.tables.values()), default=0.0)
 
-    def light(self, time: float, board: StatusTable) -> None:
+    def set_statuses(self, time: float, statuses: StatusTable) -> None:
         """The lamps from `time` (s, as they count it) on."""
-        if not self._keeps_boards:
-            self._boards.clear()
-        self._boards.append((time, board))
-        if len(self._boards) > MOST_BOARDS:
-            del self._boards[: MOST_BOARDS // 2]
-        self.alarms.follow(self.newest, board)
+        if not self._keeps_statuses:
+            self._statuses.clear()
+        self._statuses.append((time, statuses))
+        if len(self._statuses) > MOST_STATUSES:
+            del self._statuses[: MOST_STATUSES // 2]
+        self.alarms.follow(self.newest, statuses)
 
-    def board(self, time: float) -> StatusTable:
+    def statuses(self, time: float) -> StatusTable:
         """The lamps as they were last told at `time` (s)."""
-        place = bisect_right(self._boards, time, key=itemgetter(0)) if self._keeps_boards else len(self._boards)
-        return self._boards[place - 1][1] if place else StatusTable()
+        place = bisect_right(self._statuses, time, key=itemgetter(0)) if self._keeps_statuses else len(self._statuses)
+        return self._statuses[place - 1][1] if place else StatusTable()
 
 
 def _difference(first: Sequence[str], columns: Sequence[str]) -> str:

@@ -5,21 +5,22 @@ Nothing is known of who sent a message. Here, and nowhere after it, one that can
 
 from __future__ import annotations
 
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
 from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
-from ...messages.topic_table import Output, Topics, stream_of
+from ...messages.topic_table import Output, Topics
 from ...messages.type_store import decode
-from ...types import NANO, Sample, Stream, channels_of
+from ...types import NANO, SENSORS, Sample, Stream, stream_of
 from . import message_checks as checks
 from .dropped_messages import DroppedMessages, MalformedError
-from .row_order import Row, RowOrder
-from .status import MOST_NODES, Level
+from .row_order import RowOrder, TableRow
+from .status import MOST_NODES, Severity
 from .store import Store
 
 Taker = Callable[[Any, float], None]
@@ -32,14 +33,20 @@ WAITING = 1000
 """Measured samples, and residuals, that may wait for each other."""
 GAP = 0.1
 """A longer pause between strokes (s) is told as an alarm."""
-IMU = channels_of(0)[Stream.IMU]
-NOT_SHOWN = frozenset(Stream) - {Stream.STROKES, Stream.ANGLES, Stream.IMU}
-"""Sensors whose residuals the page has no place for."""
-CYLINDER = re.compile(r"cylinder_[1-9][0-9]{0,2}")
+COMPARED = Stream.IMU
+"""The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
+RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
+"""Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
 """Of `SampleDecoder`: an Imu that says that it has none is nothing odd."""
 PLANE = ("x_m", "z_m")
-ACCELERATION = ("x_m_s2", "z_m_s2")
+VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
+    Output.TIP_DISPLACEMENT: ("displacement", PLANE, attrgetter("vector")),
+    Output.TIP_POSITION: ("position", PLANE, attrgetter("point")),
+    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2"), attrgetter("accel.linear")),
+    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE, attrgetter("vector")),
+}
+"""Outputs that are a vector in the plane of the boom: table, its columns, and where the vector is in a message."""
 
 
 class TopicRows:
@@ -52,7 +59,8 @@ class TopicRows:
     ``position``       the same
     ``acceleration``   the same
     ``force``          specific force at the tip, x and z of the IMU: measured, predicted, expected deviation of the two
-    ``joints``         residual of every joint, then the same over its expected deviation
+    ``joints``         residual of every joint, then the same over its expected deviation; likewise a table of every further
+                       stream of sensors, by the stream's name
     ``uncertainty``    standard deviation of the predicted tip, x and z of ``base_link``
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
@@ -74,7 +82,7 @@ class TopicRows:
         self._strokes: list[float] = []
         self._scene = ""
         taken = [(topics.outputs[role], take) for role, take in self._by_role().items()]
-        taken += [(topics.inputs[Stream.IMU], self._take_measured), (topics.events, self._take_event)]
+        taken += [(topics.inputs[COMPARED], self._take_measured), (topics.events, self._take_event)]
         self._takers = {topic.absolute: take for topic, take in taken}
         self._types = {topic.absolute: topic.type for topic, _ in taken}
         self.names = frozenset(self._takers)
@@ -86,14 +94,11 @@ class TopicRows:
 
     def _by_role(self) -> dict[Output, Taker]:
         return {
-            Output.TIP_DISPLACEMENT: self._take_displacement,
-            Output.TIP_POSITION: self._take_position,
-            Output.TIP_ACCELERATION: self._take_acceleration,
+            **{role: partial(self._take_vector, role) for role in VECTORS},
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
             Output.HEALTH: self._take_health,
-            Output.TIP_UNCERTAINTY: self._take_uncertainty,
             Output.DIAGNOSTICS: self._take_state,
         }
 
@@ -109,14 +114,15 @@ class TopicRows:
             self._takers[topic](decode(data, self._types[topic]), now)
 
     def measure(self, sample: Sample) -> None:
-        """Put the measured specific force beside its residual, whichever comes first."""
-        self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
-        self._join(sample.stamp)
+        """Put the measured specific force beside its residual, whichever comes first; other samples are passed over."""
+        if sample.stream is COMPARED:
+            self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
+            self._join(sample.stamp)
 
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
         self._store.check(table, columns)
-        step = self._order.put(table, Row(stamp, columns, values))
+        step = self._order.put(table, TableRow(stamp, columns, values))
         if step.is_set_back:
             self._store.clear()
             self._measured.clear()
@@ -132,51 +138,42 @@ class TopicRows:
         store, known = self._store, self._store.tables.get("displacement")
         time = store.time(stamp)
         if known is not None and time - known.newest > GAP:
-            store.alarms.add("cylinder_strokes", Level.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
+            store.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
 
     def _take_measured(self, msg: Any, now: float) -> None:
         before = self._decoder.oddities.copy()
-        sample = self._decoder.put(Stream.IMU, stamp_of(msg), msg)
+        sample = self._decoder.put(COMPARED, stamp_of(msg), msg)
         odd = self._decoder.oddities - before
         if sample is not None:
             self.measure(sample)
         elif NO_MEASUREMENT not in odd:
             raise MalformedError(", ".join(odd))
 
-    def _take_displacement(self, msg: Any, now: float) -> None:
-        self._append("displacement", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
-
-    def _take_position(self, msg: Any, now: float) -> None:
-        self._append("position", PLANE, checks.stamp(msg), checks.numbers((msg.point.x, msg.point.z)))
-
-    def _take_acceleration(self, msg: Any, now: float) -> None:
-        linear = msg.accel.linear
-        self._append("acceleration", ACCELERATION, checks.stamp(msg), checks.numbers((linear.x, linear.z)))
-
-    def _take_uncertainty(self, msg: Any, now: float) -> None:
-        self._append("uncertainty", PLANE, checks.stamp(msg), checks.numbers((msg.vector.x, msg.vector.z)))
+    def _take_vector(self, role: Output, msg: Any, now: float) -> None:
+        table, columns, vector_of = VECTORS[role]
+        vector = vector_of(msg)
+        self._append(table, columns, checks.stamp(msg), checks.numbers((vector.x, vector.z)))
 
     def _take_event(self, msg: Any, now: float) -> None:
         time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
-        self._store.alarms.add("event", Level.OK, checks.text(msg.msg), time, time)
+        self._store.alarms.add("event", Severity.OK, checks.text(msg.msg), time, time)
 
     def _take_cylinders(self, msg: Any, now: float) -> None:
         checks.named(msg, "position", "effort")
-        places = [place for place, name in enumerate(msg.name) if CYLINDER.fullmatch(name)]
+        places = [place for place, name in enumerate(msg.name) if stream_of(name) is Stream.STROKES]
         strokes = checks.numbers([msg.position[place] for place in places])
         self._strokes, self._forces = strokes, checks.numbers([msg.effort[place] for place in places])
 
     def _take_residuals(self, msg: Any, now: float) -> None:
         checks.named(msg, "position", "velocity", "effort")
-        stamp, names = checks.stamp(msg), list(msg.name)
+        stamp, stream = checks.stamp(msg), checks.stream_of_residuals(msg.name)
         values, ratios, sigmas = (checks.numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
-        if names == list(IMU):
+        if stream is COMPARED:
             self._residuals[stamp] = (values, sigmas)
             self._join(stamp)
-        elif not names or stream_of(names[0]) not in NOT_SHOWN:
-            checks.joint_names(names)
-            columns = [f"{name}_rad" for name in names] + [f"{name}_normalised" for name in names]
-            self._append("joints", columns, stamp, values + ratios)
+        else:
+            ends = (SENSORS[stream].unit_suffix, "normalised")
+            self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join(self, stamp: int) -> None:
         """Make the row of a measurement and its residual, once both are there; forget what has waited long."""
@@ -220,9 +217,9 @@ class TopicRows:
     def _take_state(self, msg: Any, now: float) -> None:
         checks.count("statuses", len(msg.status), MOST_STATUSES)
         store = self._store
-        board = store.board(now).told(now, msg.status, stamp_of(msg) * NANO)
-        checks.count("nodes on one topic", len(board.nodes), MOST_NODES)
+        statuses = store.statuses(now).told(now, msg.status, stamp_of(msg) * NANO)
+        checks.count("nodes on one topic", len(statuses.nodes), MOST_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
-        store.light(now, board)
+        store.set_statuses(now, statuses)

@@ -1,8 +1,8 @@
 // A uPlot chart that fills its element and takes the page's colours.
 
 import uPlot from "/page/uplot.js";
-import { line, paint } from "./colours.js";
-import { show } from "./sheet.js";
+import { lineColour, themeColour } from "./colours.js";
+import { formatNumber } from "./html_table.js";
 
 const LEGEND = 24; // px
 
@@ -11,13 +11,13 @@ export class Chart {
   constructor(element, { title, series, bands = [], scales = {}, axes = [{}, {}], hooks = {}, cursor = {} }) {
     this.element = element;
     element.replaceChildren();
-    const colour = c => typeof c === "number" ? line(c) : paint(c);
-    const axis = { stroke: paint("soft"), grid: { stroke: paint("grid"), width: 1 }, ticks: { stroke: paint("grid"), width: 1 } };
+    const colour = c => typeof c === "number" ? lineColour(c) : themeColour(c);
+    const axis = { stroke: themeColour("soft"), grid: { stroke: themeColour("grid"), width: 1 }, ticks: { stroke: themeColour("grid"), width: 1 } };
     this.plot = new uPlot({
       width: 300, height: 100,
       pxAlign: 0,
       scales: { x: { time: false, auto: false }, ...scales },
-      axes: [{ ...axis, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(show), ...axes[1] }],
+      axes: [{ ...axis, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(formatNumber), ...axes[1] }],
       series: [{ label: title, value: (_, v) => v == null ? "" : v.toFixed(3) }, ...series.map(s => ({
         stroke: colour(s.colour), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? null, dash: s.dash, label: s.label,
         value: (_, v) => v == null ? "–" : v.toPrecision(4),

@@ -3,5 +3,5 @@
 const LINES = { light: ["#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#8a6d00"], dark: ["#56b4e9", "#f0a030", "#2fc497", "#e68acb", "#9ad0ff", "#f0e442"] };
 
 export const theme = () => document.documentElement.dataset.theme;
-export const line = i => LINES[theme()][i % 6];
-export const paint = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const lineColour = i => LINES[theme()][i % 6];
+export const themeColour = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -1,30 +1,30 @@
-// Puts the page together: link, lamps, tabs, keys, and the loop that draws.
+// Puts the page together: connection, lamps, tabs, keys, and the loop that draws.
 
 import { theme } from "./colours.js";
 import { Lamps } from "./lamps.js";
-import { Link } from "./link.js";
+import { Connection } from "./connection.js";
 import { Shape } from "./shape.js";
-import { Sheet } from "./sheet.js";
+import { HtmlTable } from "./html_table.js";
 import { SpectrumTab } from "./spectrum.js";
 import { Timeline } from "./timeline.js";
 import { Traces } from "./traces.js";
 import { View } from "./view.js";
-import { Work } from "./work.js";
+import { Actions } from "./actions.js";
 
-const REST = 2; // least time between two drawings, as a multiple of what one takes
+const IDLE_RATIO = 2; // least time between two drawings, as a multiple of what one takes
 const LONGEST = 60, SLOW = 45, FAST = 55; // ms between drawings at most, and the frames/s below and above which that changes
 const get = id => document.getElementById(id);
 
-const link = new Link(), view = new View(link), timeline = new Timeline(link), lamps = new Lamps(link);
-new Work(link, view);
-const spectrum = new SpectrumTab(link, new Sheet("peaks"));
-const tabs = { traces: new Traces(link, view, new Sheet("figures")), spectrum, spectrogram: spectrum, shape: new Shape(link, view), state: null };
+const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
+new Actions(connection, view);
+const spectrum = new SpectrumTab(connection, new HtmlTable("peaks"));
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
 // -- what is chosen ---------------------------------------------------------------------------------------------------
 
-function choose(tab) {
+function selectTab(tab) {
   open = tab;
   for (const section of document.querySelectorAll(".tab")) section.classList.toggle("open", section.id === tab);
   for (const button of document.querySelectorAll("#tabs button")) button.setAttribute("aria-selected", button.dataset.tab === tab);
@@ -33,7 +33,7 @@ function choose(tab) {
   if (tab === "state" && lamps.state) lamps.fillTable(lamps.state);
 }
 
-function dress(name) {
+function setTheme(name) {
   document.documentElement.dataset.theme = name;
   localStorage.setItem("theme", name);
   get("theme").textContent = name === "dark" ? "Light" : "Dark";
@@ -47,11 +47,11 @@ function pause() {
   else { view.hold(!view.isHeld); get("pause").textContent = view.isHeld ? "Go on" : "Pause"; }
 }
 
-for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => choose(button.dataset.tab);
+for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => selectTab(button.dataset.tab);
 get("window").onchange = event => view.set({ window: Number(event.target.value), zoom: null });
 get("pause").onclick = pause;
 get("all").onclick = () => view.set({ zoom: null });
-get("theme").onclick = () => dress(theme() === "dark" ? "light" : "dark");
+get("theme").onclick = () => setTheme(theme() === "dark" ? "light" : "dark");
 
 const KEYS = { " ": pause, z: () => get("all").click(), m: () => get("mark").click(), p: () => get("picture").click(), c: () => get("csv").click(), t: () => get("theme").click(),
   ",": () => timeline.jump(-1), ".": () => timeline.jump(1), ArrowLeft: () => timeline.isReplay && timeline.seek(timeline.position - 5), ArrowRight: () => timeline.isReplay && timeline.seek(timeline.position + 5) };
@@ -63,35 +63,35 @@ addEventListener("keydown", event => {
   else if (KEYS[event.key]) { event.preventDefault(); KEYS[event.key](); }
 });
 
-link.addEventListener("hello", event => {
+connection.addEventListener("hello", event => {
   get("title").textContent = event.detail.title;
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
 });
-link.addEventListener("reset", () => { tabs.traces.rebuild(); if (view.zoom || view.isHeld) view.set({ zoom: null, end: null }); });
+connection.addEventListener("reset", () => { tabs.traces.rebuild(); if (view.zoom || view.isHeld) view.set({ zoom: null, end: null }); });
 
 // -- what is drawn ----------------------------------------------------------------------------------------------------
 
 function draw(now) {
   requestAnimationFrame(draw);
   frames++;
-  tellDelay();
-  if (now - second > 1000) tellRate(now);
-  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : link.grown} ${spectrum.isNew}`;
+  recordDelay();
+  if (now - second > 1000) showRate(now);
+  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : connection.lastRows} ${spectrum.isNew}`;
   if (now < due || state === drawn || document.hidden) return;
   const began = performance.now();
   tabs[open]?.draw(open);
   drawn = state;
-  due = now + Math.max(pace, REST * (performance.now() - began));
+  due = now + Math.max(pace, IDLE_RATIO * (performance.now() - began));
   shown = view.newest;
 }
 
-function tellDelay() {
-  if (!timeline.isReplay && link.epoch && Number.isFinite(shown)) delays.push(Date.now() / 1000 - Number(link.epoch / 1000n) / 1e6 - shown);
+function recordDelay() {
+  if (!timeline.isReplay && connection.epoch && Number.isFinite(shown)) delays.push(Date.now() / 1000 - Number(connection.epoch / 1000n) / 1e6 - shown);
   shown = NaN;
 }
 
-function tellRate(now) {
+function showRate(now) {
   const rate = 1000 * frames / (now - second);
   get("fps").textContent = `${Math.round(rate)} frames/s`;
   if (rate < SLOW) pace = Math.min(pace + 20, LONGEST); // a machine that does not keep up draws less often
@@ -100,11 +100,11 @@ function tellRate(now) {
   second = now;
   lamps.watch(timeline.isReplay);
   const sorted = delays.splice(0).sort((a, b) => a - b), delay = sorted[sorted.length >> 1];
-  get("link").textContent = !link.isOpen ? "not connected" : timeline.isReplay ? "recorded session" : delay > -0.5 && delay < 60 ? `live, ${Math.round(1000 * delay)} ms behind the sensors` : "live";
+  get("connection").textContent = !connection.isOpen ? "not connected" : timeline.isReplay ? "recorded session" : delay > -0.5 && delay < 60 ? `live, ${Math.round(1000 * delay)} ms behind the sensors` : "live";
 }
 
 setInterval(() => lamps.watch(timeline.isReplay), 500);
-dress(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
-choose("traces");
+setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+selectTab("traces");
 requestAnimationFrame(draw);
-Object.assign(window, { twin: { link, view, timeline, delays } }); // for tests and for the curious
+Object.assign(window, { twin: { connection, view, timeline, delays } }); // for tests and for the curious

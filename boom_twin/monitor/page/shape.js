@@ -1,21 +1,21 @@
 // Side view of the boom: deflected with a stated exaggeration, undeflected as a ghost, cylinders by force, trace of the tip.
 
-import { line, paint } from "./colours.js";
-import { show } from "./sheet.js";
+import { lineColour, themeColour } from "./colours.js";
+import { formatNumber } from "./html_table.js";
 
 const TRACE = 5; // s
 const FULL = 1e5; // N that has the full colour
 const MARGIN = 30; // px
 
 export class Shape {
-  constructor(link, view) {
-    this.link = link;
+  constructor(connection, view) {
+    this.connection = connection;
     this.view = view;
     this.factor = 10;
     this.canvas = document.getElementById("boom");
     for (const button of document.querySelectorAll("#factors button")) button.onclick = () => this.choose(Number(button.dataset.factor));
     this.choose(10);
-    link.addEventListener("reset", () => { this.box = null; });
+    connection.addEventListener("reset", () => { this.box = null; });
   }
 
   choose(factor) {
@@ -25,27 +25,25 @@ export class Shape {
     this.view.version++;
   }
 
-  rebuild() {}
-
   draw() {
-    const table = this.link.table("shape");
+    const table = this.connection.table("shape");
     if (!table?.count) return;
     const read = prefix => table.columns.flatMap((name, i) => name.startsWith(prefix) ? [table.values[i][0]] : []);
     const points = values => Array.from({ length: values.length / 2 }, (_, i) => [values[2 * i], values[2 * i + 1]]);
     const straight = points(read("straight_")), bent = points(read("line_"));
     const large = bent.map(([x, z], i) => [straight[i][0] + this.factor * (x - straight[i][0]), straight[i][1] + this.factor * (z - straight[i][1])]);
     const pins = points(read("pins_")), forces = read("force_"), trace = this.trace();
-    const pen = this.pen([...straight, ...large, ...pins, ...trace]);
-    this.stroke(pen, straight, { colour: paint("off"), width: 2, dash: [7, 6] });
-    this.stroke(pen, large, { colour: paint("ink"), width: 5 });
-    this.stroke(pen, trace, { colour: line(2), width: 2 });
-    forces.forEach((force, i) => this.stroke(pen, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
-    this.tell(bent.at(-1), straight.at(-1), bent, forces);
+    const frame = this.frame([...straight, ...large, ...pins, ...trace]);
+    this.drawLine(frame, straight, { colour: themeColour("off"), width: 2, dash: [7, 6] });
+    this.drawLine(frame, large, { colour: themeColour("ink"), width: 5 });
+    this.drawLine(frame, trace, { colour: lineColour(2), width: 2 });
+    forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
+    this.describe(bent.at(-1), straight.at(-1), bent, forces);
   }
 
   // The tip's way of the last seconds, exaggerated as the boom is.
   trace() {
-    const position = this.link.table("position"), displacement = this.link.table("displacement");
+    const position = this.connection.table("position"), displacement = this.connection.table("displacement");
     if (!position?.count || position.count !== displacement?.count) return [];
     const step = Math.max(1, Math.floor((position.count - position.from(position.newest - TRACE)) / 250)), found = [];
     for (let row = position.from(position.newest - TRACE); row < position.count; row += step)
@@ -54,7 +52,7 @@ export class Shape {
   }
 
   // A canvas with metres as units; its frame grows with what is drawn and is kept otherwise.
-  pen(points) {
+  frame(points) {
     const { canvas } = this, scale = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
     if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) Object.assign(canvas, { width: width * scale, height: height * scale });
     const xs = points.map(p => p[0]), zs = points.map(p => p[1]), old = this.box ?? [Infinity, Infinity, -Infinity, -Infinity];
@@ -67,7 +65,7 @@ export class Shape {
     return { context, at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)] };
   }
 
-  stroke({ context, at }, points, { colour, width, dash = [], label }) {
+  drawLine({ context, at }, points, { colour, width, dash = [], label }) {
     if (points.length < 2) return;
     context.beginPath();
     points.forEach((point, i) => i ? context.lineTo(...at(point)) : context.moveTo(...at(point)));
@@ -77,22 +75,22 @@ export class Shape {
     if (!label) return;
     const [a, b] = points.map(at);
     context.font = "13px system-ui";
-    context.fillStyle = paint("ink");
+    context.fillStyle = themeColour("ink");
     context.fillText(label, (a[0] + b[0]) / 2 + 10, (a[1] + b[1]) / 2 + 14);
   }
 
-  tell([x, z], [x0, z0], bent, forces) {
+  describe([x, z], [x0, z0], bent, forces) {
     const words = (id, text) => { document.getElementById(id).textContent = text; };
     words("exaggeration", `displacements drawn x${this.factor}; dashed: undeflected`);
     words("reach", `reach ${x.toFixed(3)} m`);
     words("height", `height ${z.toFixed(3)} m`);
-    words("forces", `tip ${show(1000 * (x - x0))} mm forward, ${show(1000 * (z - z0))} mm up; most loaded cylinder ${(Math.max(...forces.map(Math.abs)) / 1000).toFixed(1)} kN`);
+    words("forces", `tip ${formatNumber(1000 * (x - x0))} mm forward, ${formatNumber(1000 * (z - z0))} mm up; most loaded cylinder ${(Math.max(...forces.map(Math.abs)) / 1000).toFixed(1)} kN`);
   }
 }
 
 // Grey without force, red when pulled, blue when pushed.
 function colourOf(force) {
-  if (!Number.isFinite(force)) return paint("off");
+  if (!Number.isFinite(force)) return themeColour("off");
   const share = Math.min(Math.abs(force) / FULL, 1), end = force > 0 ? [213, 60, 40] : [40, 110, 230];
   return `rgb(${end.map(c => Math.round(150 + share * (c - 150)))})`;
 }

@@ -1,7 +1,7 @@
 // Power spectral density of the tip's acceleration, the model's natural frequencies, peaks; and the density against time.
 
 import { Chart } from "./chart.js";
-import { line, paint } from "./colours.js";
+import { lineColour, themeColour } from "./colours.js";
 
 const LOWEST = 0.25, HIGHEST = 50; // Hz
 const COLUMNS = 300, FEWEST = 60; // of the spectrogram
@@ -9,24 +9,24 @@ const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: STEP and FREQU
 const RANGE = 60; // dB from dark to bright
 
 export class SpectrumTab {
-  constructor(link, sheet) {
-    this.sheet = sheet;
-    this.past = [];
+  constructor(connection, htmlTable) {
+    this.htmlTable = htmlTable;
+    this.history = [];
     this.lines = { natural: [], peaks: [] };
-    link.addEventListener("lines", event => { this.lines = event.detail; this.isNew = true; });
-    link.addEventListener("density", event => this.take(event.detail));
-    link.addEventListener("past", event => this.takePast(event.detail));
-    link.addEventListener("reset", () => { this.past = []; this.isNew = true; });
+    connection.addEventListener("lines", event => { this.lines = event.detail; this.isNew = true; });
+    connection.addEventListener("spectrum", event => this.setSpectrum(event.detail));
+    connection.addEventListener("spectrogram", event => this.addColumns(event.detail));
+    connection.addEventListener("reset", () => { this.history = []; this.isNew = true; });
   }
 
-  take({ times: frequencies, values, rows }) {
+  setSpectrum({ times: frequencies, values, rows }) {
     this.density = [Array.from(frequencies).slice(1), ...[0, 1].map(c => Array.from(values.slice(c * rows + 1, (c + 1) * rows)))];
     this.isNew = true;
   }
 
-  takePast({ times, values, rows, columns }) {
+  addColumns({ times, values, rows, columns }) {
     const decibels = row => Float32Array.from({ length: columns }, (_, c) => 10 * Math.log10(Math.max(values[c * rows + row], 1e-30)));
-    this.past = [...this.past, ...Array.from(times, (time, row) => ({ time, levels: decibels(row) }))].slice(-COLUMNS);
+    this.history = [...this.history, ...Array.from(times, (time, row) => ({ time, levels: decibels(row) }))].slice(-COLUMNS);
     this.isNew = true;
   }
 
@@ -35,23 +35,23 @@ export class SpectrumTab {
   draw(tab) {
     if (!this.isNew || !this.density) return;
     this.isNew = false;
-    if (tab === "spectrogram") return this.drawPast();
+    if (tab === "spectrogram") return this.drawSpectrogram();
     this.chart ??= new Chart(document.getElementById("density"), {
       title: "density, (m/s²)²/Hz",
       series: [{ label: "forward", colour: 0 }, { label: "up", colour: 1 }],
       scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 } },
       axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: (_, ticks) => ticks.map(tick => tick === null ? null : `1e${Math.round(Math.log10(tick))}`) }],
-      hooks: { draw: [plot => this.drawLines(plot)] },
+      hooks: { draw: [plot => this.drawModes(plot)] },
     });
     this.chart.draw(this.density, LOWEST, Math.min(HIGHEST, this.density[0].at(-1)));
-    this.tell();
+    this.fillPeaks();
   }
 
-  drawLines(plot) {
+  drawModes(plot) {
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.font = `${13 * devicePixelRatio}px system-ui`;
-    ctx.fillStyle = ctx.strokeStyle = paint("ink");
+    ctx.fillStyle = ctx.strokeStyle = themeColour("ink");
     ctx.setLineDash([6, 4]);
     this.lines.natural.forEach((frequency, i) => {
       const x = plot.valToPos(frequency, "x", true);
@@ -60,7 +60,7 @@ export class SpectrumTab {
       ctx.fillText(`${i + 1}`, x + 4, bbox.top + 14 * devicePixelRatio);
     });
     ctx.setLineDash([]);
-    ctx.strokeStyle = line(2);
+    ctx.strokeStyle = lineColour(2);
     ctx.lineWidth = 2;
     for (const peak of this.lines.peaks) {
       ctx.beginPath(); ctx.arc(plot.valToPos(peak.frequency, "x", true), plot.valToPos(peak.density, "y", true), 7 * devicePixelRatio, 0, 7); ctx.stroke();
@@ -68,44 +68,44 @@ export class SpectrumTab {
     ctx.restore();
   }
 
-  tell() {
+  fillPeaks() {
     const { natural, peaks } = this.lines;
     const percent = share => share === null ? NaN : 100 * share;
     const rows = peaks.map(({ frequency, damping, mode, deviation, drift }) =>
       [frequency.toFixed(3), percent(damping), mode === null ? "–" : `${mode}`, mode === null ? NaN : natural[mode - 1], percent(deviation), percent(drift)]);
     const others = natural.map((frequency, i) => [`mode ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
     const words = natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene";
-    this.sheet.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `last 40 s, segments of 8 s; ${words}`);
+    this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `last 40 s, segments of 8 s; ${words}`);
   }
 
   // One pixel for every cell, drawn large.
-  drawPast() {
-    if (!this.past.length) return;
+  drawSpectrogram() {
+    if (!this.history.length) return;
     const canvas = document.getElementById("waterfall"), { clientWidth: width, clientHeight: height } = canvas;
     Object.assign(canvas, { width, height });
-    const cells = this.past[0].levels.length, count = Math.max(FEWEST, this.past.length), empty = count - this.past.length;
+    const cells = this.history[0].levels.length, count = Math.max(FEWEST, this.history.length), empty = count - this.history.length;
     const picture = new OffscreenCanvas(count, cells), image = new ImageData(count, cells);
-    const top = this.past.reduce((most, { levels }) => levels.reduce((a, b) => b > a ? b : a, most), -Infinity);
-    this.past.forEach(({ levels }, i) => levels.forEach((level, c) => {
-      if (Number.isFinite(level)) image.data.set(heat(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i + empty));
+    const top = this.history.reduce((most, { levels }) => levels.reduce((a, b) => b > a ? b : a, most), -Infinity);
+    this.history.forEach(({ levels }, i) => levels.forEach((level, c) => {
+      if (Number.isFinite(level)) image.data.set(viridis(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i + empty));
     }));
     picture.getContext("2d").putImageData(image, 0, 0);
     const context = canvas.getContext("2d"), left = 44, right = width - 60, bottom = height - 24, highest = (cells - 1) * HEIGHT;
     context.imageSmoothingEnabled = false;
     context.drawImage(picture, left, 0, right - left, bottom);
-    context.fillStyle = paint("ink");
+    context.fillStyle = themeColour("ink");
     context.font = "13px system-ui";
     for (let f = 0; f <= highest; f += 5) context.fillText(`${f} Hz`, 2, Math.max(12, bottom * (1 - f / highest)));
     this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ mode ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
-    context.fillText(`${(this.past[0].time - WIDTH).toFixed(0)} s`, left + (right - left) * empty / count, height - 6);
-    context.fillText(`${this.past.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
+    context.fillText(`${(this.history[0].time - WIDTH).toFixed(0)} s`, left + (right - left) * empty / count, height - 6);
+    context.fillText(`${this.history.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
     document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
   }
 }
 
 // Viridis in five steps; grows lighter all the way, so it reads without colour.
 const STEPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
-function heat(share) {
+function viridis(share) {
   const x = Math.min(Math.max(share, 0), 1) * (STEPS.length - 1), i = Math.min(Math.floor(x), STEPS.length - 2), t = x - i;
   return [0, 1, 2].map(c => STEPS[i][c] * (1 - t) + STEPS[i + 1][c] * t).concat(255);
 }

@@ -3,9 +3,11 @@
 export const CAPACITY = 1 << 17; // rows: ten minutes at 200 Hz
 
 export class Table {
-  constructor(name, columns) {
+  // residuals: what they are of, factor and unit in which they are shown; only tables of residuals have it
+  constructor(name, columns, residuals) {
     this.name = name;
     this.columns = columns;
+    this.residuals = residuals;
     const capacity = name === "shape" ? 1 : CAPACITY; // of the shape only the newest is drawn
     this.times = new Float64Array(capacity);
     this.values = columns.map(() => new Float32Array(capacity));

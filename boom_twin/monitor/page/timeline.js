@@ -3,33 +3,33 @@
 import { RANKS } from "./lamps.js";
 
 export class Timeline {
-  constructor(link) {
-    this.link = link;
+  constructor(connection) {
+    this.connection = connection;
     this.times = [];
     this.alarms = [];
     this.scrubber = document.getElementById("scrubber");
     this.play = document.getElementById("play");
     this.scrubber.oninput = () => this.seek(Number(this.scrubber.value));
     this.play.onclick = () => this.hold(!this.isHeld);
-    document.getElementById("speed").onchange = event => link.ask({ do: "speed", value: Number(event.target.value) });
+    document.getElementById("speed").onchange = event => connection.send({ do: "speed", value: Number(event.target.value) });
     document.getElementById("before").onclick = () => this.jump(-1);
     document.getElementById("after").onclick = () => this.jump(1);
-    link.addEventListener("hello", event => this.greet(event.detail));
-    link.addEventListener("state", event => this.follow(event.detail));
-    link.addEventListener("alarms", event => this.mark(event.detail.alarms));
+    connection.addEventListener("hello", event => this.begin(event.detail));
+    connection.addEventListener("state", event => this.update(event.detail));
+    connection.addEventListener("alarms", event => this.drawMarks(event.detail.alarms));
   }
 
   get isReplay() { return this.end !== null && this.end !== undefined; }
 
-  greet({ end }) {
+  begin({ end }) {
     this.end = end;
     document.getElementById("timeline").hidden = end === null;
-    if (this.isReplay) this.link.ask({ do: "speed", value: Number(document.getElementById("speed").value) });
+    if (this.isReplay) this.connection.send({ do: "speed", value: Number(document.getElementById("speed").value) });
   }
 
-  follow({ position, is_held: isHeld, end, read }) {
+  update({ position, is_held: isHeld, end, read }) {
     if (!this.isReplay) return;
-    if (end !== this.end) { this.end = end; this.mark(this.alarms); }
+    if (end !== this.end) { this.end = end; this.drawMarks(this.alarms); }
     this.scrubber.max = end;
     this.isRead = read >= end;
     this.isHeld = isHeld;
@@ -39,7 +39,7 @@ export class Timeline {
     document.getElementById("position").textContent = `${position.toFixed(2)} of ${end.toFixed(2)} s` + (this.isRead ? "" : `, read to ${read.toFixed(0)} s`);
   }
 
-  mark(alarms) {
+  drawMarks(alarms) {
     this.alarms = alarms;
     if (!this.isReplay) return;
     this.times = [...new Set(alarms.map(alarm => alarm.begin))].sort((a, b) => a - b);
@@ -53,8 +53,8 @@ export class Timeline {
     }));
   }
 
-  hold(isHeld) { this.link.ask({ do: "hold", value: isHeld ? 1 : 0 }); }
-  seek(value) { this.link.ask({ do: "seek", value }); }
+  hold(isHeld) { this.connection.send({ do: "hold", value: isHeld ? 1 : 0 }); }
+  seek(value) { this.connection.send({ do: "seek", value }); }
 
   // To the mark before (-1) or after (1) the present position.
   jump(direction) {

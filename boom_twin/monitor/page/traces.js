@@ -1,41 +1,62 @@
 // What the tip does and how far it is from what was measured, against time.
 
 import { Chart } from "./chart.js";
-import { paint } from "./colours.js";
+import { themeColour } from "./colours.js";
 import { RANKS, SIGNS } from "./lamps.js";
-import { escape } from "./sheet.js";
-import { figures, thin } from "./thin.js";
+import { escapeHtml } from "./html_table.js";
+import { decimate, statistics } from "./decimation.js";
 
 const BAND = 2; // deviations that are shaded
 const SLOT = 2; // px from lowest to highest of which one line is drawn
 const BAR = 4; // px, of an alarm's mark
-const TELL = 500; // ms between two looks at the figures
+const PERIOD = 500; // ms between two looks at the figures
 const NAMES = { x: "forward", z: "up" };
 
-// Every chart: table, columns (a function of the table), their labels, a factor of the unit.
+const range = (from, to) => Array.from({ length: to - from }, (_, i) => from + i);
+// Of a table of residuals: the columns of residuals over their deviation, which are the second half, and the channels' names.
+const normalised = table => range(table.columns.length / 2, table.columns.length);
+const channels = table => normalised(table).map(column => table.columns[column].replace("_normalised", ""));
+
+// Every chart: table, columns (a function of the table), their labels, a factor of the unit. Further streams of residuals follow.
+const residualChart = (name, table, title) => ({ name, table, title, factor: 1, columns: normalised, labels: channels, isResidual: true });
 const CHARTS = [
   { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true },
   { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
   { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
-  { name: "residuals", table: "joints", title: "residual, σ", factor: 1, columns: table => range(table.columns.length / 2, table.columns.length),
-    labels: table => table.columns.slice(table.columns.length / 2).map(name => name.replace("_normalised", "")) },
+  residualChart("residuals", "joints", "residual, σ"),
 ];
 
+// Every quantity of the table of statistics: table, number of columns, their names, factor and unit. Those of residuals follow.
+const QUANTITIES = [
+  { table: "displacement", count: 2, label: column => `displ. ${NAMES[column[0]]}`, factor: 1000, unit: "mm" },
+  { table: "acceleration", count: 2, label: column => `accel. ${NAMES[column[0]]}`, factor: 1, unit: "m/s²" },
+  { table: "force", count: 4, label: column => `IMU ${column.replace("_m_s2", "").replace("_", " ")}`, factor: 1, unit: "m/s²" },
+];
+const residualQuantity = table => ({ table: table.name, count: table.columns.length / 2, label: (_, i) => `resid. ${channels(table)[i]}`, ...table.residuals });
+
 export class Traces {
-  constructor(link, view, sheet) {
-    this.link = link;
+  constructor(connection, view, htmlTable) {
+    this.connection = connection;
     this.view = view;
-    this.sheet = sheet;
+    this.htmlTable = htmlTable;
     this.charts = new Map();
     this.alarms = [];
-    link.addEventListener("alarms", event => { this.alarms = event.detail.alarms; view.version++; });
-    setInterval(() => this.tell(), TELL);
-    for (const { name } of CHARTS) {
+    connection.addEventListener("alarms", event => { this.alarms = event.detail.alarms; view.version++; });
+    setInterval(() => this.fillStatistics(), PERIOD);
+    this.kinds = [];
+    this.add(CHARTS);
+  }
+
+  // Make room for further charts below the others; all are drawn anew, for the lowest has the axis of time.
+  add(kinds) {
+    for (const { name } of kinds) {
       const element = document.createElement("div");
       element.className = "chart";
       element.id = `chart-${name}`;
       document.getElementById("charts").append(element);
     }
+    this.kinds = [...this.kinds, ...kinds];
+    this.rebuild();
   }
 
   rebuild() {
@@ -46,12 +67,14 @@ export class Traces {
   draw() {
     const [from, to] = this.view.span;
     if (!Number.isFinite(to)) return;
-    for (const kind of CHARTS) {
-      const table = this.link.table(kind.table);
+    const further = this.connection.residualTables.filter(({ name }) => !this.kinds.some(kind => kind.table === name));
+    if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, `${residuals.title}, σ`)));
+    for (const kind of this.kinds) {
+      const table = this.connection.table(kind.table);
       if (!table?.count) continue;
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
-      const [times, ...values] = thin(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
+      const [times, ...values] = decimate(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
       const scaled = kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor));
       chart.draw([times, ...(kind.isBanded ? banded(scaled) : kind.isUncertain ? this.uncertain(times, scaled, kind.factor) : scaled)], from, to);
     }
@@ -59,11 +82,11 @@ export class Traces {
 
   // The tip's lines, and beside each what it may be off by: as told last before each time.
   uncertain(times, values, factor) {
-    const table = this.link.table("uncertainty");
+    const table = this.connection.table("uncertainty");
     let row = table?.count ? Math.max(table.first, table.from(times[0]) - 1) : NaN;
     const at = times.map(time => { while (row + 1 < table?.count && table.time(row + 1) <= time) row++; return row; });
-    const beside = (column, sign) => values[column].map((value, i) => value === null || !(table?.time(at[i]) <= times[i]) ? null : value + sign * factor * BAND * table.at(column, at[i]));
-    return [...values, ...[0, 1].flatMap(column => [beside(column, 1), beside(column, -1)])];
+    const offset = (column, sign) => values[column].map((value, i) => value === null || !(table?.time(at[i]) <= times[i]) ? null : value + sign * factor * BAND * table.at(column, at[i]));
+    return [...values, ...[0, 1].flatMap(column => [offset(column, 1), offset(column, -1)])];
   }
 
   build(kind, table) {
@@ -72,9 +95,9 @@ export class Traces {
     const options = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
-      axes: [kind === CHARTS.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
+      axes: [kind === this.kinds.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
       ...options,
-      scales: kind.name === "residuals" ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
+      scales: kind.isResidual ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },
       hooks: {
         setSelect: [plot => {
@@ -82,13 +105,13 @@ export class Traces {
           if (width > 5) this.view.set({ zoom: [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] });
           plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
         }],
-        draw: [plot => this.markAlarms(plot), ...(kind.name === "residuals" ? [shadeExpected] : [])],
+        draw: [plot => this.markAlarms(plot), ...(kind.isResidual ? [shadeExpected] : [])],
       },
     });
   }
 
   // The alarms of a span of time, the worst last.
-  during(from, to) {
+  alarmsBetween(from, to) {
     return this.alarms.filter(({ begin, end }) => begin <= to && (end ?? Infinity) >= from).sort((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level) || a.causes.length - b.causes.length);
   }
 
@@ -96,42 +119,38 @@ export class Traces {
   markAlarms({ ctx, bbox, scales, valToPos }) {
     const right = bbox.left + bbox.width, at = time => Math.min(Math.max(valToPos(time, "x", true), bbox.left), right);
     ctx.save();
-    for (const { level, begin, end } of this.during(scales.x.min, scales.x.max)) {
-      ctx.fillStyle = paint(level === "OK" ? "accent" : level.toLowerCase());
+    for (const { level, begin, end } of this.alarmsBetween(scales.x.min, scales.x.max)) {
+      ctx.fillStyle = themeColour(level === "OK" ? "accent" : level.toLowerCase());
       ctx.fillRect(at(begin), bbox.top, Math.max((end === null ? right : at(end)) - at(begin), 2 * devicePixelRatio), BAR * devicePixelRatio);
     }
     ctx.restore();
   }
 
   // In words, the worst first.
-  tellAlarms(from, to) {
-    const words = this.during(from, to).reverse().map(({ name, reason, level, begin, end }) =>
-      `<span data-level=${level}>${SIGNS[level]} ${escape(name)}</span>: ${escape(reason)}, ${end === null ? `since ${begin.toFixed(1)} s` : `${begin.toFixed(1)} to ${end.toFixed(1)} s`}`);
+  listAlarms(from, to) {
+    const words = this.alarmsBetween(from, to).reverse().map(({ name, reason, level, begin, end }) =>
+      `<span data-level=${level}>${SIGNS[level]} ${escapeHtml(name)}</span>: ${escapeHtml(reason)}, ${end === null ? `since ${begin.toFixed(1)} s` : `${begin.toFixed(1)} to ${end.toFixed(1)} s`}`);
     document.getElementById("during").innerHTML = words.join(" &nbsp; ");
   }
 
-  // The table of figures of what is shown.
-  tell() {
-    const [from, to] = this.view.span, told = `${from} ${to} ${this.link.grown} ${this.view.version}`;
-    if (told === this.told || !Number.isFinite(to) || !this.sheet.element.offsetParent) return;
-    this.told = told;
-    this.tellAlarms(from, to);
+  // The table of statistics of what is shown.
+  fillStatistics() {
+    const [from, to] = this.view.span, span = `${from} ${to} ${this.connection.lastRows} ${this.view.version}`;
+    if (span === this.span || !Number.isFinite(to) || !this.htmlTable.element.offsetParent) return;
+    this.span = span;
+    this.listAlarms(from, to);
     const rows = [];
-    for (const [name, unit, factor, label] of [["displacement", "mm", 1000, "displ."], ["acceleration", "m/s²", 1, "accel."], ["force", "m/s²", 1, "IMU"], ["joints", "mrad", 1000, ""]]) {
-      const table = this.link.table(name);
+    for (const { table: name, count, label, factor, unit } of [...QUANTITIES, ...this.connection.residualTables.map(residualQuantity)]) {
+      const table = this.connection.table(name);
       if (!table?.count) continue;
-      const count = name === "force" ? 4 : name === "joints" ? table.columns.length / 2 : 2;
       for (let column = 0; column < count; column++) {
-        const found = figures(table, column, from, to);
-        const words = name === "joints" ? `resid. ${table.columns[column].replace("_rad", "")}` : name === "force" ? `IMU ${table.columns[column].replace("_m_s2", "").replace("_", " ")}` : `${label} ${NAMES[table.columns[column][0]]}`;
-        rows.push([`${words}, ${unit}`, ...["mean", "rms", "peak", "range"].map(key => found[key] * factor), found.crest]);
+        const found = statistics(table, column, from, to);
+        rows.push([`${label(table.columns[column], column)}, ${unit}`, ...["mean", "rms", "peak", "range"].map(key => found[key] * factor), found.crest]);
       }
     }
-    this.sheet.fill(["", "mean", "rms", "peak", "p-p", "crest"], rows, `of the ${(to - from).toFixed(1)} s shown; rms and peak about the mean`);
+    this.htmlTable.fill(["", "mean", "rms", "peak", "p-p", "crest"], rows, `of the ${(to - from).toFixed(1)} s shown; rms and peak about the mean`);
   }
 }
-
-const range = (from, to) => Array.from({ length: to - from }, (_, i) => from + i);
 
 const BANDED = {
   series: [
@@ -149,8 +168,8 @@ const UNCERTAIN = {
 
 // From measured, predicted, deviation of z, then of x, to what is drawn.
 function banded([measuredZ, predictedZ, sigmaZ, measuredX, predictedX]) {
-  const beside = sign => predictedZ.map((value, i) => value === null || sigmaZ[i] === null ? null : value + sign * BAND * sigmaZ[i]);
-  return [measuredZ, predictedZ, beside(1), beside(-1), measuredX, predictedX];
+  const offset = sign => predictedZ.map((value, i) => value === null || sigmaZ[i] === null ? null : value + sign * BAND * sigmaZ[i]);
+  return [measuredZ, predictedZ, offset(1), offset(-1), measuredX, predictedX];
 }
 
 // Residuals over their deviation are mostly within 2.

@@ -1,15 +1,15 @@
 // What span of time is shown.
 
 export class View {
-  constructor(link) {
-    this.link = link;
+  constructor(connection) {
+    this.connection = connection;
     this.window = 30; // s
     this.end = null; // where it is held; null: at the newest row
     this.zoom = null; // [from, to] chosen on a chart
     this.version = 0; // raised with every change
   }
 
-  get newest() { return this.link.table("displacement")?.newest ?? NaN; }
+  get newest() { return this.connection.table("displacement")?.newest ?? NaN; }
   get isHeld() { return this.end !== null; }
 
   get span() {

@@ -1,15 +1,19 @@
 """The sensor is read in its unit, has residuals in the bag of a replay, a zero, and statuses of its own."""
 
+import json
 import math
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_samples
+from boom_twin.calibration.sessions import read_sessions
+from boom_twin.calibration.validation import judged
 from boom_twin.config.settings import Settings, Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
@@ -18,6 +22,10 @@ from boom_twin.health.baseline import Baseline
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.monitor.protocol import layout
+from boom_twin.offline.history import history_of
+from boom_twin.plots.residuals import residual_picture
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
 from boom_twin.types import channels_of
@@ -71,8 +79,38 @@ assert math.isclose(decoder.put(INCLINATION, stamp_of(message), message).values[
 
 lines = default_text().replace("\nbase:\n", f"\nbase:\n  inclination: {SLOPE}\n")
 Path("scene.yaml").write_text(lines)
-options = ("--scene", "scene.yaml", "--out", "result", "--no-pictures", "--no-health")
+options = ("--scene", "scene.yaml", "--out", "result", "--report")
 subprocess.run([sys.executable, "-m", "boom_twin.cli.main", "replay", "session", *options], check=True)
 kept = read(scan(Path("result/bag")), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
 kept = [message.position[0] for _, _, message in kept if message.name == [CHANNEL]]
 assert len(kept) == count and np.abs(np.array(kept) - WRONG).max() < 6e-4
+
+# In pictures, report and comparisons, with its unit.
+rows = json.loads(Path("result/quantities.json").read_text())["quantities"]
+mean = next(row for row in rows if row["name"] == f"residual_mean_{CHANNEL}")
+assert math.isclose(mean["value"], WRONG, abs_tol=5e-4) and mean["unit"] == "rad" and mean["sigma"] is None
+labels, set_ylabel = [], Axes.set_ylabel
+Axes.set_ylabel = lambda self, text: labels.append(text) or set_ylabel(self, text)
+recording = replay("session", load_scene("scene.yaml"), "again", health=False).recording
+residual_picture(Path("residuals.png"), "session", history_of(recording, scene), "")
+assert f"{CHANNEL}\nrad" in labels and "joint_1\nmrad" in labels
+
+# On the live page: a table of residuals, from which it makes chart, figures and columns of the export.
+feed = bag_feed(Path("session"), scene, Settings())
+while feed.is_reading:
+    feed.poll()
+(table,) = (each for each in layout(feed.store)["tables"] if each["name"] == INCLINATION.value)
+assert table["columns"] == (f"{CHANNEL}_rad", f"{CHANNEL}_normalised")
+assert table["residuals"] == {"title": "tip inclinometer", "factor": 1.0, "unit": "rad"}
+assert not feed.topic_rows.dropped.by_topic
+
+# A sensor that falls silent is told, and what a calibration holds out is compared with it.
+twin, alarms = Twin(scene, baseline=Baseline()), set()
+for sample in samples:
+    if sample.stream is not INCLINATION or sample.stamp < samples[0].stamp + 10**9:
+        health = twin.update(sample).health
+        alarms |= {(alarm.kind, alarm.cause) for alarm in (health.alarms if health else ())}
+assert alarms == {("dropout", f"{CHANNEL}.sensor")}
+(session,) = read_sessions([Path("session")], topics, 4)
+compared = judged(scene, Settings(), [None] * 4, session, {}, 0)
+assert compared.names[-1] == CHANNEL and compared.spread[-1] > 5.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ....plots.study import TONES, Curve, Panel
+from ....plots.study import Curve, Panel
+from ....plots.style import TONES
 from ....scene.schema import Scene
 from .cases import PAPERS, Case, Own, Peer, Stiff
 from .default_choice import find

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ....plots.stability import Line, matrix_picture, roundoff_picture
+from ....plots.stability import MatrixRow, matrix_picture, roundoff_picture
 from ....scene.kinematics import posture_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
@@ -226,7 +226,7 @@ def write_files(
     numbers, report, matrix, roundoff = (out / name for name in names)
     write_atomic(report, text(rows, long_rows, limits, lost, turned, move))
     write_json(numbers, _as_json(rows + long_rows, limits, lost, turned))
-    lines = [Line(row.case.group, row.case.name, [mark(cell) for cell in row.cells.values()]) for row in rows]
+    lines = [MatrixRow(row.case.group, row.case.name, [mark(cell) for cell in row.cells.values()]) for row in rows]
     matrix_picture(matrix, "Where each method holds", list(rows[0].cells), lines)
     chain = [loss for loss in lost if loss.group == "sections"]
     shown = {"Riccati": "riccati", "plain product": "plain", "LU of the whole system": "dense"}

@@ -1,25 +1,25 @@
 // What one does with the page: mark, acknowledge, record, export.
 
-import { paint } from "./colours.js";
+import { themeColour } from "./colours.js";
 
 const TABLES = ["displacement", "position", "acceleration", "force", "joints", "uncertainty"];
 
-export class Work {
-  constructor(link, view) {
-    this.link = link;
+export class Actions {
+  constructor(connection, view) {
+    this.connection = connection;
     this.view = view;
     this.answer = document.getElementById("answer");
     this.record = document.getElementById("record");
     const mark = document.getElementById("mark"), dialog = document.getElementById("note"), text = document.getElementById("note-text");
     mark.onclick = () => { text.value = ""; dialog.showModal(); };
-    dialog.onclose = () => { if (dialog.returnValue === "ok") link.ask({ do: "mark", note: text.value }); dialog.returnValue = ""; };
-    this.record.onclick = () => link.ask({ do: "record", on: !this.isRecording });
-    document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) link.ask({ do: "acknowledge", number: Number(event.target.dataset.number) }); };
+    dialog.onclose = () => { if (dialog.returnValue === "ok") connection.send({ do: "mark", note: text.value }); dialog.returnValue = ""; };
+    this.record.onclick = () => connection.send({ do: "record", on: !this.isRecording });
+    document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) connection.send({ do: "acknowledge", number: Number(event.target.dataset.number) }); };
     document.getElementById("picture").onclick = () => this.savePicture();
     document.getElementById("csv").onclick = () => this.saveTable();
-    link.addEventListener("hello", event => this.permit(event.detail.permitted));
-    link.addEventListener("answer", event => { this.answer.textContent = event.detail.words; });
-    link.addEventListener("state", event => {
+    connection.addEventListener("hello", event => this.permit(event.detail.permitted));
+    connection.addEventListener("answer", event => { this.answer.textContent = event.detail.words; });
+    connection.addEventListener("state", event => {
       this.isRecording = event.detail.is_recording;
       this.record.textContent = this.isRecording ? "■ Stop recording" : "● Record";
     });
@@ -37,9 +37,9 @@ export class Work {
     const picture = document.createElement("canvas"), context = picture.getContext("2d");
     picture.width = Math.max(...canvases.map(each => each.width));
     picture.height = 30 + canvases.reduce((sum, each) => sum + each.height, 0);
-    context.fillStyle = paint("ground");
+    context.fillStyle = themeColour("ground");
     context.fillRect(0, 0, picture.width, picture.height);
-    context.fillStyle = paint("ink");
+    context.fillStyle = themeColour("ink");
     context.font = "15px system-ui";
     context.fillText(`${document.getElementById("title").textContent}, ${this.view.span.map(t => t.toFixed(2)).join(" to ")} s, ${document.querySelector("#overall .word").textContent}`, 8, 20);
     let y = 30;
@@ -50,7 +50,8 @@ export class Work {
   // Every row of the span that is shown, by stamp; empty where a table has none at that stamp.
   saveTable() {
     const [from, to] = this.view.span, rows = new Map(), heads = ["t_s"];
-    for (const table of TABLES.map(name => this.link.table(name)).filter(Boolean)) {
+    const others = this.connection.residualTables.filter(({ name }) => !TABLES.includes(name));
+    for (const table of [...TABLES.map(name => this.connection.table(name)).filter(Boolean), ...others]) {
       const start = heads.length;
       heads.push(...table.columns.map(column => `${table.name}_${column}`));
       for (let row = table.from(from); row < table.count && table.time(row) <= to; row++) {
@@ -66,9 +67,9 @@ export class Work {
 }
 
 function save(blob, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  const anchor = document.createElement("a");
+  anchor.href = URL.createObjectURL(blob);
+  anchor.download = name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(anchor.href), 1000);
 }

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..types import Array
-from .style import GREY, INK
+from boom_twin.plots.style import GREY, INK
+from boom_twin.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

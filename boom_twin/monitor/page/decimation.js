@@ -3,7 +3,7 @@
 const GAP = 0.1; // s without rows that is drawn as a break
 
 // Columns of a table from one time to another, for uPlot: [times, ...values], null at breaks.
-export function thin(table, columns, from, to, slots) {
+export function decimate(table, columns, from, to, slots) {
   const first = Math.max(table.first, table.from(from) - 1), end = Math.min(table.count, table.from(to) + 1);
   const step = Math.max(1, Math.floor((end - first) / slots));
   const times = [], values = columns.map(() => []);
@@ -46,7 +46,7 @@ function pushOutline(table, columns, row, stop, times, values) {
 }
 
 // Of one column from one time to another: mean, and about it root mean square, largest deviation, range, crest factor.
-export function figures(table, column, from, to) {
+export function statistics(table, column, from, to) {
   const first = table.from(from), end = table.from(to);
   let sum = 0, squares = 0, count = 0, low = Infinity, high = -Infinity;
   for (let row = first; row < end; row++) {

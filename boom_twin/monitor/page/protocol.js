@@ -2,7 +2,7 @@
 
 export const ROWS = 1, SPECTRUM = 2, SPECTROGRAM = 3;
 
-export function* blocks(buffer) {
+export function* decodeBlocks(buffer) {
   const view = new DataView(buffer);
   for (let at = 0; at < buffer.byteLength;) {
     const kind = view.getUint8(at), table = view.getUint8(at + 1);

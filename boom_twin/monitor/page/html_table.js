@@ -1,0 +1,20 @@
+// An HTML table of words and numbers.
+
+export class HtmlTable {
+  constructor(id) { this.element = document.getElementById(id); }
+
+  fill(heads, rows, caption = "") {
+    const cells = (kind, row) => "<tr>" + row.map(cell => `<${kind}${typeof cell === "string" ? ' class="text"' : ""}>${formatNumber(cell)}</${kind}>`).join("") + "</tr>";
+    this.element.innerHTML = (caption ? `<caption>${escapeHtml(caption)}</caption>` : "") + cells("th", heads) + rows.map(row => cells("td", row)).join("");
+  }
+}
+
+// Three or four digits of a number, – where it is not known.
+export function formatNumber(cell) {
+  if (typeof cell === "string") return escapeHtml(cell);
+  if (!Number.isFinite(cell)) return "–";
+  const size = Math.abs(cell);
+  return size && (size < 1e-3 || size >= 1e6) ? cell.toExponential(2) : Number(cell.toPrecision(4)).toString();
+}
+
+export const escapeHtml = text => text.replace(/[&<>"]/g, sign => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[sign]);
