@@ -16,7 +16,7 @@ from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
 from boom_twin.messages.report_encoder import decode_changes, encode_changes
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.offline.reader_process import Changes
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Change, Stream
@@ -36,7 +36,7 @@ def test_there_and_back() -> None:
 
 @pytest.mark.parametrize(("name", "value"), [("gap", -1.0), ("payload", np.nan), ("gap", np.inf)])
 def test_values_of_a_stranger_are_checked(name: str, value: float) -> None:
-    msg = RosbagsTypes().make(TYPE)
+    msg = new_message(TYPE)
     msg.name, msg.position = [name], np.array([value])
     with pytest.raises(BagError, match=name):
         decode_changes(msg)

@@ -18,7 +18,7 @@ from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.cli.main import main
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes
+from boom_twin.messages.type_store import new_message
 from boom_twin.types import Stream
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
@@ -30,7 +30,7 @@ def write_strokes(directory: Path, rows: list[tuple[int, int, list[str]]]) -> Pa
     topic = load_topics().inputs[Stream.STROKES]
     with SessionWriter(directory, {"strokes": topic}) as bag:
         for log_time, stamp, names in rows:
-            msg = RosbagsTypes().make(topic.type)
+            msg = new_message(topic.type)
             fill_header(msg.header, stamp, "base_link")
             msg.name, msg.position = names, np.zeros(len(names))
             bag.write("strokes", log_time, msg)
@@ -95,7 +95,7 @@ def test_clocks_of_two_streams_that_differ(bag: Path, tmp_path: Path) -> None:
     with SessionWriter(tmp_path / "two", {stream.value: topic for stream, topic in topics.items()}) as two:
         for row in range(10):
             for stream, topic in topics.items():
-                msg = RosbagsTypes().make(topic.type)
+                msg = new_message(topic.type)
                 fill_header(msg.header, 10**18 + row * STEP - (stream is Stream.ANGLES) * 200_000_000, "")
                 two.write(stream.value, 10**18 + row * STEP, msg)
     assert any("/joint_angles is stamped +0.200 s before its log time" in text for text in remarks(inspect(tmp_path / "two")))

@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
@@ -23,7 +24,7 @@ from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.types import Stream
 
 TOPIC = load_topics().inputs[Stream.STROKES]
@@ -31,9 +32,9 @@ STEP = 5_000_000
 
 
 def message(number: int) -> bytes:
-    msg = RosbagsTypes().make(TOPIC.type)
+    msg = new_message(TOPIC.type)
     msg.header.stamp.sec = number
-    msg.position = RosbagsTypes().doubles([0.1 * number])
+    msg.position = np.array([0.1 * number])
     return bytes(jazzy().serialize_cdr(msg, TOPIC.type))
 
 
