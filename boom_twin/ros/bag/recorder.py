@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 from ...bag.async_writer import Storage
 from ...bag.writer import LARGEST_MESSAGE
 from ...config.settings import Settings, Thresholds
+from ...diagnostics.levels import Evaluation
 from ...diagnostics.recorder_status import RecordingJudge, TopicState
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
@@ -189,7 +190,7 @@ class _Recording:
     ) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage, tell) for each in wanted]
-        self._board, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self._publisher, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
         self._parameters = RemoteParameters(node)
         self._texts = {name: RemoteText(node, name) for name in TEXTS}
 
@@ -211,10 +212,10 @@ class _Recording:
         """Publish the state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * NANO
-        disk = self.storage.state()
-        self._board.show([self._judge.status(topics, disk, end, self._thresholds, time.monotonic(), clock)])
+        at = Evaluation(self._thresholds, time.monotonic(), clock)
+        self._publisher.show([self._judge.status(topics, self.storage.state(), end, at)])
         if end is not None:
-            self._board.settle()
+            self._publisher.settle()
 
 
 @contextmanager

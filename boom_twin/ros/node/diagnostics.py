@@ -160,7 +160,7 @@ class Diagnostics:
         self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        self._board = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
+        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._due, self._active = time.monotonic() + PERIOD, False
@@ -223,7 +223,7 @@ class Diagnostics:
         peers = self._peers
         others, received = self._other_booms(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        self._board.show(self._watch.look(told, self._active, *ends, clock, received, others))
+        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others))
         self._tell_oddities()
         self._tell_clock(clock)
 
