@@ -85,7 +85,7 @@ def run(args: Namespace) -> int:
         bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
         sheet.write(args.out)
 
-        def meet(told: Mapping[str, Any]) -> None:
+        def on_twin(told: Mapping[str, Any]) -> None:
             nonlocal sheet
             more = _met(sheet, told)
             try:
@@ -96,7 +96,7 @@ def run(args: Namespace) -> int:
 
         storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
+        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, on_twin)
     _tell(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if sheet.scene is None:

@@ -187,7 +187,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
 
     with ros([]):
         player = Player(session)
-        running.meet(player)
+        running.wait_for_discovery(player)
         with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in running.play(player, duration):
                 bar.update(elapsed * NANO - bar.n)

@@ -53,7 +53,7 @@ def _play(args: Namespace, running: DemoProcesses) -> None:
     monitor = running.start("monitor", command, signal.SIGTERM)
     with ros([]):
         player = Player(scan(args.bag))
-        running.meet(player)
+        running.wait_for_discovery(player)
         while not (found := re.search(r"open (http://\S+)", monitor.said())):
             running.check()
             time.sleep(0.1 * LOOK)

@@ -134,7 +134,7 @@ class DemoProcesses:
 
         return player.play(duration=duration, is_held=is_held)
 
-    def meet(self, player: Player) -> None:
+    def wait_for_discovery(self, player: Player) -> None:
         """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
         from ..bag.recorder import COMPLETE
 
@@ -144,7 +144,7 @@ class DemoProcesses:
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
-        player.refuse_rivals()
+        player.refuse_other_publishers()
 
     def end(self) -> None:
         """End all, the last first."""

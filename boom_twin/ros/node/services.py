@@ -107,8 +107,8 @@ BETWEEN = 1.0
 """Least time (s) between starts that are told: a source whose clock jumps at every sample does not fill the log."""
 
 
-class Started:
-    """Tells what changed.
+class StartLog:
+    """Logs from when on the model goes on with other settings, zeros or from rest.
 
     Parameters
     ----------
