@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -78,6 +79,19 @@ class BagMetadata(BaseModel):
     files: list[FileInformation] = []
     custom_data: dict[str, Any] | None = None
     ros_distro: str = ""
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Messages by topic."""
+        found: Counter[str] = Counter()
+        for entry in self.topics_with_message_count:
+            found[entry.topic_metadata.name] += entry.message_count
+        return found
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """What the writer noted, as texts."""
+        return {key: str(value) for key, value in (self.custom_data or {}).items()}
 
 
 def read_metadata(path: Path) -> BagMetadata:

@@ -22,7 +22,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import decode, jazzy
 from ..system.received_files import holds_file
-from .integrity import RESCUE, STUMBLES, as_bag_error, compare_counts
+from .integrity import PARSE_ERRORS, REMEDY, as_bag_error, compare_counts
 from .mcap_records import messages
 from .mcap_summary import McapFile, summarise
 from .metadata import FILE_NAME, BagMetadata, read_metadata
@@ -179,11 +179,8 @@ def _scan(path: Path, incomplete: str) -> Session:
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
-        told = Counter[str]()
-        for entry in metadata.topics_with_message_count:
-            told[entry.topic_metadata.name] += entry.message_count
-        compare_counts(path, FILE_NAME, told, "files", {topic.name: topic.count for topic in topics})
-        notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()}
+        compare_counts(path, FILE_NAME, metadata.counts, "files", {topic.name: topic.count for topic in topics})
+        notes |= metadata.notes
     filled = [file for file in files if any(file.counts.values())]
     return Session(
         path=path,
@@ -279,8 +276,8 @@ def _decoded(file: McapFile, asked: Mapping[str, str]) -> Iterator[tuple[str, in
             kind = file.schemas[channel.schema_id].name
             try:
                 decoded = decode(message.data, kind) if kind in known else None
-            except STUMBLES as error:
+            except PARSE_ERRORS as error:
                 place = f"{file.path}: topic {channel.topic} at log time {message.log_time} ns"
-                raise BagError(f"{place}: {error} {RESCUE}") from error
+                raise BagError(f"{place}: {error} {REMEDY}") from error
             yield name, message.log_time, message.data, decoded
-        compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))
+        file.check_counts("statistics", file.counts, "read", seen)

@@ -66,7 +66,7 @@ def write_samples(
     inputs = load_topics().inputs
     with SessionWriter(directory, {stream.value: inputs[stream] for stream in streams}, description) as bag:
         for sample in samples:
-            bag.write(sample.stream.value, sample.stamp, _message_of(sample))
+            bag.write(sample.stream.value, sample.stamp, sensor_message(sample))
 
 
 def samples_of(
@@ -92,7 +92,7 @@ def samples_of(
     return sorted(samples, key=lambda sample: sample.stamp)
 
 
-def _message_of(sample: Sample) -> Any:
+def sensor_message(sample: Sample) -> Any:
     """The message as a sensor of a rig would send it; of an Imu only the acceleration is there, and of it only the plane."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
