@@ -221,6 +221,13 @@ class Recorded:
     encoding: str = "cdr"
     definition_encoding: str = "ros2msg"
 
+    @classmethod
+    def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
+        """A topic that is offered with `qos`; its channel keeps that and the hash of the type, as rosbag2's do."""
+        profile = offered_qos(qos)
+        details = {"offered_qos_profiles": dump(profile), "topic_type_hash": type_hash}
+        return cls(topic, type_name, definition.encode(), details, profile, type_hash)
+
 
 def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
     """One file: name, first and last log time (ns), messages."""

@@ -247,11 +247,8 @@ FILE_NAME = file_name(0)
 
 def recorded(topic: Topic) -> Recorded:
     """How a topic of ``topics.yaml`` stands in a bag."""
-    qos = bagmeta.offered_qos(topic.qos)
-    type_hash = jazzy().hash_rihs01(topic.type)
-    details = {"offered_qos_profiles": bagmeta.dump(qos), "topic_type_hash": type_hash}
     definition, _ = jazzy().generate_msgdef(topic.type, ros_version=2)
-    return Recorded(topic.absolute, topic.type, definition.encode(), details, qos, type_hash)
+    return Recorded.offered(topic.absolute, topic.type, definition, topic.qos, jazzy().hash_rihs01(topic.type))
 
 
 class SessionWriter:

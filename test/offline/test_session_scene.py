@@ -140,7 +140,7 @@ def test_the_intake_takes_nothing_of_another_boom():
     names = [f"cylinder_{i}" for i in range(1, 6)]
     decoder, msg = SampleDecoder(4), SimpleNamespace(name=names, position=[0.1] * 5)
     assert decoder.put(Stream.STROKES, 10**18, msg) is None
-    assert decoder.oddities == {"names of another boom": 1} and decoder.strangers == {Stream.STROKES: ["cylinder_5"]}
+    assert decoder.oddities == {"names of another boom": 1} and decoder.other_boom_names == {Stream.STROKES: ["cylinder_5"]}
     assert decoder.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
 
 

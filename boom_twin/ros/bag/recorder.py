@@ -26,7 +26,7 @@ from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
-from .subscriptions import Wanted, subscription_of
+from .subscriptions import RequestedTopic, subscription_of
 
 NAMES = ("scene", *Settings.model_fields)
 
@@ -108,7 +108,7 @@ class Count:
 class _Channel:
     """One topic while it is recorded."""
 
-    def __init__(self, wanted: Wanted, storage: Storage, tell: Callable[[str], None]) -> None:
+    def __init__(self, wanted: RequestedTopic, storage: Storage, tell: Callable[[str], None]) -> None:
         self.wanted, self._storage, self._tell = wanted, storage, tell
         self.subscription: Any = None
         self.count = Count(wanted.name)
@@ -183,7 +183,7 @@ class _Recording:
     """What is recorded, told on ``/diagnostics``."""
 
     def __init__(
-        self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds, tell: Callable[[str], None]
+        self, node: Any, storage: Storage, wanted: Sequence[RequestedTopic], thresholds: Thresholds, tell: Callable[[str], None]
     ) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage, tell) for each in wanted]
@@ -225,7 +225,7 @@ def recorder_node() -> Iterator[Any]:
 def record(
     node: Any,
     storage: Storage,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[RequestedTopic],
     thresholds: Thresholds,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
@@ -239,7 +239,7 @@ def record(
         See `recorder_node`.
     storage : Storage
         Completed at the end.
-    wanted : sequence of Wanted
+    wanted : sequence of RequestedTopic
     thresholds : Thresholds
         Of the state on ``/diagnostics``.
     stopped : callable
