@@ -50,7 +50,7 @@ PACKED = BYTES_PER_BYTE // 10
 """Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
 
 
-REST = 10.0
+METADATA_PAUSE = 10.0
 """Time from one writing of ``metadata.yaml`` at a split to the next, over what it takes: it grows with every file."""
 
 
@@ -94,7 +94,7 @@ class BagWriter:
         self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
-        self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
+        self._pending = self._end = self._excess = 0  # of the open file: see `_add_excess`
         claim_directory(directory)
         self._open()
 
@@ -132,9 +132,9 @@ class BagWriter:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
-        self._weigh(len(data))
+        self._add_excess(len(data))
 
-    def _weigh(self, size: int) -> None:
+    def _add_excess(self, size: int) -> None:
         """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
         self._pending += size
         if (end := self._buffered.tell()) > self._end:
@@ -146,7 +146,7 @@ class BagWriter:
 
         They survive the loss of power once ``os.fsync`` has put that file on the disk.
         """
-        with self._told():
+        with self._as_bag_error():
             self._writer.flush()  # type: ignore[no-untyped-call]
         return self._raw.fileno()
 
@@ -172,16 +172,16 @@ class BagWriter:
 
     def split(self) -> None:
         """Complete the open file, tell of it in ``metadata.yaml`` unless that takes too long by now, and begin the next one."""
-        with self._told():
+        with self._as_bag_error():
             self._finish()
             if (began := time.monotonic()) >= self._due:
                 self._write_metadata()
-                self._due = began + (1.0 + REST) * (time.monotonic() - began)
+                self._due = began + (1.0 + METADATA_PAUSE) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
-        with self._told():
+        with self._as_bag_error():
             self._finish()
             self._write_metadata()
 
@@ -191,7 +191,7 @@ class BagWriter:
             self._raw.close()
 
     def _open(self) -> None:
-        with self._told():
+        with self._as_bag_error():
             self._raw = self.file.open("xb", buffering=0)
             self._buffered = BufferedWriter(self._raw)
             self._writer = Writer(self._buffered, chunk_size=CHUNK_SIZE, compression=self._compression)
@@ -226,7 +226,7 @@ class BagWriter:
         self._files.append(file_information(file_name(len(self._files)), first, last, count))
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _as_bag_error(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:

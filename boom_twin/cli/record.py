@@ -87,7 +87,7 @@ def run(args: Namespace) -> int:
 
         def on_twin(told: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _met(sheet, told)
+            more = _with_twin_values(sheet, told)
             try:
                 more.write(args.out)
                 sheet = more
@@ -130,7 +130,7 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _met(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
+def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
     """With what the running twin tells of itself; what was given instead stays, and the difference is told."""
     from ..ros.bag.recorder import TEXTS
 

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boom_twin.messages.sample_decoder import LONGEST, SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import Sensor, Topics, channels, load_topics, usual
+from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
 from boom_twin.messages.type_store import new_message
-from boom_twin.types import Stream
+from boom_twin.types import SENSORS, Stream
 
 FINITE = st.floats(-1e6, 1e6)
 OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joint_", "cylinder_")))
@@ -197,7 +197,7 @@ def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], rea
     other = {"cylinder_2": "cylinder_1", "joint_1": "joint_2"}[channel]
     sample = SampleDecoder(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
     assert sample is not None
-    values = dict(zip(channels(stream, 2), sample.values.tolist(), strict=True))
+    values = dict(zip(SENSORS[stream].channels(2), sample.values.tolist(), strict=True))
     assert values == {channel: pytest.approx(expected, rel=1e-12), other: 0.7}
 
 

@@ -78,7 +78,7 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     BagError
         The file is of another profile than ros2.
     """
-    definitions, loose = FileDefinitions(), FileDefinitions()
+    definitions, unvouched = FileDefinitions(), FileDefinitions()
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST, True
@@ -86,10 +86,10 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
-        taker = definitions if piece.vouched or is_in_summary else loose
+        target = definitions if piece.vouched or is_in_summary else unvouched
         others = _NOTES | _INDEXES if is_in_summary else _NOTES
         for opcode, body in parts(piece.content):
-            if opcode in _DEFINITIONS and (taker is definitions or is_data):
+            if opcode in _DEFINITIONS and (target is definitions or is_data):
                 budget -= len(body)
                 if budget < 0:
                     raise BagError(f"{path}: more than {LARGEST} bytes of definitions. It is not the work of a recorder.")
@@ -97,9 +97,9 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
                 continue
             match record_of(opcode, body):
                 case Channel() as channel:
-                    taker.channels.setdefault(channel.id, channel)
+                    target.channels.setdefault(channel.id, channel)
                 case Schema() as schema:
-                    taker.schemas.setdefault(schema.id, schema)
+                    target.schemas.setdefault(schema.id, schema)
                 case Header(profile=("ros1" | "px4") as profile):
                     raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
                 case Metadata(name=name, metadata=notes) if name == NOTES:
@@ -111,8 +111,8 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
                     statistics = found
                 case ChunkIndex() as index:
                     definitions.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
-    definitions.channels = {**loose.channels, **definitions.channels}
-    definitions.schemas = {**loose.schemas, **definitions.schemas}
+    definitions.channels = {**unvouched.channels, **definitions.channels}
+    definitions.schemas = {**unvouched.schemas, **definitions.schemas}
     if statistics is not None and statistics.channel_message_counts.keys() <= definitions.channels.keys():
         definitions.told = by_topic(statistics.channel_message_counts, definitions.channels)
     return definitions

@@ -109,7 +109,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen no more."""
         self.queue.catch_up()
-        self._go_quiet()
+        self._stop_listening()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -119,14 +119,14 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of everything, from whatever state."""
-        self._go_quiet()
+        self._stop_listening()
         self._discard()
         self.finished = True
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of everything; the node can be configured anew."""
-        self._go_quiet()
+        self._stop_listening()
         self._discard()
         return super().on_error(state)
 
@@ -163,7 +163,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self.queue.catch_up()
             self._twin.requests.tune(asked)
 
-    def _go_quiet(self) -> None:
+    def _stop_listening(self) -> None:
         self._diagnostics.stop()
         while self._subscriptions_in:
             self.destroy_subscription(self._subscriptions_in.pop())
