@@ -20,24 +20,14 @@ SKEW = 0.05
 """Difference (s) of two streams' clocks that is worth a word: a boom moves by centimetres in it."""
 
 JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
-MOST_JOINTS = 99
-"""As far as numbers of channels are looked for where no scene tells it."""
 
 
-def names_missing(info: BagInfo, joints: int | None = None) -> list[str]:
-    """Names of channels that are not in (all) messages, one sentence for each.
-
-    Parameters
-    ----------
-    info : BagInfo
-    joints : int, optional
-        Of the scene; by default the highest number that occurs.
-    """
+def names_missing(info: BagInfo, joints: int) -> list[str]:
+    """Names of the channels of a scene with so many joints that are not in (all) messages, one sentence for each."""
     topics = mapping_of(info.session.path).topics
-    last = joints or _highest(info, topics)
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
-        own = _names(topics, stream, last)
+        own = _names(topics, stream, joints)
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
         for name in own:
             if lacking := sum(count for names, count in its.items() if name not in names):
@@ -45,13 +35,12 @@ def names_missing(info: BagInfo, joints: int | None = None) -> list[str]:
     return found
 
 
-def names_extra(info: BagInfo, joints: int | None = None) -> list[str]:
-    """Names that no replay uses, one sentence for each."""
+def names_extra(info: BagInfo, joints: int) -> list[str]:
+    """Names that no replay with so many joints uses, one sentence for each."""
     topics = mapping_of(info.session.path).topics
-    last = joints or _highest(info, topics)
     used: dict[str, set[str]] = {}
     for stream, tally in _joint_states(info, topics):
-        used.setdefault(tally.name, set()).update(_names(topics, stream, last))
+        used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
     tallies = {tally.name: tally for _, tally in _joint_states(info, topics)}
     return [
         f"{name} of {topic} is not used"
@@ -60,19 +49,20 @@ def names_extra(info: BagInfo, joints: int | None = None) -> list[str]:
     ]
 
 
-def missing(info: BagInfo, joints: int | None = None, scene: str = "") -> list[str]:
+def missing(info: BagInfo, joints: int, scene: str = "") -> list[str]:
     """What is missing for a replay, one sentence for each, the worst first; empty when all is there.
 
     Parameters
     ----------
     info : BagInfo
-    joints : int, optional
-        Of the scene, and where that was taken from; without them nothing tells whether the session is of another boom.
+    joints : int
+        Of the scene.
     scene : str
+        Where that was taken from.
     """
     topics = mapping_of(info.session.path).topics
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
-    found = list(other_names(topics, names, joints, scene)) if joints else []
+    found = list(other_names(topics, names, joints, scene))
     for stream, topic in topics.inputs.items():
         try:
             name = check_topic(info.session, topic.name, topic.type).name
@@ -130,17 +120,6 @@ def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally
 def _names(topics: Topics, stream: Stream, joints: int) -> list[str]:
     """Under which names the channels of a stream are published."""
     return [sensor.name for sensor in topics.sensors_of(stream, joints).values()]
-
-
-def _highest(info: BagInfo, topics: Topics) -> int:
-    """The highest number of a cylinder or joint that occurs."""
-    numbers = [
-        number
-        for stream, tally in _joint_states(info, topics)
-        for number, name in enumerate(_names(topics, stream, MOST_JOINTS), start=1)
-        if any(name in names for names in tally.names)
-    ]
-    return max(numbers, default=0)
 
 
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)

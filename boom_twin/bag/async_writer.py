@@ -91,7 +91,7 @@ _Message = tuple[int, int, bytes, int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Split:
+class FileSplit:
     """When a new file begins: bytes, and seconds of log time; None for never."""
 
     size: int | None = None
@@ -113,12 +113,12 @@ class Storage:
     ----------
     bag : BagWriter
         From now on only used here.
-    split : Split
+    split : FileSplit
     tell : callable
         Told in words that the disk does not answer, and that it does again; and that no further file begins.
     """
 
-    def __init__(self, bag: BagWriter, split: Split, tell: Callable[[str], None]) -> None:
+    def __init__(self, bag: BagWriter, split: FileSplit, tell: Callable[[str], None]) -> None:
         self._bag, self._split, self._tell = bag, split, tell
         self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
         self._put = self._taken = 0  # bytes; each is changed by one thread only

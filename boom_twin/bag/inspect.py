@@ -14,7 +14,7 @@ from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
 from ..system.received_files import open_received
 from ..types import NANO, Stream
-from .integrity import as_bag_error, compare_counts
+from .integrity import as_bag_error
 from .mcap_records import LARGEST, chunk_at, heads
 from .mcap_summary import McapFile
 from .reader import Session, scan
@@ -187,7 +187,7 @@ def _count(file: McapFile, tallies: dict[str, Tally]) -> None:
         for key, log_time, data in heads(file.path, file.chunks):
             seen[key] += 1
             own[key].add(log_time, data)
-    compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))
+    file.check_counts("statistics", file.counts, "read", seen)
 
 
 def _writer(file: McapFile) -> tuple[str, str]:

@@ -18,32 +18,30 @@ from zstandard import ZstdError
 from ..errors import BagError
 from ..system.received_files import open_received
 
-RESCUE = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
+REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
 _LZ4 = (RuntimeError,)
 _PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
-STUMBLES = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
+PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
 """What the parsers raise on bytes that are not what they should be."""
 
 
 @contextmanager
 def as_bag_error(path: Path) -> Iterator[None]:
-    """Turn what reading `path` stumbles over into a BagError that names it."""
+    """Turn an error on reading `path` into a BagError that names it."""
     try:
         yield
     except OSError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
-    except STUMBLES as error:
-        raise BagError(f"{path}: {str(error) or type(error).__name__}. {RESCUE}") from error
+    except PARSE_ERRORS as error:
+        raise BagError(f"{path}: {str(error) or type(error).__name__}. {REMEDY}") from error
 
 
-def compare_counts(place: Path, teller: str, told: Mapping[str, int], finder: str, found: Mapping[str, int]) -> None:
-    """Raise BagError that names each topic whose two counts differ; a count of 0 is the same as none."""
-    topics = sorted(topic for topic in {*told, *found} if told.get(topic, 0) != found.get(topic, 0))
-    if topics:
-        pairs = [(topic, told.get(topic, 0), found.get(topic, 0)) for topic in topics]
-        faults = "; ".join(f"{topic}: {teller} {one}, {finder} {other}" for topic, one, other in pairs)
-        raise BagError(f"{place}: message counts differ ({faults}). {RESCUE}")
+def compare_counts(place: Path, source: str, counts: Mapping[str, int], other: str, others: Mapping[str, int]) -> None:
+    """Raise BagError that names each topic whose counts from two sources differ; a count of 0 is the same as none."""
+    pairs = [(topic, counts.get(topic, 0), others.get(topic, 0)) for topic in sorted({*counts, *others})]
+    if faults := "; ".join(f"{topic}: {source} {one}, {other} {two}" for topic, one, two in pairs if one != two):
+        raise BagError(f"{place}: message counts differ ({faults}). {REMEDY}")
 
 
 BLOCK = 2**20
@@ -60,13 +58,13 @@ def check_ends(path: Path, file: BinaryIO) -> None:
             raise BagError(f"{path}: incomplete: {size} bytes, of which nothing can be saved. Its recorder was ended at once.")
         raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
     if (ends := _footer(file, size)) is None:
-        raise BagError(f"{path}: incomplete: the end is missing (no footer at the end of its {size} bytes). {RESCUE}")
+        raise BagError(f"{path}: incomplete: the end is missing (no footer at the end of its {size} bytes). {REMEDY}")
     summary, is_sound = ends
     if not is_sound:
         fault = f"the checksum of the summary, from byte {summary}, does not fit"
         if summary > size - _FOOTER.size:
             fault = f"the summary is said to begin at byte {summary}, which is not in front of the footer of its {size} bytes"
-        raise BagError(f"{path}: {fault}. {RESCUE}")
+        raise BagError(f"{path}: {fault}. {REMEDY}")
 
 
 def summary_start(path: Path) -> int | None:

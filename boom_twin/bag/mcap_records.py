@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from operator import attrgetter
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from lz4.frame import LZ4FrameDecompressor
+from mcap import records as mcap_records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, McapRecord, Message, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, McapRecord, Message
 from mcap.stream_reader import StreamReader
 from zstandard import ZstdDecompressor
 
 from ..system.received_files import open_received
-from .integrity import STUMBLES
+from .integrity import PARSE_ERRORS
 
 LARGEST = 64 * 2**20
 """Bytes of one record, and of one chunk unpacked, that are read at most."""
@@ -31,6 +33,22 @@ RECORDS_PER_BYTE = 0.5
 
 PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
+KINDS: dict[int, Any] = {
+    Opcode.HEADER: mcap_records.Header,
+    Opcode.FOOTER: mcap_records.Footer,
+    Opcode.SCHEMA: mcap_records.Schema,
+    Opcode.CHANNEL: mcap_records.Channel,
+    Opcode.MESSAGE_INDEX: mcap_records.MessageIndex,
+    Opcode.CHUNK_INDEX: mcap_records.ChunkIndex,
+    Opcode.ATTACHMENT: mcap_records.Attachment,
+    Opcode.ATTACHMENT_INDEX: mcap_records.AttachmentIndex,
+    Opcode.STATISTICS: mcap_records.Statistics,
+    Opcode.METADATA: mcap_records.Metadata,
+    Opcode.METADATA_INDEX: mcap_records.MetadataIndex,
+    Opcode.SUMMARY_OFFSET: mcap_records.SummaryOffset,
+    Opcode.DATA_END: mcap_records.DataEnd,
+}
+"""Classes of all records but messages and chunks."""
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
 
@@ -164,15 +182,21 @@ def message_of(body: bytes) -> Message:
     )
 
 
-def definition_of(opcode: int, body: bytes) -> Channel | Schema | None:
-    """A channel or a schema from the body of its record; None for any other record, McapError if it is not whole."""
-    if opcode not in (Opcode.CHANNEL, Opcode.SCHEMA):
-        return None
+def record_of(opcode: int, body: bytes) -> McapRecord:
+    """A record of one of `KINDS` from its body; McapError if it does not fill that."""
     stream = ReadDataStream(BytesIO(body))
-    record: Channel | Schema = Channel.read(stream) if opcode == Opcode.CHANNEL else Schema.read(stream)
+    record: McapRecord = KINDS[opcode].read(stream)
     if stream.count != len(body):
         raise McapError(f"{type(record).__name__} record of {len(body)} bytes holds {stream.count}")
     return record
+
+
+def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:
+    """Counts by channel, added up by the name of the topic."""
+    topics: Counter[str] = Counter()
+    for channel, count in counts.items():
+        topics[channels[channel].topic] += count
+    return topics
 
 
 def records(path: Path) -> Iterator[McapRecord]:
@@ -230,11 +254,13 @@ def fault_named_by_times(chunk: Chunk) -> Iterator[None]:
     """Turn what the content of a chunk is at fault with into a McapError that names the chunk by its log times."""
     try:
         yield
-    except STUMBLES as error:
+    except PARSE_ERRORS as error:
         span = f"{chunk.message_start_time} to {chunk.message_end_time} ns"
         raise McapError(f"chunk with log times {span}: {error}") from error
 
 
-def record_of(opcode: int, body: bytes) -> McapRecord | None:
+def record_of_message(opcode: int, body: bytes) -> McapRecord | None:
     """A message, a channel or a schema from the body of its record; None for any other record."""
-    return message_of(body) if opcode == Opcode.MESSAGE else definition_of(opcode, body)
+    if opcode == Opcode.MESSAGE:
+        return message_of(body)
+    return record_of(opcode, body) if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -15,7 +15,7 @@ from mcap.summary import Summary
 from ..errors import BagError
 from ..system.received_files import open_received
 from .integrity import as_bag_error, check_ends, compare_counts
-from .mcap_records import LARGEST, records
+from .mcap_records import LARGEST, by_topic, records
 from .recovery.chunk_head import head_at
 
 PROFILE = "ros2"
@@ -53,12 +53,10 @@ class McapFile:
     checked: bool
     notes: dict[str, str]
 
-    def by_topic(self, counts: dict[int, int]) -> dict[str, int]:
-        """Counts by channel, added up by the name of the topic."""
-        topics: Counter[str] = Counter()
-        for channel, count in counts.items():
-            topics[self.channels[channel].topic] += count
-        return dict(topics)
+    def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
+        """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
+        one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
+        compare_counts(self.path, source, one, other, two)
 
 
 def summarise(path: Path) -> McapFile:
@@ -136,8 +134,7 @@ def _walk(path: Path) -> McapFile:
     checked = is_summed or (chunks_summed == {True} and told is not None)
     held = McapFile(path, channels, schemas, dict(counts), start, end, (), checked, _notes(notes))
     if told is not None:
-        expected = held.by_topic(told.channel_message_counts)
-        compare_counts(path, "statistics", expected, "in the file", held.by_topic(counts))
+        held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
     return held
 
 

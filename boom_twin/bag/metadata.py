@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -78,6 +79,19 @@ class BagMetadata(BaseModel):
     files: list[FileInformation] = []
     custom_data: dict[str, Any] | None = None
     ros_distro: str = ""
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Messages by topic."""
+        found: Counter[str] = Counter()
+        for entry in self.topics_with_message_count:
+            found[entry.topic_metadata.name] += entry.message_count
+        return found
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """What the writer noted, as texts."""
+        return {key: str(value) for key, value in (self.custom_data or {}).items()}
 
 
 def read_metadata(path: Path) -> BagMetadata:
@@ -206,6 +220,13 @@ class Recorded:
     type_hash: str = ""
     encoding: str = "cdr"
     definition_encoding: str = "ros2msg"
+
+    @classmethod
+    def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
+        """A topic that is offered with `qos`; its channel keeps that and the hash of the type, as rosbag2's do."""
+        profile = offered_qos(qos)
+        details = {"offered_qos_profiles": dump(profile), "topic_type_hash": type_hash}
+        return cls(topic, type_name, definition.encode(), details, profile, type_hash)
 
 
 def file_information(path: str, first: int, last: int, count: int) -> FileInformation:

@@ -177,11 +177,8 @@ def _scan(path: Path, incomplete: str) -> Session:
     topics = _topics(path, files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
-        told = Counter[str]()
-        for entry in metadata.topics_with_message_count:
-            told[entry.topic_metadata.name] += entry.message_count
-        compare_counts(path, FILE_NAME, told, "files", {topic.name: topic.count for topic in topics})
-        notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()}
+        compare_counts(path, FILE_NAME, metadata.counts, "files", {topic.name: topic.count for topic in topics})
+        notes |= metadata.notes
     filled = [file for file in files if any(file.counts.values())]
     return Session(
         path=path,

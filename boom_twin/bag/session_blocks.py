@@ -14,7 +14,7 @@ from ..errors import BagError
 from ..messages.message_block import MessageBlock, joined
 from ..messages.type_store import decode, jazzy
 from .chunk_reader import message_blocks
-from .integrity import RESCUE, STUMBLES, as_bag_error, compare_counts
+from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
 from .mcap_summary import McapFile
 
 
@@ -69,9 +69,9 @@ class SessionBlocks:
         source = self.sources[block.sources[row]]
         try:
             return decode(block.data(row), source.type) if source.type in jazzy().types else None
-        except STUMBLES as error:
+        except PARSE_ERRORS as error:
             place = f"{source.file}: topic {source.topic} at log time {block.log_times[row]} ns"
-            raise BagError(f"{place}: {error} {RESCUE}") from error
+            raise BagError(f"{place}: {error} {REMEDY}") from error
 
 
 def _wanted(file: McapFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
@@ -92,7 +92,7 @@ def _wanted(file: McapFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock
                 yield replace(block.chosen(rows), sources=sources[rows])
             if end < len(block):
                 raise KeyError(int(block.sources[end]))
-        compare_counts(file.path, "statistics", file.by_topic(file.counts), "read", file.by_topic(seen))
+        file.check_counts("statistics", file.counts, "read", seen)
 
 
 def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:

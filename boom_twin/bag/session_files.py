@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..messages.message_fields import FRAME, fill_header
 from ..messages.topic_table import load_topics
-from ..messages.type_store import RosbagsTypes
+from ..messages.type_store import new_message
 from ..types import SENSORS, Array, Sample, Stream
 from .writer import SessionWriter
 
@@ -64,10 +64,9 @@ def write_samples(
 ) -> None:
     """Write the bag of one session from `samples` in their order, with the topics of `streams`; else as `write_session`."""
     inputs = load_topics().inputs
-    messages = _Messages()
     with SessionWriter(directory, {stream.value: inputs[stream] for stream in streams}, description) as bag:
         for sample in samples:
-            bag.write(sample.stream.value, sample.stamp, messages.of(sample))
+            bag.write(sample.stream.value, sample.stamp, sensor_message(sample))
 
 
 def samples_of(
@@ -93,28 +92,19 @@ def samples_of(
     return sorted(samples, key=lambda sample: sample.stamp)
 
 
-class _Messages:
-    """Messages as the sensors of a rig would send them."""
-
-    def __init__(self) -> None:
-        self._types = RosbagsTypes()
-
-    def of(self, sample: Sample) -> Any:
-        kind = SENSORS[sample.stream]
-        msg = self._types.make(kind.message)
-        if kind.is_imu:
-            return self.imu(msg, sample.stamp, sample.values)
-        fill_header(msg.header, sample.stamp, FRAME)
-        msg.name, msg.position = list(kind.channels(len(sample.values))), self._types.doubles(sample.values)
-        return msg
-
-    def imu(self, msg: Any, stamp: int, values: Array) -> Any:
-        """Of the three quantities of an Imu only the acceleration is there, and of it only the plane."""
-        fill_header(msg.header, stamp, IMU_FRAME)
-        msg.linear_acceleration.x, msg.linear_acceleration.z = float(values[0]), float(values[1])
+def sensor_message(sample: Sample) -> Any:
+    """The message as a sensor of a rig would send it; of an Imu only the acceleration is there, and of it only the plane."""
+    kind = SENSORS[sample.stream]
+    msg = new_message(kind.message)
+    if kind.is_imu:
+        fill_header(msg.header, sample.stamp, IMU_FRAME)
+        msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         msg.orientation.w = 1.0
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
         return msg
+    fill_header(msg.header, sample.stamp, FRAME)
+    msg.name, msg.position = list(kind.channels(len(sample.values))), np.array(sample.values, dtype=float)
+    return msg
 
 
 def _check_shapes(stamps: NDArray[np.int64], strokes: Array, joints: Array, imu: Array | None) -> None:

@@ -54,7 +54,7 @@ PACKED = BYTES_PER_BYTE // 10
 """Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
 
 
-REST = 10.0
+METADATA_PAUSE = 10.0
 """Time from one writing of ``metadata.yaml`` at a split to the next, over what it takes: it grows with every file."""
 
 
@@ -98,7 +98,7 @@ class BagWriter:
         self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
-        self._pending = self._end = self._excess = 0  # of the open file: see `_weigh`
+        self._pending = self._end = self._excess = 0  # of the open file: see `_add_excess`
         claim_directory(directory)
         self._open()
 
@@ -135,7 +135,7 @@ class BagWriter:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
-        self._weigh(len(data))
+        self._add_excess(len(data))
 
     def write_block(self, keys: Integers, block: EncodedBlock) -> None:
         """Append many messages to the topics with these keys, numbered; the same bytes as by `write` of each of them."""
@@ -151,9 +151,9 @@ class BagWriter:
             sequences[own] = self.counts[key] + np.arange(1, len(own) + 1)
             self.counts[key] += len(own)
         self._extend_span(int(block.log_times.min()), int(block.log_times.max()), len(keys))
-        with self._told():
+        with self._as_bag_error():
             for size in self._writer.add_block(np.array(self._channels)[keys], sequences, block):
-                self._weigh(size)
+                self._add_excess(size)
 
     def _has_room(self, size: int) -> bool:
         """Whether the open file can be read with so many bytes more, however well they pack."""
@@ -164,7 +164,7 @@ class BagWriter:
         first, last, before = self._span or (start, end, 0)
         self._span = min(first, start), max(last, end), before + count
 
-    def _weigh(self, size: int) -> None:
+    def _add_excess(self, size: int) -> None:
         """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
         self._pending += size
         if (end := self._buffered.tell()) > self._end:
@@ -176,7 +176,7 @@ class BagWriter:
 
         They survive the loss of power once ``os.fsync`` has put that file on the disk.
         """
-        with self._told():
+        with self._as_bag_error():
             self._writer.flush()
         return self._raw.fileno()
 
@@ -202,16 +202,16 @@ class BagWriter:
 
     def split(self) -> None:
         """Complete the open file, tell of it in ``metadata.yaml`` unless that takes too long by now, and begin the next one."""
-        with self._told():
+        with self._as_bag_error():
             self._finish()
             if (began := time.monotonic()) >= self._due:
                 self._write_metadata()
-                self._due = began + (1.0 + REST) * (time.monotonic() - began)
+                self._due = began + (1.0 + METADATA_PAUSE) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
-        with self._told():
+        with self._as_bag_error():
             self._finish()
             self._write_metadata()
 
@@ -221,7 +221,7 @@ class BagWriter:
             self._raw.close()
 
     def _open(self) -> None:
-        with self._told():
+        with self._as_bag_error():
             self._raw = self.file.open("xb", buffering=0)
             self._buffered = BufferedWriter(self._raw)
             self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, CHUNK_SIZE, self._compression)
@@ -255,7 +255,7 @@ class BagWriter:
         self._files.append(file_information(file_name(len(self._files)), first, last, count))
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _as_bag_error(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
@@ -276,11 +276,8 @@ FILE_NAME = file_name(0)
 
 def recorded(topic: Topic) -> Recorded:
     """How a topic of ``topics.yaml`` stands in a bag."""
-    qos = bagmeta.offered_qos(topic.qos)
-    type_hash = jazzy().hash_rihs01(topic.type)
-    details = {"offered_qos_profiles": bagmeta.dump(qos), "topic_type_hash": type_hash}
     definition, _ = jazzy().generate_msgdef(topic.type, ros_version=2)
-    return Recorded(topic.absolute, topic.type, definition.encode(), details, qos, type_hash)
+    return Recorded.offered(topic.absolute, topic.type, definition, topic.qos, jazzy().hash_rihs01(topic.type))
 
 
 class SessionWriter:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
-from .main import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -33,7 +33,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--stiffness", action="store_true", help="besides: bending stiffness EI of sections")
     whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
-    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
+    add_params(parser)
     parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
@@ -59,7 +59,7 @@ def _learn(args: Namespace) -> int:
     check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
-    scene, settings = _scene(args), load_settings(Path(args.params) if args.params else None)
+    scene, settings = _scene(args), load_settings(args.params)
     with _bar() as progress:
         learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress)
     write_baseline(learnt, args.baseline, _credit(args), args.force)
@@ -100,7 +100,7 @@ def _calibrate(args: Namespace) -> int:
 
     refuse_overwriting(args.out, _sources(args), args.force)
     scene = _scene(args)
-    settings = load_settings(Path(args.params) if args.params else None)
+    settings = load_settings(args.params)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()

@@ -13,7 +13,7 @@ from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from . import reduce as need
-from .main import add_json, add_scene, open_scene, print_json
+from .main import add_json, add_scene, open_scene, print_result
 
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
@@ -40,10 +40,7 @@ def run(args: Namespace) -> int:
         if args.out is not None:
             need.write(args.scene, scene, found, args.need, args.out)
             lines.append(f"Written: {args.out}")
-    if args.json:
-        print_json(values)
-    else:
-        print("\n".join(lines))
+    print_result(args.json, values, lines)
     return 0
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .main import add_json, add_session_scene, open_session_scene, print_json
+from .main import add_json, add_params, add_session_scene, open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..report.compare import ComparedSession, ComparisonRow
@@ -21,8 +21,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     for name in ("A", "B"):
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
     add_session_scene(parser)
-    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
-    parser.add_argument("--baseline", metavar="FILE", help="as for replay")
+    add_params(parser)
+    parser.add_argument("--baseline", metavar="FILE", type=Path, help="as for replay")
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
     add_json(parser)
@@ -46,10 +46,7 @@ def run(args: Namespace) -> int:
             print(f"warning: {side.name}: its session is {side.incomplete}", file=sys.stderr)
     if one.scene != other.scene:
         print("warning: the two were replayed with different scenes; differences may be those of the scenes", file=sys.stderr)
-    if args.json:
-        print_json(flat(one, other, rows))
-    else:
-        print("\n".join(as_text(one, other, rows)))
+    print_result(args.json, flat(one, other, rows), as_text(one, other, rows))
     return 0
 
 
@@ -60,10 +57,10 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
 
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
-        scene, settings = open_session_scene(session, args.scene), load_settings(Path(args.params) if args.params else None)
+        scene, settings = open_session_scene(session, args.scene), load_settings(args.params)
         inner = building.inner(name)
         result = replay_into(inner, session, scene, settings, baseline=args.baseline)
-        worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, inner.folder)
+        worked_out(result, scene.scene, settings, args.baseline, inner.folder)
         return inner.folder
 
     return side_of(path, replayed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO
-from .main import add_json, add_session_scene, open_session_scene, print_json
+from .main import add_json, add_session_scene, open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally
@@ -28,10 +28,8 @@ def run(args: Namespace) -> int:
 
     info = inspect(Path(args.bag))
     scene = open_session_scene(args.bag, args.scene)
-    if args.json:
-        print_json(as_json(info, scene))
-    else:
-        print("\n".join(as_text(info, scene)))
+    told = as_json(info, scene)
+    print_result(args.json, told, as_text(info, scene, told))
     return 0
 
 
@@ -91,9 +89,8 @@ def _skew(tally: Tally, which: int) -> float | None:
     return tally.skews[which] * NANO / (tally.skewed if which == 2 else 1)
 
 
-def as_text(info: BagInfo, scene: SessionScene) -> list[str]:
-    """The same for people; a name or note with a line break makes no line of its own."""
-    told = as_json(info, scene)
+def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[str]:
+    """What `as_json` has `told`, for people; a name or note with a line break makes no line of its own."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
     files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
     distro = told["distro"] or "distribution not noted"

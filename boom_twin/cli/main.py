@@ -28,24 +28,24 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-# name: (module in boom_twin.cli with add_arguments(parser) and run(args) -> int, what it does)
-COMMANDS: dict[str, tuple[str, str]] = {
-    "check": ("check", "validate a scene and tell what its model consists of"),
-    "info": ("info", "what a recorded session holds and what it lacks"),
-    "monitor": ("monitor", "the live page, of the topics or of a recorded session"),
-    "play": ("play", "publish a recorded session over ROS 2"),
-    "record": ("record", "record the session topics from ROS 2"),
-    "recover": ("recover", "save what is whole of a damaged session"),
-    "scene": ("scene", "print the default scene file"),
-    "urdf": ("urdf", "print a scene as a URDF, for robot_state_publisher"),
-    "statics": ("statics", "static equilibrium, cylinder forces, natural frequencies"),
-    "simulate": ("simulate", "the boom's answer to a stroke history"),
-    "replay": ("replay", "a recorded session through the twin"),
-    "calibrate": ("calibrate", "parameters of a scene from healthy sessions"),
-    "compare": ("compare", "two recorded sessions side by side"),
-    "study": ("study", "reports on the methods: error against run time"),
-    "rig": ("rig", "make a synthetic session on the virtual rig (extra peers)"),
+COMMANDS: dict[str, str] = {
+    "check": "validate a scene and tell what its model consists of",
+    "info": "what a recorded session holds and what it lacks",
+    "monitor": "the live page, of the topics or of a recorded session",
+    "play": "publish a recorded session over ROS 2",
+    "record": "record the session topics from ROS 2",
+    "recover": "save what is whole of a damaged session",
+    "scene": "print the default scene file",
+    "urdf": "print a scene as a URDF, for robot_state_publisher",
+    "statics": "static equilibrium, cylinder forces, natural frequencies",
+    "simulate": "the boom's answer to a stroke history",
+    "replay": "a recorded session through the twin",
+    "calibrate": "parameters of a scene from healthy sessions",
+    "compare": "two recorded sessions side by side",
+    "study": "reports on the methods: error against run time",
+    "rig": "make a synthetic session on the virtual rig (extra peers)",
 }
+"""What each command does; it is the module of that name in `boom_twin.cli`, with what `Command` has."""
 
 # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
 # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
@@ -113,7 +113,7 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def _command(name: str) -> Command:
-    return cast(Command, import_module(f".{COMMANDS[name][0]}", __package__))
+    return cast(Command, import_module(f".{name}", __package__))
 
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:
@@ -121,15 +121,11 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
     parser = ArgumentParser(prog="boom_twin", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, (_, purpose) in COMMANDS.items():
+    for name, purpose in COMMANDS.items():
         own = commands.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
         if name in arguments:
             _command(name).add_arguments(own)
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())
 
 
 def add_scene(parser: ArgumentParser) -> None:
@@ -141,6 +137,11 @@ def add_session_scene(parser: ArgumentParser) -> None:
     """``--scene`` of a command that reads a session; see `open_session_scene`."""
     told = "scene file (YAML); without it, the one that the session was made with, else the default scene"
     parser.add_argument("--scene", metavar="SCENE", help=told)
+
+
+def add_params(parser: ArgumentParser) -> None:
+    """``--params``, for `boom_twin.config.settings.load_settings`."""
+    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file; by default the package's twin.yaml")
 
 
 def add_json(parser: ArgumentParser) -> None:
@@ -179,6 +180,14 @@ def warn_incomplete(session: Session) -> None:
         print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
 
 
+def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:
+    """Print what came out: `values` as JSON, or `lines` for people."""
+    if is_json:
+        print_json(values)
+    else:
+        print("\n".join(lines))
+
+
 def print_json(values: Mapping[str, Any]) -> None:
     """Print one flat JSON object; a number that is not finite becomes null."""
     print(json.dumps({key: _plain(value) for key, value in values.items()}, allow_nan=False))
@@ -194,3 +203,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and value - value != 0.0:
         return None
     return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -60,7 +60,7 @@ def run(args: Namespace) -> int:
     from ..monitor.actions import RecorderProcess, ViewerActions
     from ..monitor.log_limit import write_log
 
-    _give_way()
+    _lower_priority()
     write_log()
     recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
@@ -79,7 +79,7 @@ def _passed_on(args: Namespace) -> list[str]:
     return [*given, *(["--ros-args", *args.ros_args] if args.ros_args else [])]
 
 
-def _give_way() -> None:
+def _lower_priority() -> None:
     """Let the node run first, and do not interrupt it in the midst of a step."""
     os.nice(NICE)
     if hasattr(os, "SCHED_BATCH"):  # Linux: does not preempt others when it wakes up

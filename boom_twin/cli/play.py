@@ -57,9 +57,9 @@ def run(args: Namespace) -> int:
     with ros([]):
         player = Player(session, args.topics, args.clock)
         length = player.length(args.start, args.duration)
-        lonely = player.wait(args.wait)
-        if lonely and args.wait > 0.0:
-            _complain(lonely, len(player.topics), args.wait)
+        unmatched = player.wait(args.wait)
+        if unmatched and args.wait > 0.0:
+            _check_listeners(unmatched, len(player.topics), args.wait)
         try:
             _play(player, args, length)
         except KeyboardInterrupt:
@@ -94,13 +94,13 @@ def _play(player: Player, args: Namespace, length: float) -> None:
                 return
 
 
-def _complain(lonely: list[str], topics: int, wait: float) -> None:
+def _check_listeners(unmatched: list[str], topics: int, wait: float) -> None:
     """Refuse to play to nobody; warn of single topics that nobody listens to."""
-    if len(lonely) == topics:
+    if len(unmatched) == topics:
         raise BoomTwinError(
             f"nobody listened within {wait:g} s. Start twin_node, check ROS_DOMAIN_ID, or play anyway with --wait 0."
         )
-    print(f"warning: nobody listens to {', '.join(lonely)}", file=sys.stderr)
+    print(f"warning: nobody listens to {', '.join(unmatched)}", file=sys.stderr)
 
 
 def positive(text: str) -> float:

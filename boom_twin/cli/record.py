@@ -25,7 +25,7 @@ from .play import positive
 
 if TYPE_CHECKING:
     from ..ros.bag.recorder import Count
-    from ..ros.bag.subscriptions import Wanted
+    from ..ros.bag.subscriptions import RequestedTopic
 
 
 SMALLEST = 2**20
@@ -61,7 +61,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
     require_rclpy()
-    from ..bag.async_writer import Split, Storage
+    from ..bag.async_writer import FileSplit, Storage
     from ..bag.session_sheet import incompleteness
     from ..bag.writer import BagWriter
     from ..ros.bag.recorder import record, recorder_node
@@ -85,18 +85,18 @@ def run(args: Namespace) -> int:
         bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
         sheet.write(args.out)
 
-        def meet(told: Mapping[str, Any]) -> None:
+        def on_twin(told: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _met(sheet, told)
+            more = _with_twin_values(sheet, told)
             try:
                 more.write(args.out)
                 sheet = more
             except BagError as error:
                 _say(f"warning: what the running twin told is not kept: {error}")
 
-        storage = Storage(bag, Split(args.split_size, args.split_duration), _say)
+        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), _say)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, meet)
+        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, on_twin)
     _tell(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if sheet.scene is None:
@@ -130,7 +130,7 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _met(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
+def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
     """With what the running twin tells of itself; what was given instead stays, and the difference is told."""
     from ..ros.bag.recorder import TEXTS
 
@@ -157,16 +157,16 @@ def _tell(counts: list[Count]) -> None:
         _say(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
 
 
-def _wanted(args: Namespace, known: Topics) -> list[Wanted]:
+def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
     """The topics of the command line, or the chosen ones of the mapping."""
-    from ..ros.bag.subscriptions import Wanted, wanted_of
+    from ..ros.bag.subscriptions import RequestedTopic, requested_topics
 
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
     outputs = {topic.absolute: topic for topic in [*known.outputs.values(), known.events]}
     if args.topics:
-        return wanted_of(args.topics, inputs | outputs)
+        return requested_topics(args.topics, inputs | outputs)
     chosen = {**({} if args.only == "outputs" else inputs), **({} if args.only == "inputs" else outputs)}
-    return [Wanted(name, topic.type, topic) for name, topic in chosen.items()]
+    return [RequestedTopic(name, topic.type, topic) for name, topic in chosen.items()]
 
 
 def long_enough(text: str) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
-from .main import add_json, print_json
+from .main import add_json, print_result
 
 if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
@@ -40,10 +40,8 @@ def run(args: Namespace) -> int:
         print(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}", file=sys.stderr)
     if outcome.fault_count > SHOWN:
         print(f"and {outcome.fault_count - SHOWN} faults more", file=sys.stderr)
-    if args.json:
-        print_json(as_json(outcome, args.out))
-    else:
-        print("\n".join(as_text(outcome, args.out)))
+    told = as_json(outcome, args.out)
+    print_result(args.json, told, as_text(outcome, told))
     return 0
 
 
@@ -63,9 +61,8 @@ def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
     }
 
 
-def as_text(outcome: Recovery, out: str) -> list[str]:
-    """The same for people."""
-    told = as_json(outcome, out)
+def as_text(outcome: Recovery, told: dict[str, Any]) -> list[str]:
+    """What `as_json` has `told`, for people."""
     wide = max(len(topic) for topic in told["topics"])
     lines = [f"{'topic':{wide}}  {'saved':>9}  {'no checksum':>11}  {'lost':>9}"]
     for row, topic in enumerate(told["topics"]):
@@ -79,4 +76,4 @@ def as_text(outcome: Recovery, out: str) -> list[str]:
         lines.append("'no checksum': saved as they stood; nothing vouches for their values")
     if outcome.lost is None:
         lines.append("'unknown': no sound count is left in the source that says how many there were")
-    return [printable(line, keep="") for line in [*lines, out]]
+    return [printable(line, keep="") for line in [*lines, told["path"]]]

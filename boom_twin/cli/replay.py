@@ -8,7 +8,7 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .main import add_json, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -23,15 +23,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session_scene(parser)
     place = "folder for summary.json, bag/ and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
-    parser.add_argument("--params", metavar="FILE", help="ROS parameter file; by default the package's twin.yaml")
-    parser.add_argument(
-        "--mapping", metavar="FILE", help="topics and sensors; by default as the session was recorded, else topics.yaml"
-    )
+    add_params(parser)
+    told = "topics and sensors; by default as the session was recorded, else topics.yaml"
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help=told)
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
-    parser.add_argument("--baseline", metavar="FILE", help=usual)
+    parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
@@ -50,7 +49,7 @@ def run(args: Namespace) -> int:
 
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
-    settings = load_settings(Path(args.params) if args.params else None)
+    settings = load_settings(args.params)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
@@ -75,7 +74,7 @@ def _write(
     from ..report.compare import worked_out
     from ..report.page import Subject, write_report
 
-    history, still, path = worked_out(result, scene.scene, settings, Path(args.baseline) if args.baseline else None, out)
+    history, still, path = worked_out(result, scene.scene, settings, args.baseline, out)
     files = [path]
     if not args.no_pictures:
         files += draw(result, history, out)

@@ -7,7 +7,7 @@ import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 
-from .main import add_json, add_scene, open_scene, print_json
+from .main import add_json, add_scene, open_scene, print_result
 
 if TYPE_CHECKING:
     from ..analysis.equilibrium import Equilibrium
@@ -38,10 +38,7 @@ def run(args: Namespace) -> int:
     found = statics(scene, strokes=args.strokes, posture=args.posture)
     for doubt in found.doubts:
         print(f"boom_twin statics: warning: {doubt}.", file=sys.stderr)
-    if args.json:
-        print_json(as_json(found))
-    else:
-        print("\n".join(as_text(found)))
+    print_result(args.json, as_json(found), as_text(found))
     return 0
 
 

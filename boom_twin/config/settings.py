@@ -72,15 +72,10 @@ class Thresholds(BaseModel):
     disk_error: Positive = Field(default=120.0, description="the disk is full in less, at the present pace: error, s")
 
 
-def thresholds_from(values: dict[str, Any], source: str) -> Thresholds:
-    """Thresholds from names and values; UsageError names every value that is out of bounds."""
-    return checked(Thresholds, values, source)
-
-
 def load_thresholds(path: Path) -> Thresholds:
     """Thresholds from a ROS parameter file; other parameters in it are passed over."""
     values = read_parameters(path)
-    return thresholds_from({name: value for name, value in values.items() if name in Thresholds.model_fields}, str(path))
+    return checked(Thresholds, {name: value for name, value in values.items() if name in Thresholds.model_fields}, str(path))
 
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
@@ -147,7 +142,7 @@ class Settings(BaseModel):
         if fixed := sorted(set(live) - set(self.live_names())):
             known = ", ".join(self.live_names())
             raise UsageError(f"{', '.join(fixed)}: fixed while the twin runs. What can change: {known}.")
-        return settings_from({**self.model_dump(), **live}, "change of settings")
+        return checked(Settings, {**self.model_dump(), **live}, "change of settings")
 
     def noise(self, kind: SensorKind) -> tuple[float, float]:
         """Standard deviation of the noise and resolution of the sensors of a stream, in their SI unit."""
@@ -167,11 +162,6 @@ class Settings(BaseModel):
     def angle_variance(self) -> float:
         """Noise and rounding of a joint angle, rad^2."""
         return self.angle_sigma**2 + self.angle_resolution**2 / 12.0
-
-
-def settings_from(values: dict[str, Any], source: str) -> Settings:
-    """Settings from names and values; UsageError names every value that is out of bounds."""
-    return checked(Settings, values, source)
 
 
 def load_settings(path: Path | None = None) -> Settings:
@@ -196,4 +186,5 @@ def load_settings(path: Path | None = None) -> Settings:
     """
     source = DEFAULT_FILE if path is None else Path(path)
     others = {*NODE_ONLY, *Thresholds.model_fields}
-    return settings_from({name: value for name, value in read_parameters(source).items() if name not in others}, str(source))
+    values = {name: value for name, value in read_parameters(source).items() if name not in others}
+    return checked(Settings, values, str(source))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from math import isfinite, nan
 
@@ -58,15 +58,6 @@ class Bounds:
         return Level.OK
 
 
-@dataclass(frozen=True, slots=True)
-class Persistence:
-    """How long (s) a worse and a better level must last before it counts, and the share of a limit where it is left."""
-
-    raise_after: float
-    clear_after: float
-    release: float
-
-
 class Hysteresis:
     """The level of one quantity; a NaN is no reason to change it to a worse one."""
 
@@ -74,15 +65,31 @@ class Hysteresis:
         self.level = Level.OK
         self._agreed: float | None = None
 
-    def update(self, value: float, bounds: Bounds, patience: Persistence, now: float) -> Level:
-        """The level at the time `now` (s, of a clock that only goes forward)."""
-        seen = bounds.level(value, self.level, patience.release)
+    def update(self, value: float, bounds: Bounds, thresholds: Thresholds, now: float, at_once: bool = False) -> Level:
+        """The level at the time `now` (s, of a clock that only goes forward); `at_once`: a worse level need not last."""
+        seen = bounds.level(value, self.level, thresholds.release)
         if seen == self.level or self._agreed is None:
             self._agreed = now
-        wait = patience.raise_after if seen > self.level else patience.clear_after
-        if now - self._agreed >= wait:
+        raise_after = 0.0 if at_once else thresholds.raise_after
+        if now - self._agreed >= (raise_after if seen > self.level else thresholds.clear_after):
             self.level, self._agreed = seen, now
         return self.level
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """When and by what components are judged.
+
+    Attributes
+    ----------
+    thresholds : Thresholds
+    now, clock : float
+        Time (s) of a clock that only goes forward, and of the one that people know.
+    """
+
+    thresholds: Thresholds
+    now: float
+    clock: float
 
 
 class ComponentJudge:
@@ -96,7 +103,7 @@ class ComponentJudge:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._gates: defaultdict[str, Hysteresis] = defaultdict(Hysteresis)
+        self._hysteresis: defaultdict[str, Hysteresis] = defaultdict(Hysteresis)
         self._words: dict[str, str] = {}
         self._level: Level | None = None
         self._since = 0.0
@@ -106,10 +113,9 @@ class ComponentJudge:
         """As it was told last; None before."""
         return self._level
 
-    def begin(self, now: float, thresholds: Thresholds) -> None:
-        """A new look, at the time `now` (s, of a clock that only goes forward)."""
-        self._now = now
-        self._patience = Persistence(thresholds.raise_after, thresholds.clear_after, thresholds.release)
+    def begin(self, at: Evaluation) -> None:
+        """A new evaluation."""
+        self._at = at
         self._faults: list[tuple[Level, str]] = []
         self._values: dict[str, str | int | float] = {}
 
@@ -136,8 +142,7 @@ class ComponentJudge:
                 self._values[f"{key}_{name}"] = limit
         if bounds.level(value, Level.OK, 1.0) != Level.OK:
             self._words[key] = words
-        patience = replace(self._patience, raise_after=0.0) if at_once else self._patience
-        level = self._gates[key].update(value, bounds, patience, self._now)
+        level = self._hysteresis[key].update(value, bounds, self._at.thresholds, self._at.now, at_once)
         self.fault(level, self._words.get(key, words))
 
     def check_age(self, age: float, limit: float, words: str) -> None:
@@ -151,11 +156,11 @@ class ComponentJudge:
         if level != Level.OK:
             self._faults.append((level, words))
 
-    def finish(self, clock: float, message: str) -> Status:
-        """The worst of it; `message` if all is well. `clock` (s) is the time that people know, for ``since_s``."""
+    def finish(self, message: str) -> Status:
+        """The worst of it; `message` if all is well."""
         faults = sorted(self._faults, key=lambda fault: -fault[0])
         level = faults[0][0] if faults else Level.OK
         if level != self._level:
-            self._level, self._since = level, clock
+            self._level, self._since = level, self._at.clock
         told = "; ".join(words for _, words in faults) or message
         return Status(self.name, level, told, {**self._values, "since_s": f"{self._since:.3f}"})

@@ -12,7 +12,7 @@ import numpy as np
 from ..config.settings import Thresholds
 from ..health.alarms import Alarms, values_of
 from ..types import Alarm, Array, Health, Report
-from .levels import Bounds, ComponentJudge, Level, Status
+from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 
 HOLD = 1.0
 """Seconds for which a failure is shown."""
@@ -63,9 +63,7 @@ class ModelWatch:
     def _fail(self, reason: str) -> None:
         self._failure, self._new = reason, True
 
-    def status(
-        self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, thresholds: Thresholds, now: float, clock: float
-    ) -> Status:
+    def status(self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, at: Evaluation) -> Status:
         """State of the model.
 
         Parameters
@@ -74,27 +72,25 @@ class ModelWatch:
             Told too.
         is_active, is_fed : bool
             Whether the twin listens, and strokes come.
-        thresholds : Thresholds
-        now, clock : float
-            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
+        at : Evaluation
         """
         judge = self._judge
-        judge.begin(now, thresholds)
+        judge.begin(at)
         for key, value in values.items():
             judge.note(key, value)
-        self._check_load(thresholds, now)
+        self._check_load(at.thresholds, at.now)
         for key in ("predictions", "failures"):
             judge.note(key, getattr(self, key))
         judge.note("unhandled messages", self.broken)
         if self._new:
-            self._failed_at, self._new = now, False
+            self._failed_at, self._new = at.now, False
         if not is_active:
             judge.fault(Level.WARN, "not active")
-        elif now - self._failed_at <= HOLD:
+        elif at.now - self._failed_at <= HOLD:
             judge.fault(Level.ERROR, self._failure)
         elif not is_fed or not self.predictions:
             judge.fault(Level.WARN, "waiting for strokes")
-        return judge.finish(clock, "following the strokes")
+        return judge.finish("following the strokes")
 
     def _check_load(self, thresholds: Thresholds, now: float) -> None:
         """Time of a step against the time there is for it."""
@@ -140,12 +136,13 @@ class ResidualJudge:
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
-    def status(self, alarm: tuple[Level, str] | None, thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the channel, with its alarm if there is one; times as for `SensorJudge`."""
-        while self._window and self._window[0].time <= now - thresholds.residual_window:
+    def status(self, alarm: tuple[Level, str] | None, at: Evaluation) -> Status:
+        """State of the channel, with its alarm if there is one."""
+        thresholds = at.thresholds
+        while self._window and self._window[0].time <= at.now - thresholds.residual_window:
             self._window.popleft()
         judge, count = self._judge, sum(sums.number for sums in self._window)
-        judge.begin(now, thresholds)
+        judge.begin(at)
         rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
         told = f"{rms:.2f} times as large as noise explains, for {thresholds.residual_window:g} s"
         if alarm is not None:
@@ -157,7 +154,7 @@ class ResidualJudge:
         judge.note("window_s", thresholds.residual_window)
         if not count:
             judge.fault(Level.STALE, f"none for {thresholds.residual_window:g} s")
-        return judge.finish(clock, "as large as noise explains")
+        return judge.finish("as large as noise explains")
 
 
 class HealthWatch:
@@ -190,10 +187,10 @@ class HealthWatch:
         """The alarm that lasts in a channel."""
         return next((alarm for alarm in self._alarms.lasting if alarm.channel == channel), None)
 
-    def status(self, thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the rig; times as for `SensorJudge`."""
+    def status(self, at: Evaluation) -> Status:
+        """State of the rig."""
         judge, self.has_news = self._judge, False
-        judge.begin(now, thresholds)
+        judge.begin(at)
         alarms = self._alarms.all
         judge.note("alarms", len(self._alarms.lasting))
         judge.note("not_acknowledged", len(alarms) - len(self._alarms.lasting))
@@ -201,7 +198,7 @@ class HealthWatch:
             judge.fault(level_of(alarm), told_of(alarm))
             for key, value in {"channel": alarm.channel, **values_of(alarm)}.items():
                 judge.note(f"{number} {key}", value)
-        return judge.finish(clock, "no alarm")
+        return judge.finish("no alarm")
 
 
 def level_of(alarm: Alarm) -> Level:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..config.settings import Thresholds
-from .levels import Bounds, ComponentJudge, Level, Status
+from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 
 ENDED = "ended"
 """Key of a status that says of itself, by 1, that it is the last one: silence after it is no news."""
@@ -51,15 +50,7 @@ class RecordingJudge:
     def __init__(self) -> None:
         self._judge = ComponentJudge("recording")
 
-    def status(
-        self,
-        topics: Mapping[str, TopicState],
-        disk: DiskState,
-        end: str | None,
-        thresholds: Thresholds,
-        now: float,
-        clock: float,
-    ) -> Status:
+    def status(self, topics: Mapping[str, TopicState], disk: DiskState, end: str | None, at: Evaluation) -> Status:
         """State of the recording.
 
         Parameters
@@ -68,12 +59,11 @@ class RecordingJudge:
         disk : DiskState
         end : str or None
             Why it ended too early; empty if it ended in order, None while it runs.
-        thresholds : Thresholds
-        now, clock : float
-            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
+        at : Evaluation
         """
-        judge, missed = self._judge, sum(topic.missed or 0 for topic in topics.values())
-        judge.begin(now, thresholds)
+        judge, thresholds = self._judge, at.thresholds
+        missed = sum(topic.missed or 0 for topic in topics.values())
+        judge.begin(at)
         if end:
             judge.fault(Level.ERROR, end)
         judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
@@ -89,4 +79,4 @@ class RecordingJudge:
         for name, topic in topics.items():
             judge.note(f"received {name}", topic.received)
             judge.note(f"never_arrived {name}", "nan" if topic.missed is None else topic.missed)
-        return judge.finish(clock, "running" if end is None else "ended")
+        return judge.finish("running" if end is None else "ended")

@@ -10,12 +10,12 @@ from ..config.settings import Settings, Thresholds
 from ..health.sensor_monitor import readings_of_frozen, sensor_ranges
 from ..scene.schema import Scene
 from ..types import SENSORS, Mount, Stream
-from .levels import Bounds, ComponentJudge, Status
+from .levels import Bounds, ComponentJudge, Evaluation, Status
 from .stream_stats import ChannelStats
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class SensorSpec:
     """What is known of a sensor: name of its status, range, noise and resolution, in its own unit.
 
     ``unit`` is how a key ends that holds a value of it: ``rad``, ``m``, ``m_s2``.
@@ -33,10 +33,10 @@ class Sensor:
 class SensorJudge:
     """Judges one sensor by its figures."""
 
-    def __init__(self, sensor: Sensor) -> None:
+    def __init__(self, sensor: SensorSpec) -> None:
         self._sensor, self._judge = sensor, ComponentJudge(f"sensor {sensor.name}")
 
-    def status(self, figures: ChannelStats, age: float, thresholds: Thresholds, now: float, clock: float) -> Status:
+    def status(self, figures: ChannelStats, age: float, at: Evaluation) -> Status:
         """State of the sensor.
 
         Parameters
@@ -44,15 +44,12 @@ class SensorJudge:
         figures : ChannelStats
         age : float
             Since its last reading, s.
-        thresholds : Thresholds
-            The thresholds.
-        now, clock : float
-            Time (s) of a clock that only goes forward, and of the one that people know.
+        at : Evaluation
         """
-        judge, sensor = self._judge, self._sensor
-        judge.begin(now, thresholds)
+        judge, sensor, thresholds = self._judge, self._sensor, at.thresholds
+        judge.begin(at)
         if not figures.stamp and not sensor.required:
-            return judge.finish(clock, "not there; optional")
+            return judge.finish("not there; optional")
         judge.note(f"value_{sensor.unit}", figures.value)
         judge.note("rate_Hz", figures.rate)
         told = f"no reading for {age:.1f} s" if figures.stamp else "no reading yet"
@@ -63,7 +60,7 @@ class SensorJudge:
         judge.check("missing_share", figures.missing, share, f"{figures.missing:.1%} of the messages without a value")
         self._check_range(figures, share)
         self._check_frozen(figures, thresholds)
-        return judge.finish(clock, "measuring" if figures.stamp else "waiting for a reading")
+        return judge.finish("measuring" if figures.stamp else "waiting for a reading")
 
     def _check_range(self, figures: ChannelStats, share: Bounds) -> None:
         if self._sensor.high < inf:
@@ -88,7 +85,7 @@ SLACK = 5.0
 
 def sensors_of(
     scene: Scene, settings: Settings, required: Mapping[Stream, bool], mounts: Sequence[Mount | None]
-) -> dict[Stream, list[Sensor]]:
+) -> dict[Stream, list[SensorSpec]]:
     """The sensors of every stream, in the order of a sample's values.
 
     Parameters
@@ -109,5 +106,5 @@ def sensors_of(
         unit, over = kind.unit_suffix, SLACK * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         about = sigma, resolution, required[stream]
-        found[stream] = [Sensor(name, unit, low - over, high + over, *about) for name, low, high in bounds]
+        found[stream] = [SensorSpec(name, unit, low - over, high + over, *about) for name, low, high in bounds]
     return found

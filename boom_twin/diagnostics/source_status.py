@@ -8,7 +8,7 @@ from math import nan
 
 from ..config.settings import Thresholds
 from ..types import Stream
-from .levels import Bounds, ComponentJudge, Status
+from .levels import Bounds, ComponentJudge, Evaluation, Status
 from .topic_status import Peers
 
 FOLLOWED = "Followed is the one whose stamps go on, and which of them that is ROS does not tell. End all but one"
@@ -20,14 +20,7 @@ class PublishersJudge:
     def __init__(self) -> None:
         self._judge = ComponentJudge("publishers")
 
-    def status(
-        self,
-        publishers: Mapping[Stream, Peers],
-        followed: Mapping[Stream, str],
-        thresholds: Thresholds,
-        now: float,
-        clock: float,
-    ) -> Status:
+    def status(self, publishers: Mapping[Stream, Peers], followed: Mapping[Stream, str], at: Evaluation) -> Status:
         """State of the sources.
 
         Parameters
@@ -36,12 +29,10 @@ class PublishersJudge:
             Streams that come by one topic may have a publisher each.
         followed : dict of Stream to str
             Stamp of the newest sample of each, s.
-        thresholds : Thresholds
-        now, clock : float
-            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
+        at : Evaluation
         """
         judge = self._judge
-        judge.begin(now, thresholds)
+        judge.begin(at)
         streams: dict[str, list[Stream]] = {}
         for stream, peers in publishers.items():
             streams.setdefault(peers.address, []).append(stream)
@@ -53,7 +44,7 @@ class PublishersJudge:
             surplus = Bounds(error=0.0)
             judge.check(f"{address} surplus", max(0, len(names) - len(sharing)), surplus, told, at_once=True)
             judge.note(f"{address} newest_stamp_s", followed[sharing[0]])
-        return judge.finish(clock, "one source for every topic")
+        return judge.finish("one source for every topic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +82,14 @@ class ReceptionJudge:
         self._judge = ComponentJudge("reception")
         self._before: dict[str, Reception] = {}
 
-    def status(self, topics: Mapping[str, Reception], thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the reception; `topics` by name, times as for `boom_twin.diagnostics.sensor_status.SensorJudge`."""
+    def status(self, topics: Mapping[str, Reception], at: Evaluation) -> Status:
+        """State of the reception; `topics` by name."""
         judge = self._judge
-        judge.begin(now, thresholds)
+        judge.begin(at)
         for name, each in topics.items():
-            self._check(name, each, thresholds)
+            self._check(name, each, at.thresholds)
         self._before = dict(topics)
-        return judge.finish(clock, "all that arrives is read at once")
+        return judge.finish("all that arrives is read at once")
 
     def _check(self, name: str, each: Reception, thresholds: Thresholds) -> None:
         before = self._before.get(name, Reception())

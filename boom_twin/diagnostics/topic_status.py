@@ -6,9 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..config.settings import Thresholds
 from ..types import NANO, SECOND
-from .levels import Bounds, ComponentJudge, Level, Status
+from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 from .stream_stats import StreamWatch
 
 
@@ -54,9 +53,7 @@ class TopicJudge:
         stream: StreamWatch,
         publishers: Peers,
         offset: float,
-        thresholds: Thresholds,
-        now: float,
-        clock: float,
+        at: Evaluation,
         other_boom: str = "",
     ) -> Status:
         """State of the topic.
@@ -68,16 +65,14 @@ class TopicJudge:
         publishers : Peers
         offset : float
             By how much the stamps are behind those of the strokes, s; NaN where it is not known.
-        thresholds : Thresholds
-        now, clock : float
-            As for `boom_twin.diagnostics.sensor_status.SensorJudge`.
+        at : Evaluation
         other_boom : str
             That its messages are of another boom, in words; empty if they are not.
         """
-        judge, age = self._judge, stream.age(now)
-        judge.begin(now, thresholds)
+        judge, age = self._judge, stream.age(at.now)
+        judge.begin(at)
         judge.note("topic", publishers.address)
-        self._count(stream, now)
+        self._count(stream, at.now)
         if other_boom:
             judge.fault(Level.ERROR, other_boom)
         judge.note("publishers", len(publishers.names))
@@ -85,15 +80,15 @@ class TopicJudge:
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
         if stream.newest is None and not self._required:
-            return judge.finish(clock, "not there; optional")
+            return judge.finish("not there; optional")
         told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
-        judge.check_age(age, thresholds.stale_after, told)
+        judge.check_age(age, at.thresholds.stale_after, told)
         if stream.newest is not None:
             judge.note("newest_stamp_s", seconds(stream.newest))
-            judge.note("clock_minus_stamp_s", clock - stream.newest * NANO)
+            judge.note("clock_minus_stamp_s", at.clock - stream.newest * NANO)
         told = f"stamped {offset:+.3f} s behind the strokes: synchronise the sensors' clocks"
-        judge.check("clock_offset_s", abs(offset), Bounds(thresholds.clock_offset), told)
-        return judge.finish(clock, "listened to" if stream.newest is not None else "waiting for a message")
+        judge.check("clock_offset_s", abs(offset), Bounds(at.thresholds.clock_offset), told)
+        return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
 
     def _count(self, stream: StreamWatch, now: float) -> None:
         """Messages, and how many a second since the last look."""
@@ -114,12 +109,12 @@ class OutputsJudge:
     def __init__(self) -> None:
         self._judge = ComponentJudge("outputs")
 
-    def status(self, peers: Iterable[Peers], thresholds: Thresholds, now: float, clock: float) -> Status:
-        """State of the outputs; `peers` are their subscribers, times as for `SensorJudge`."""
+    def status(self, peers: Iterable[Peers], at: Evaluation) -> Status:
+        """State of the outputs; `peers` are their subscribers."""
         judge = self._judge
-        judge.begin(now, thresholds)
+        judge.begin(at)
         for each in peers:
             judge.note(f"subscribers {each.address}", len(each.names))
             if each.incompatible:
                 judge.fault(Level.WARN, f"{each.address}: incompatible QoS: {'; '.join(each.incompatible)}")
-        return judge.finish(clock, "offered")
+        return judge.finish("offered")

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..config.settings import Thresholds
 from ..types import Report, Residuals, Sample, Stream
-from .levels import Level, Status
+from .levels import Evaluation, Level, Status
 from .model_status import HealthWatch, ModelWatch, ResidualJudge, level_of
-from .sensor_status import Sensor, SensorJudge
+from .sensor_status import SensorJudge, SensorSpec
 from .source_status import PublishersJudge, Reception, ReceptionJudge
 from .stream_stats import StreamWatch
 from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
@@ -22,7 +22,7 @@ class TwinWatch:
 
     Parameters
     ----------
-    sensors : dict of Stream to sequence of Sensor
+    sensors : dict of Stream to sequence of SensorSpec
         In the order of a sample's values; empty before the node is configured.
     names : dict of Stream to str
         Names of the input topics.
@@ -34,7 +34,7 @@ class TwinWatch:
 
     def __init__(
         self,
-        sensors: Mapping[Stream, Sequence[Sensor]],
+        sensors: Mapping[Stream, Sequence[SensorSpec]],
         names: Mapping[Stream, str],
         thresholds: Thresholds,
         monotonic: Callable[[], float] = time.monotonic,
@@ -123,47 +123,47 @@ class TwinWatch:
         other_booms : dict of Stream to str, optional
             Of inputs whose messages are of another boom: that in words.
         """
-        now, others = self._monotonic(), other_booms or {}
-        is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], now)
-        found = [self._model.status(counts, is_active, is_fed, self.thresholds, now, clock)]
+        at, others = Evaluation(self.thresholds, self._monotonic(), clock), other_booms or {}
+        is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
+        found = [self._model.status(counts, is_active, is_fed, at)]
         if not is_active:
             return found
-        sensors = [status for stream in self._streams for status in self._look_at(stream, now, clock)]
-        found += [self._topic(stream, publishers[stream], now, clock, others.get(stream, "")) for stream in self._streams]
+        sensors = [status for stream in self._streams for status in self._look_at(stream, at)]
+        found += [self._topic(stream, publishers[stream], at, others.get(stream, "")) for stream in self._streams]
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
-            found.insert(0, self._publishers.status(publishers, followed, self.thresholds, now, clock))
-            found.append(self._reception.status(reception, self.thresholds, now, clock))
-        found.append(self._outputs.status(subscribers, self.thresholds, now, clock))
+            found.insert(0, self._publishers.status(publishers, followed, at))
+            found.append(self._reception.status(reception, at))
+        found.append(self._outputs.status(subscribers, at))
         if self.health is not None:
-            found.append(self.health.status(self.thresholds, now, clock))
-        return found + sensors + self._look_at_residuals(now, clock)
+            found.append(self.health.status(at))
+        return found + sensors + self._look_at_residuals(at)
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
-    def _topic(self, stream: Stream, peers: Peers, now: float, clock: float, other_boom: str) -> Status:
+    def _topic(self, stream: Stream, peers: Peers, at: Evaluation, other_boom: str) -> Status:
         watch = self._streams[stream]
         offset = watch.lag - self._streams[Stream.STROKES].lag
-        return self._topics[stream].status(watch, peers, offset, self.thresholds, now, clock, other_boom)
+        return self._topics[stream].status(watch, peers, offset, at, other_boom)
 
-    def _look_at(self, stream: Stream, now: float, clock: float) -> list[Status]:
+    def _look_at(self, stream: Stream, at: Evaluation) -> list[Status]:
         """The sensors of one stream."""
         watch = self._streams[stream]
         return [
-            judge.status(figures, watch.age_of(figures, now), self.thresholds, now, clock)
+            judge.status(figures, watch.age_of(figures, at.now), at)
             for judge, figures in zip(self._sensors[stream], watch.look(self.thresholds.gap_warn), strict=True)
         ]
 
-    def _look_at_residuals(self, now: float, clock: float) -> list[Status]:
+    def _look_at_residuals(self, at: Evaluation) -> list[Status]:
         """Every channel that ever had a residual."""
         taken, self._residuals = self._residuals, []
         for names in dict.fromkeys(each.names for each in taken):
             those = [each for each in taken if each.names == names]
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
-                self._judges.setdefault(name, ResidualJudge(name)).take(column, now)
-        return [judge.status(self._alarm_of(name), self.thresholds, now, clock) for name, judge in self._judges.items()]
+                self._judges.setdefault(name, ResidualJudge(name)).take(column, at.now)
+        return [judge.status(self._alarm_of(name), at) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
         """Level and words of the alarm that lasts in a channel."""

@@ -21,27 +21,27 @@ STAMP = 1_365_991_213
 
 _TIME = struct.Struct("<iI")
 _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
-"""Bits of the first hole of either width, about 1e300 and 1e38; the next holes count up. No constant comes near them."""
+"""Bits of the first placeholder of either width, about 1e300 and 1e38; the next ones count up. No constant comes near them."""
 
 
 class NumberFields:
-    """Numbers that stand for those to be filled in, each of them once."""
+    """Placeholders of the numbers that are filled in, each of them once."""
 
     def __init__(self) -> None:
         self.doubles = self.singles = 0
 
     def double(self) -> float:
-        """The next hole of a ``float64``."""
+        """The next placeholder of a ``float64``."""
         self.doubles += 1
         return float(np.uint64(_DOUBLE + self.doubles - 1).view(np.float64))
 
     def single(self) -> float:
-        """The next hole of a ``float32``."""
+        """The next placeholder of a ``float32``."""
         self.singles += 1
         return float(np.uint32(_SINGLE + self.singles - 1).view(np.float32))
 
     def row(self, count: int) -> list[float]:
-        """The next `count` holes of ``float64``."""
+        """The next `count` placeholders of ``float64``."""
         return [self.double() for _ in range(count)]
 
 
@@ -52,26 +52,26 @@ class Template:
     ----------
     type_name : str
     msg : message of rosbags
-        Its numbers are constants, or of `holes`; its stamps are `STAMP` s.
-    holes : NumberFields
+        Its numbers are constants, or of `fields`; its stamps are `STAMP` s.
+    fields : NumberFields
         Those of `msg`.
     """
 
-    def __init__(self, type_name: str, msg: Any, holes: NumberFields) -> None:
+    def __init__(self, type_name: str, msg: Any, fields: NumberFields) -> None:
         self._data = bytearray(jazzy().serialize_cdr(msg, type_name))
         size = len(self._data) - ORIGIN
         words = np.frombuffer(self._data, "<i4", size // 4, ORIGIN)
         self._singles, self._doubles = words.view("<f4"), np.frombuffer(self._data, "<f8", size // 8, ORIGIN)
         self._stamps = [ORIGIN + 4 * int(place) for place in np.flatnonzero(words == STAMP)]
-        self._single_places = _places(words, _SINGLE, holes.singles)
-        self._double_places = _places(self._doubles.view("<i8"), _DOUBLE, holes.doubles)
+        self._single_places = _places(words, _SINGLE, fields.singles)
+        self._double_places = _places(self._doubles.view("<i8"), _DOUBLE, fields.doubles)
 
     def byte_of(self, double: int) -> int:
-        """Where in the message the hole of that number begins; -1 is the last one."""
+        """Where in the message the field of that number begins; -1 is the last one."""
         return ORIGIN + 8 * int(self._double_places[double])
 
     def fill(self, stamp: int, doubles: Array | Sequence[float], singles: Sequence[float] = ()) -> bytes:
-        """The message with a stamp (ns) in all its headers, and with numbers in the order in which the holes were made."""
+        """The message with a stamp (ns) in all its headers, and with numbers in the order in which the fields were made."""
         time = divmod(stamp, SECOND)
         for place in self._stamps:
             _TIME.pack_into(self._data, place, *time)
@@ -92,14 +92,14 @@ class Template:
 
 
 def stamped(header: Any) -> None:
-    """Put the hole of a stamp, and the frame, into a header."""
+    """Put the placeholder of a stamp, and the frame, into a header."""
     fill_header(header, STAMP * SECOND)
 
 
 def _places(bits: Any, first: int, count: int) -> Any:
-    """Where the holes are, in the order in which they were made; each must be there once."""
+    """Where the placeholders are, in the order in which they were made; each must be there once."""
     found = np.flatnonzero((bits >= first) & (bits < first + count))
     places = found[np.argsort(bits[found])]
     if bits[places].tolist() != list(range(first, first + count)):
-        raise ValueError(f"{len(places)} of {count} holes stand at a place of their own")
+        raise ValueError(f"{len(places)} of {count} placeholders stand at a place of their own")
     return places

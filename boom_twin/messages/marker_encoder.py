@@ -12,7 +12,7 @@ from ..types import Array, Prediction
 from .cdr_encoder import NumberFields, Template, stamped
 from .message_fields import fill_xz
 from .topic_table import TYPES, Output
-from .type_store import RosbagsTypes
+from .type_store import new_message
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
@@ -54,7 +54,7 @@ class ShapeMarkers:
     """
 
     def __init__(self, exaggeration: float, force_scale: float) -> None:
-        self._types, self._factor, self._scale = RosbagsTypes(), exaggeration, force_scale
+        self._factor, self._scale = exaggeration, force_scale
         self._template: Template | None = None
         self._past: deque[tuple[int, bytes]] = deque()
 
@@ -73,16 +73,16 @@ class ShapeMarkers:
 
     def _new_template(self, points: int, cylinders: int) -> Template:
         """The message with a trace of one point; its lines have so many points."""
-        msg, holes = self._types.make(TYPES[Output.SHAPE]), NumberFields()
+        msg, fields = new_message(TYPES[Output.SHAPE]), NumberFields()
         msg.markers = [
-            self._line("boom", 0, 0.12, BOOM, holes, points),
-            self._line("boom_exaggerated", 0, 0.06, LARGE, holes, points),
-            self._label("boom_exaggerated", 1, f"displacements x {self._factor:g}", holes),
-            self._line("boom_undeflected", 0, 0.06, GHOST, holes, points),
-            *(self._line("cylinders", i + 1, 0.09, None, holes, 2) for i in range(cylinders)),
-            self._line("tip_trace", 0, 0.03, TIP, holes, 1),
+            self._line("boom", 0, 0.12, BOOM, fields, points),
+            self._line("boom_exaggerated", 0, 0.06, LARGE, fields, points),
+            self._label("boom_exaggerated", 1, f"displacements x {self._factor:g}", fields),
+            self._line("boom_undeflected", 0, 0.06, GHOST, fields, points),
+            *(self._line("cylinders", i + 1, 0.09, None, fields, 2) for i in range(cylinders)),
+            self._line("tip_trace", 0, 0.03, TIP, fields, 1),
         ]
-        return Template(TYPES[Output.SHAPE], msg, holes)
+        return Template(TYPES[Output.SHAPE], msg, fields)
 
     def _with_trace(self, data: bytes) -> bytes:
         """All points of the trace instead of the single one; 24 bytes each, so nothing behind them is aligned anew."""
@@ -100,23 +100,23 @@ class ShapeMarkers:
             self._past.popleft()
         self._past.append((stamp, POINT.pack(tip[0], 0.0, tip[1])))
 
-    def _line(self, namespace: str, number: int, width: float, colour: Colour | None, holes: NumberFields, points: int) -> Any:
-        """A line of so many points; without a colour, that is one of four holes."""
-        marker = self._marker(namespace, number, LINE_STRIP, colour or tuple(holes.single() for _ in range(4)))
+    def _line(self, namespace: str, number: int, width: float, colour: Colour | None, fields: NumberFields, points: int) -> Any:
+        """A line of so many points; without a colour, that is one of four fields."""
+        marker = self._marker(namespace, number, LINE_STRIP, colour or tuple(fields.single() for _ in range(4)))
         marker.scale.x = width
-        marker.points = [self._types.make("geometry_msgs/msg/Point") for _ in range(points)]
+        marker.points = [new_message("geometry_msgs/msg/Point") for _ in range(points)]
         for point in marker.points:
-            fill_xz(point, holes.row(2))
+            fill_xz(point, fields.row(2))
         return marker
 
-    def _label(self, namespace: str, number: int, text: str, holes: NumberFields) -> Any:
+    def _label(self, namespace: str, number: int, text: str, fields: NumberFields) -> Any:
         marker = self._marker(namespace, number, TEXT, LARGE)
         marker.scale.z, marker.text = TEXT_HEIGHT, text
-        fill_xz(marker.pose.position, holes.row(2))
+        fill_xz(marker.pose.position, fields.row(2))
         return marker
 
     def _marker(self, namespace: str, number: int, kind: int, colour: tuple[float, ...]) -> Any:
-        marker = self._types.make("visualization_msgs/msg/Marker")
+        marker = new_message("visualization_msgs/msg/Marker")
         stamped(marker.header)
         marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, ADD
         marker.pose.orientation.w, marker.lifetime.sec = 1.0, LIFETIME

@@ -24,7 +24,7 @@ from .marker_encoder import ShapeMarkers
 from .message_fields import fill_header, fill_xz
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
-from .type_store import RosbagsTypes, jazzy
+from .type_store import jazzy, new_message
 
 OK, WARN, ERROR = range(3)
 """Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""
@@ -32,10 +32,9 @@ OK, WARN, ERROR = range(3)
 
 def encode_health(health: Health) -> bytes:
     """A diagnostic_msgs/DiagnosticArray in CDR, with the stamp of `health`; see ``topics.yaml`` for its values."""
-    types = RosbagsTypes()
-    msg = types.make(TYPES[Output.HEALTH])
+    msg = new_message(TYPES[Output.HEALTH])
     fill_header(msg.header, health.stamp)
-    msg.status = [_status(alarm, types) for alarm in health.alarms]
+    msg.status = [_status(alarm) for alarm in health.alarms]
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
 
 
@@ -50,12 +49,12 @@ def decode_health(msg: Any) -> tuple[Alarm, ...]:
     return tuple(found)
 
 
-def _status(alarm: Alarm, types: RosbagsTypes) -> Any:
-    status = types.make("diagnostic_msgs/msg/DiagnosticStatus")
+def _status(alarm: Alarm) -> Any:
+    status = new_message("diagnostic_msgs/msg/DiagnosticStatus")
     status.level = OK if alarm.until is not None else WARN if alarm.cause is None else ERROR
     status.name, status.message = alarm.channel, alarm.told
     for key, value in values_of(alarm).items():
-        pair = types.make("diagnostic_msgs/msg/KeyValue")
+        pair = new_message("diagnostic_msgs/msg/KeyValue")
         pair.key, pair.value = key, value
         status.values.append(pair)
     return status
@@ -67,10 +66,9 @@ FROM_REST = "from_rest"
 def encode_changes(change: Change) -> bytes:
     """The message of a change, in CDR."""
     values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
-    types = RosbagsTypes()
-    msg = types.make(TYPES[Output.CHANGES])
+    msg = new_message(TYPES[Output.CHANGES])
     fill_header(msg.header, change.stamp)
-    msg.name, msg.position = list(values), types.doubles(list(values.values()))
+    msg.name, msg.position = list(values), np.array(list(values.values()), dtype=float)
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
 
 
@@ -95,7 +93,7 @@ def decode_changes(msg: Any) -> Change:
 class PredictedOutput(NamedTuple):
     """An output that every prediction gives one message of: what is put into an empty message, and with which numbers.
 
-    ``put`` gets the message and the holes, which it places where numbers stand; ``numbers`` gives these in the same order.
+    ``put`` gets the message and the fields, which it places where numbers stand; ``numbers`` gives these in the same order.
     Of a block of predictions each of them is a column of it: transpose what has a row for every prediction.
     """
 
@@ -104,17 +102,17 @@ class PredictedOutput(NamedTuple):
     numbers: Callable[[Prediction | PredictionBlock], Array | Sequence[Any]]
 
 
-def _put_vector(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.vector, holes.row(2))
+def _put_vector(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.vector, fields.row(2))
 
 
-def _put_point(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.point, holes.row(2))
+def _put_point(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.point, fields.row(2))
 
 
-def _put_acceleration(msg: Any, holes: NumberFields) -> None:
-    fill_xz(msg.accel.linear, holes.row(2))
-    msg.accel.angular.y = holes.double()
+def _put_acceleration(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.accel.linear, fields.row(2))
+    msg.accel.angular.y = fields.double()
 
 
 PREDICTED = (
@@ -140,7 +138,7 @@ class ReportEncoder:
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        self._types, count = RosbagsTypes(), len(scene.joints)
+        count = len(scene.joints)
         self._passive = PassiveJoints(scene)
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
         self._predicted = [(row.output, self._template(row.output, row.put), row.numbers) for row in PREDICTED]
@@ -195,18 +193,18 @@ class ReportEncoder:
         return found.block(block.stamps)
 
     def _template(self, key: Output, put: Callable[[Any, NumberFields], None]) -> Template:
-        msg, holes = self._types.make(TYPES[key]), NumberFields()
+        msg, fields = new_message(TYPES[key]), NumberFields()
         stamped(msg.header)
-        put(msg, holes)
-        return Template(TYPES[key], msg, holes)
+        put(msg, fields)
+        return Template(TYPES[key], msg, fields)
 
     def _joint_states(self, names: list[str], count: int, passive: int) -> Template:
         """Joints first, cylinders after them, passive joints last; only cylinders have an effort."""
 
-        def put(msg: Any, holes: NumberFields) -> None:
-            own, efforts, others = (holes.row(number) for number in (2 * count, count, passive))
-            msg.name, msg.position = names, self._types.doubles(own + others)
-            msg.effort = self._types.doubles([nan] * count + efforts + [nan] * passive)
+        def put(msg: Any, fields: NumberFields) -> None:
+            own, efforts, others = (fields.row(number) for number in (2 * count, count, passive))
+            msg.name, msg.position = names, np.array(own + others)
+            msg.effort = np.array([nan] * count + efforts + [nan] * passive)
 
         return self._template(Output.JOINT_STATES, put)
 
@@ -239,9 +237,9 @@ class ReportEncoder:
             yield rows, self._residual_template(names).fill_rows(residuals.stamps[rows], _residual_numbers(values, sigmas))
 
     def _residual_template(self, names: tuple[str, ...]) -> Template:
-        def put(msg: Any, holes: NumberFields) -> None:
+        def put(msg: Any, fields: NumberFields) -> None:
             msg.name = list(names)
-            msg.position, msg.velocity, msg.effort = (self._types.doubles(holes.row(len(names))) for _ in range(3))
+            msg.position, msg.velocity, msg.effort = (np.array(fields.row(len(names))) for _ in range(3))
 
         if names not in self._residuals:
             self._residuals[names] = self._template(Output.RESIDUALS, put)

@@ -98,7 +98,7 @@ class SampleDecoder:
             Zero, which a driver leaves that does not set it; no sample.
         ``impossible stamp``
             Before 1970, or more seconds than a message can hold; no sample.
-    strangers : dict of Stream to list of str
+    other_boom_names : dict of Stream to list of str
         The names that the newest of these messages had, of another boom.
     """
 
@@ -106,10 +106,10 @@ class SampleDecoder:
         topics = topics or load_topics()
         self._channels = {stream: _Channels(topics, stream, joints) for stream in Stream}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
-        self._beside = pair if topics.is_shared else {}
+        self._sharing = pair if topics.is_shared else {}
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
-        self.strangers: dict[Stream, list[str]] = {}
+        self.other_boom_names: dict[Stream, list[str]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> Iterator[Sample]:
         """Those that `msg` holds of `streams`, the roles of the topic that it came by; see `put`."""
@@ -166,11 +166,11 @@ class SampleDecoder:
             return None, ["too many names"]
         places = channels.places(names)
         if channels.beyond:
-            self.strangers[stream] = channels.beyond
+            self.other_boom_names[stream] = channels.beyond
             return None, ["names of another boom"]
         if max(places) < 0:
-            beside = self._beside.get(stream)
-            is_unknown = beside is None or max(self._channels[beside].places(names)) < 0
+            other = self._sharing.get(stream)
+            is_unknown = other is None or max(self._channels[other].places(names)) < 0
             return None, ["unknown names only"] if is_unknown else []
         odd = ["unequal arrays"] if end != len(names) else []
         if -1 in places:

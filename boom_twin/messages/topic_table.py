@@ -35,11 +35,6 @@ def number_of(channel: str) -> int:
     return int(channel.rpartition("_")[2])
 
 
-def channels(stream: Stream, joints: int) -> list[str]:
-    """The channels of a stream in the order of its samples, for a boom of so many joints."""
-    return list(channels_of(joints)[stream])
-
-
 def usual(channel: str) -> dict[str, Any]:
     """Name and unit of a channel that no mapping names."""
     kind = sensor_kind(channel)
@@ -73,7 +68,7 @@ def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterat
     is_shared : bool
         Whether strokes and angles come by one topic.
     """
-    known = {stream: channels(stream, joints) for stream in Stream}
+    known = channels_of(joints)
     for channel in names:
         if not any(channel in group for group in known.values()):
             bound = f"the scene has {joints} joints, so channels end at {channel.split('_')[0]}_{joints}"
@@ -183,7 +178,7 @@ class Topics(_Entry):
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """The sensors of a stream by channel, in the order of its samples."""
-        return {name: self.sensors.get(name) or Sensor(**usual(name)) for name in channels(stream, joints)}
+        return {name: self.sensors.get(name) or Sensor(**usual(name)) for name in SENSORS[stream].channels(joints)}
 
     def beyond(self, stream: Stream, joints: int, names: Iterable[str]) -> list[str]:
         """Those of `names` by which a message tells of cylinders or joints that a boom with so many joints does not have.
@@ -191,7 +186,8 @@ class Topics(_Entry):
         ``cylinder_5`` of four; not if a channel reads that name, nor if `sensors` has every channel of the stream: then
         whoever wrote the mapping has said which of the names are the boom's.
         """
-        if SENSORS[stream].ends or all(channel in self.sensors for channel in channels(stream, joints)):
+        kind = SENSORS[stream]
+        if kind.ends or all(channel in self.sensors for channel in kind.channels(joints)):
             return []
         used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
         return [name for name in names if stream_of(name) is stream and number_of(name) > joints and name not in used]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).absolute().parents[2]
 """The folder, or zip archive, from which this process has its ``boom_twin``."""
@@ -31,3 +34,13 @@ def python_command(module: str, *arguments: str) -> list[str]:
         Of the module.
     """
     return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]
+
+
+def end_process(process: subprocess.Popen[Any], timeout: float, by: signal.Signals = signal.SIGTERM) -> None:
+    """End a child process by a signal, and by force where it has not ended within `timeout`, s; waits until it has."""
+    process.send_signal(by)
+    try:
+        process.wait(timeout)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

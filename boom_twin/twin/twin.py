@@ -468,7 +468,7 @@ class Twin:
             self.judge.predicted(followed)
         if last.stop > last.start:
             streams = found.residual_streams[last]
-            for code in np.unique(streams).tolist() if len(streams) > 1 else streams.tolist():
+            for code in sorted(set(streams.tolist())):
                 own, width = np.flatnonzero(streams == code) + last.start, int(self._counts[code])
                 self.judge.measured(
                     STREAMS[code], Compared(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])

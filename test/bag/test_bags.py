@@ -23,7 +23,7 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import Qos, Topic, load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
@@ -39,7 +39,7 @@ POINT = Topic(
 def write_points(directory: Path, count: int, compression: CompressionType = CompressionType.ZSTD) -> None:
     with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression) as bag:
         for number in range(count):
-            msg = RosbagsTypes().make(POINT.type)
+            msg = new_message(POINT.type)
             msg.point.x = float(number)
             bag.write("point", 10 * number, msg)
 
@@ -114,7 +114,7 @@ def test_rosbags_writes_what_is_read_here(tmp_path: Path) -> None:
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         connection = bag.add_connection("/p", POINT.type, typestore=jazzy())
         for number in range(20):
-            bag.write(connection, number, jazzy().serialize_cdr(RosbagsTypes().make(POINT.type), POINT.type))
+            bag.write(connection, number, jazzy().serialize_cdr(new_message(POINT.type), POINT.type))
     session = scan(tmp_path / "bag")
     assert not session.checked
     assert [time for _, time, _ in read(session, {"p": POINT.type})] == list(range(20))
@@ -142,7 +142,7 @@ def test_file_is_as_the_contract_says(bag: Path) -> None:
 def test_little_waits_in_memory(tmp_path: Path) -> None:
     with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
         for number in range(5000):
-            bag.write("point", number, RosbagsTypes().make(POINT.type))
+            bag.write("point", number, new_message(POINT.type))
         written = (tmp_path / "bag" / FILE_NAME).stat().st_size
     assert written > 0.7 * (tmp_path / "bag" / FILE_NAME).stat().st_size
 
@@ -150,7 +150,7 @@ def test_little_waits_in_memory(tmp_path: Path) -> None:
 def test_a_run_that_fails_leaves_no_bag_that_looks_whole(tmp_path: Path) -> None:
     """What was written can be saved."""
     with pytest.raises(ZeroDivisionError), SessionWriter(tmp_path / "bag", {"point": POINT}) as bag:
-        bag.write("point", 1, RosbagsTypes().make(POINT.type))
+        bag.write("point", 1, new_message(POINT.type))
         raise ZeroDivisionError
     assert not (tmp_path / "bag" / "metadata.yaml").exists()
     with pytest.raises(BagError, match="incomplete: the end is missing"):
@@ -225,7 +225,7 @@ def test_chunks_that_overlap_are_merged(tmp_path: Path) -> None:
     times = [int(time) for time in np.random.default_rng(3).permutation(4000)]
     with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
         for time in times:
-            bag.write("point", time, RosbagsTypes().make(POINT.type))
+            bag.write("point", time, new_message(POINT.type))
     session = scan(tmp_path / "bag")
     assert len(session.files[0].chunks) > 2
     assert [time for _, time, _ in read(session, {"boom_twin/tip/position": POINT.type})] == list(range(4000))

@@ -10,13 +10,13 @@ import pytest
 
 from boom_twin import Sample, load_scene, replay
 from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import _Messages
+from boom_twin.bag.session_files import sensor_message
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
 from boom_twin.messages.report_encoder import decode_changes, encode_changes
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.offline.reader_process import Changes
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Change, Stream
@@ -36,7 +36,7 @@ def test_there_and_back() -> None:
 
 @pytest.mark.parametrize(("name", "value"), [("gap", -1.0), ("payload", np.nan), ("gap", np.inf)])
 def test_values_of_a_stranger_are_checked(name: str, value: float) -> None:
-    msg = RosbagsTypes().make(TYPE)
+    msg = new_message(TYPE)
     msg.name, msg.position = [name], np.array([value])
     with pytest.raises(BagError, match=name):
         decode_changes(msg)
@@ -76,14 +76,13 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
     scene, topics = load_scene(), load_topics()
     strokes = strokes_of_posture(scene, "arch")
     joints = joint_angles_of_strokes(scene, strokes)
-    messages = _Messages()
     keys = {"s": topics.inputs[Stream.STROKES], "a": topics.inputs[Stream.ANGLES], "c": topics.outputs[Output.CHANGES]}
     told = Change(5 * SECOND, True, Settings(payload=50.0).live, {"joint_1": 0.02})
     with SessionWriter(tmp_path / "bag", keys) as bag:
         for k in range(100):
             stamp = 4 * SECOND + 20_000_000 * k
-            bag.write("s", stamp, messages.of(Sample(Stream.STROKES, stamp, strokes)))
-            bag.write("a", stamp, messages.of(Sample(Stream.ANGLES, stamp, joints)))
+            bag.write("s", stamp, sensor_message(Sample(Stream.STROKES, stamp, strokes)))
+            bag.write("a", stamp, sensor_message(Sample(Stream.ANGLES, stamp, joints)))
             if stamp == told.stamp:
                 bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")

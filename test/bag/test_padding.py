@@ -21,7 +21,7 @@ from boom_twin.errors import BagError
 from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import PADDING, RosbagsTypes, decode, jazzy
+from boom_twin.messages.type_store import PADDING, decode, jazzy, new_message
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Stream
 
@@ -35,7 +35,7 @@ def padded(data: bytes, size: int = PADDING) -> bytes:
 
 
 def joint_state(values: list[float]) -> Any:
-    msg = RosbagsTypes().make(JOINT_STATE)
+    msg = new_message(JOINT_STATE)
     fill_header(msg.header, 7, "rig")
     msg.name, msg.position = [f"cylinder_{i}" for i in range(1, len(values) + 1)], np.array(values)
     return msg
@@ -47,7 +47,7 @@ def both_orders(msg: Any, type_name: str) -> list[bytes]:
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
 def test_every_type_is_read_with_as_much_behind_it_as_there_may_be(type_name: str) -> None:
-    for data in both_orders(RosbagsTypes().make(type_name), type_name):
+    for data in both_orders(new_message(type_name), type_name):
         for size in range(PADDING + 1):
             again = jazzy().serialize_cdr(decode(padded(data, size), type_name), type_name, little_endian=bool(data[1]))
             assert bytes(again) == data, size

@@ -12,18 +12,19 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
 from boom_twin.bag import async_writer as module
-from boom_twin.bag.async_writer import Split, Storage
+from boom_twin.bag.async_writer import FileSplit, Storage
 from boom_twin.bag.metadata import Recorded, read_metadata
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.types import Stream
 
 TOPIC = load_topics().inputs[Stream.STROKES]
@@ -31,9 +32,9 @@ STEP = 5_000_000
 
 
 def message(number: int) -> bytes:
-    msg = RosbagsTypes().make(TOPIC.type)
+    msg = new_message(TOPIC.type)
     msg.header.stamp.sec = number
-    msg.position = RosbagsTypes().doubles([0.1 * number])
+    msg.position = np.array([0.1 * number])
     return bytes(jazzy().serialize_cdr(msg, TOPIC.type))
 
 
@@ -50,12 +51,12 @@ def fill(storage: Storage, count: int) -> list[int]:
 
 
 def test_all_that_is_put_is_written(tmp_path: Path) -> None:
-    assert fill(Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail), 500) == [500]
+    assert fill(Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail), 500) == [500]
     assert numbers(tmp_path / "bag") == list(range(500))
 
 
-@pytest.mark.parametrize(("split", "files"), [(Split(duration=0.5), 5), (Split(size=9_000), None)])
-def test_splits(tmp_path: Path, split: Split, files: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("split", "files"), [(FileSplit(duration=0.5), 5), (FileSplit(size=9_000), None)])
+def test_splits(tmp_path: Path, split: FileSplit, files: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("boom_twin.bag.writer.CHUNK_SIZE", 4096)
     fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), split, pytest.fail), 500)
     metadata = read_metadata(tmp_path / "bag" / "metadata.yaml")
@@ -102,7 +103,7 @@ def test_many_files_do_not_hold_up_the_recorder(tmp_path: Path) -> None:
 def test_the_last_file_that_can_be_listed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 3)
     told: list[str] = []
-    fill(Storage(BagWriter(tmp_path / "bag"), Split(duration=0.5), told.append), 500)
+    fill(Storage(BagWriter(tmp_path / "bag"), FileSplit(duration=0.5), told.append), 500)
     assert len(read_metadata(tmp_path / "bag" / "metadata.yaml").files) == 3
     assert numbers(tmp_path / "bag") == list(range(500))
     assert len(told) == 1 and "session_2.mcap: is the last file of 3" in told[0]
@@ -116,7 +117,7 @@ def numbers_of_metadata(path: Path) -> tuple[list[str], int]:
 def test_blank_pictures_are_read_again(tmp_path: Path) -> None:
     """Zeros pack better than 1000 to 1, as bombs do; readers allow that for 64 MiB in a file."""
     count, size = 25, 4_000_000
-    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail)
     keys = [storage.add(replace(recorded(TOPIC), topic=name)) for name in ("/strokes", "/picture")]
     for number in range(count):
         storage.put(keys[0], number * STEP, message(number), number * STEP, number)
@@ -130,7 +131,7 @@ def test_blank_pictures_are_read_again(tmp_path: Path) -> None:
 
 
 def test_a_topic_may_come_late(tmp_path: Path) -> None:
-    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail)
     first = storage.add(recorded(TOPIC))
     storage.put(first, 1, message(1), 1, 1)
     other = storage.add(Recorded("/late", "pkg/msg/Late", b"int32 value\n"))
@@ -145,9 +146,9 @@ FULL = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_storage import BagError, BagWriter, Split, Storage, message, recorded, TOPIC
+from test_storage import BagError, BagWriter, FileSplit, Storage, message, recorded, TOPIC
 import resource, time
-storage = Storage(BagWriter(Path({bag!r})), Split(), print)
+storage = Storage(BagWriter(Path({bag!r})), FileSplit(), print)
 key = storage.add(recorded(TOPIC))
 resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 try:
@@ -180,7 +181,7 @@ def test_a_disk_that_stalls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(module, "STALL", 0.3)
     monkeypatch.setattr(module, "FLUSH", 0.05)
     monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: stuck[0], False)] and real(file))
-    storage = Storage(BagWriter(tmp_path / "bag"), Split(), told.append)
+    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), told.append)
     key = storage.add(recorded(TOPIC))
     for number in range(300):
         storage.put(key, number, message(number), number, number)
@@ -197,7 +198,7 @@ def test_messages_leave_the_process_while_the_disk_is_slow(tmp_path: Path, monke
     release, real = [False], os.fsync
     monkeypatch.setattr(module, "FLUSH", 0.05)
     monkeypatch.setattr("os.fsync", lambda file: [time.sleep(0.02) for _ in iter(lambda: release[0], True)] and real(file))
-    storage = Storage(BagWriter(tmp_path / "bag"), Split(), pytest.fail)
+    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail)
     key = storage.add(recorded(TOPIC))
     for number in range(100):
         storage.put(key, number * STEP, message(number), number * STEP, number)
@@ -222,7 +223,7 @@ def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "FLUSH", 0.01)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     monkeypatch.setattr(BagWriter, "flush", stuck)
-    storage = Storage(BagWriter(tmp_path / "bag"), Split(), lambda text: None)
+    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), lambda text: None)
     key = storage.add(recorded(TOPIC))
     time.sleep(0.1)
     with pytest.raises(BagError, match="does not keep up: 0 MiB of messages wait"):
@@ -239,8 +240,8 @@ KILLED = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_storage import BagWriter, Split, Storage, message, recorded, TOPIC
-storage = Storage(BagWriter(Path({bag!r})), Split({size}, None), print)
+from test_storage import BagWriter, FileSplit, Storage, message, recorded, TOPIC
+storage = Storage(BagWriter(Path({bag!r})), FileSplit({size}, None), print)
 key = storage.add(recorded(TOPIC))
 began = time.monotonic()
 for number in range(10**6):

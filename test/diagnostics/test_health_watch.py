@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.model_status import HealthWatch
 from boom_twin.types import Alarm, Health
 
@@ -21,7 +21,7 @@ def health(second: int, *alarms: Alarm) -> Health:
 
 
 def status(watch: HealthWatch) -> Status:
-    return watch.status(Thresholds(), 0.0, 100.0)
+    return watch.status(Evaluation(Thresholds(), 0.0, 100.0))
 
 
 def test_without_alarms() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.source_status import PublishersJudge, Reception, ReceptionJudge
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.types import Stream
@@ -15,7 +15,7 @@ def received(*looks: Reception) -> Status:
     """The state after looks that are two seconds apart."""
     judge = ReceptionJudge()
     for second, each in enumerate(looks):
-        status = judge.status({"cylinder_strokes": each}, T, 2.0 * second, 0.0)
+        status = judge.status({"cylinder_strokes": each}, Evaluation(T, 2.0 * second, 0.0))
     return status
 
 
@@ -49,7 +49,7 @@ def test_numbers_of_several_publishers_are_said_to_tell_nothing() -> None:
 def publishers(**names: tuple[str, ...]) -> Status:
     peers = {stream: Peers(f"/{stream.value}", names.get(stream.value, ("/driver",))) for stream in Stream}
     followed = dict.fromkeys(Stream, "12.500000000")
-    return PublishersJudge().status(peers, followed, T, 0.0, 0.0)
+    return PublishersJudge().status(peers, followed, Evaluation(T, 0.0, 0.0))
 
 
 def test_one_source_for_each_topic() -> None:
@@ -66,7 +66,7 @@ def test_a_second_source_is_an_error_at_once() -> None:
 def test_streams_that_share_a_topic_may_have_a_publisher_each() -> None:
     def status(names: tuple[str, ...]) -> Status:
         peers = dict.fromkeys((Stream.STROKES, Stream.ANGLES), Peers("/joint_states", names))
-        return PublishersJudge().status(peers, dict.fromkeys(Stream, "1.0"), T, 0.0, 0.0)
+        return PublishersJudge().status(peers, dict.fromkeys(Stream, "1.0"), Evaluation(T, 0.0, 0.0))
 
     assert status(("/cylinders", "/encoders")).level == Level.OK
     assert status(("/cylinders", "/encoders", "/other")).level == Level.ERROR

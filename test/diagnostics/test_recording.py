@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.recorder_status import DiskState, RecordingJudge, TopicState
 
 TOPICS = {"/a": TopicState(500, 0), "/b": TopicState(30, None)}
@@ -19,7 +19,7 @@ def judged(topics: dict[str, TopicState] = TOPICS, end: str | None = None, **dis
     """After ten seconds of it."""
     judge, state = RecordingJudge(), DiskState(**(DISK | disk))
     for now in range(10):
-        status = judge.status(topics, state, end, Thresholds(), float(now), 1e9)
+        status = judge.status(topics, state, end, Evaluation(Thresholds(), float(now), 1e9))
     return status
 
 

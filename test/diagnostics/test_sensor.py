@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings, Thresholds
-from boom_twin.diagnostics.levels import Level
-from boom_twin.diagnostics.sensor_status import Sensor, SensorJudge, sensors_of
+from boom_twin.diagnostics.levels import Evaluation, Level
+from boom_twin.diagnostics.sensor_status import SensorJudge, SensorSpec, sensors_of
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
 from boom_twin.scene import load_scene
 from boom_twin.types import Sample, Stream
@@ -92,16 +92,16 @@ def test_lags_tell_how_clocks_are_apart() -> None:
     assert streams[1].lag - streams[0].lag == pytest.approx(0.07, abs=0.005)
 
 
-SENSOR = Sensor("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
+SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
 GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 
 
-def judged(changes: dict[str, float], age: float = 0.0, sensor: Sensor = SENSOR) -> tuple[Level, str]:
+def judged(changes: dict[str, float], age: float = 0.0, sensor: SensorSpec = SENSOR) -> tuple[Level, str]:
     """Level and message after ten seconds of it."""
     judge = SensorJudge(sensor)
     figures = ChannelStats(**{name: changes.get(name, getattr(GOOD, name)) for name in ChannelStats.__dataclass_fields__})
     for now in range(10):
-        status = judge.status(figures, age, Thresholds(), float(now), 1e9 + now)
+        status = judge.status(figures, age, Evaluation(Thresholds(), float(now), 1e9 + now))
     return status.level, status.message
 
 
@@ -125,7 +125,7 @@ def test_what_a_sensor_is_told_to_be(changes: dict[str, float], age: float, leve
 
 
 def test_an_optional_sensor_may_be_absent() -> None:
-    assert judged({"stamp": 0}, 99.0, Sensor("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)) == (
+    assert judged({"stamp": 0}, 99.0, SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)) == (
         Level.OK,
         "not there; optional",
     )

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.random import Generator
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.bag.integrity import STUMBLES
-from boom_twin.bag.session_files import _Messages
+from boom_twin.bag.integrity import PARSE_ERRORS
+from boom_twin.bag.session_files import sensor_message
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.cdr_decoder import CdrDecoder
@@ -55,11 +55,6 @@ def _arch() -> tuple[np.ndarray, np.ndarray]:
     return strokes_of_posture(load_scene(), "arch"), posture_angles(load_scene(), "arch")
 
 
-@cache
-def _rig() -> _Messages:
-    return _Messages()
-
-
 def _true(random: Generator, number: int, stream: Stream) -> Sample:
     """What the rig says of a gentle move."""
     strokes, angles = _arch()
@@ -73,7 +68,7 @@ def _true(random: Generator, number: int, stream: Stream) -> Sample:
 
 
 def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
-    return bytes(jazzy().serialize_cdr(_rig().of(sample), TYPES[sample.stream], little_endian=little_endian))
+    return bytes(jazzy().serialize_cdr(sensor_message(sample), TYPES[sample.stream], little_endian=little_endian))
 
 
 @cache
@@ -207,12 +202,12 @@ class _Listener:
         data = bytes.fromhex(content[0])
         try:
             stamp, message = self._wires[stream].read(data)
-        except STUMBLES:
+        except PARSE_ERRORS:
             return None
         if stream is not Stream.IMU:
             try:
                 whole = decode(data, TYPES[stream])
-            except STUMBLES:
+            except PARSE_ERRORS:
                 return "read, and a full decoder refuses it"
             if list(whole.name) != list(message.name) or not np.array_equal(whole.position, message.position, equal_nan=True):
                 return "read otherwise than a full decoder reads it"

@@ -11,10 +11,8 @@ from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import RosbagsTypes, decode, jazzy
+from boom_twin.messages.type_store import decode, jazzy, new_message
 from boom_twin.types import Stream
-
-MAKE = RosbagsTypes()
 
 
 def counted(calls: list[bytes]) -> Any:
@@ -26,14 +24,14 @@ def counted(calls: list[bytes]) -> Any:
 
 
 def joint_state(stamp: int, names: list[str], values: Any, frame: str = "", effort: int = 0) -> bytes:
-    msg = MAKE.make(TYPES[Stream.STROKES])
+    msg = new_message(TYPES[Stream.STROKES])
     fill_header(msg.header, stamp, frame)
     msg.name, msg.position, msg.effort = names, np.array(values, dtype=float), np.zeros(effort)
     return bytes(jazzy().serialize_cdr(msg, TYPES[Stream.STROKES]))
 
 
 def imu(stamp: int, frame: str, covariance: float, x: float, z: float) -> bytes:
-    msg = MAKE.make(TYPES[Stream.IMU])
+    msg = new_message(TYPES[Stream.IMU])
     fill_header(msg.header, stamp, frame)
     msg.linear_acceleration.x, msg.linear_acceleration.z = x, z
     msg.linear_acceleration_covariance[0] = covariance

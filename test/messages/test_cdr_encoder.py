@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from boom_twin.messages.cdr_encoder import NumberFields, Template, stamped
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 
 MARKER = "visualization_msgs/msg/Marker"
 
 
-def marker(holes: NumberFields) -> Any:
+def marker(fields: NumberFields) -> Any:
     """Holes of both widths, made in another order than they stand in."""
-    msg = RosbagsTypes().make(MARKER)
+    msg = new_message(MARKER)
     stamped(msg.header)
-    msg.ns, msg.color.g = "odd", holes.single()
-    msg.scale.z, msg.pose.position.y, msg.pose.orientation.w = holes.double(), holes.double(), -0.0
-    msg.color.r = holes.single()
+    msg.ns, msg.color.g = "odd", fields.single()
+    msg.scale.z, msg.pose.position.y, msg.pose.orientation.w = fields.double(), fields.double(), -0.0
+    msg.color.r = fields.single()
     return msg
 
 
-def test_numbers_come_in_the_order_of_their_holes() -> None:
-    template = Template(MARKER, marker(holes := NumberFields()), holes)
+def test_numbers_come_in_the_order_of_their_fields() -> None:
+    template = Template(MARKER, marker(fields := NumberFields()), fields)
     for stamp, doubles, singles in (
         (1_999_999_999, [0.1, np.nan], [0.5, 0.25]),
         (2**31 * 10**9 - 1, [-np.inf, 5e-324], [1.0, 0.0]),
@@ -36,9 +36,9 @@ def test_numbers_come_in_the_order_of_their_holes() -> None:
         assert (msg.ns, msg.color.b, msg.pose.position.x) == ("odd", 0.0, 0.0)
 
 
-def test_a_hole_that_is_in_no_message_is_refused() -> None:
-    holes = NumberFields()
-    msg = marker(holes)
-    holes.double()
-    with pytest.raises(ValueError, match="2 of 3 holes"):
-        Template(MARKER, msg, holes)
+def test_a_placeholder_that_is_in_no_message_is_refused() -> None:
+    fields = NumberFields()
+    msg = marker(fields)
+    fields.double()
+    with pytest.raises(ValueError, match="2 of 3 placeholders"):
+        Template(MARKER, msg, fields)

@@ -12,7 +12,7 @@ from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.scene import load_scene
 from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
 
@@ -192,15 +192,14 @@ def test_no_shape_without_a_line() -> None:
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
 def test_factory_makes_what_can_be_encoded(type_name: str) -> None:
-    types, store = RosbagsTypes(), jazzy()
-    data = bytes(store.serialize_cdr(types.make(type_name), type_name))
+    store = jazzy()
+    data = bytes(store.serialize_cdr(new_message(type_name), type_name))
     assert bytes(store.serialize_cdr(store.deserialize_cdr(data, type_name), type_name)) == data
     assert not any(data[4:].replace(b"\x01\x00\x00\x00\x00", b""))
 
 
 def test_factory_makes_a_new_message_each_time() -> None:
-    types = RosbagsTypes()
-    one, other = types.make("sensor_msgs/msg/Imu"), types.make("sensor_msgs/msg/Imu")
+    one, other = new_message("sensor_msgs/msg/Imu"), new_message("sensor_msgs/msg/Imu")
     one.header.stamp.sec, one.orientation_covariance[0] = 5, -1.0
     assert (other.header.stamp.sec, other.orientation_covariance[0]) == (0, 0.0)
 

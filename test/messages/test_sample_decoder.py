@@ -13,23 +13,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boom_twin.messages.sample_decoder import LONGEST, SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import Sensor, Topics, channels, load_topics, usual
-from boom_twin.messages.type_store import RosbagsTypes
-from boom_twin.types import Stream
+from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
+from boom_twin.messages.type_store import new_message
+from boom_twin.types import SENSORS, Stream
 
-TYPES = RosbagsTypes()
 FINITE = st.floats(-1e6, 1e6)
 OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joint_", "cylinder_")))
 
 
 def joint_state(names: list[str], positions: list[float]) -> Any:
-    msg = TYPES.make("sensor_msgs/msg/JointState")
-    msg.name, msg.position = names, TYPES.doubles(positions)
+    msg = new_message("sensor_msgs/msg/JointState")
+    msg.name, msg.position = names, np.array(positions)
     return msg
 
 
 def imu(x: float, z: float) -> Any:
-    msg = TYPES.make("sensor_msgs/msg/Imu")
+    msg = new_message("sensor_msgs/msg/Imu")
     msg.linear_acceleration.x, msg.linear_acceleration.y, msg.linear_acceleration.z = x, 77.0, z
     return msg
 
@@ -152,7 +151,7 @@ def test_real_messages_of_rclpy_are_taken() -> None:
 
 
 def test_stamp_of_is_exact() -> None:
-    msg = TYPES.make("sensor_msgs/msg/Imu")
+    msg = new_message("sensor_msgs/msg/Imu")
     msg.header.stamp.sec, msg.header.stamp.nanosec = 1_700_000_000, 999_999_999
     assert stamp_of(msg) == 1_700_000_000_999_999_999
 
@@ -160,7 +159,7 @@ def test_stamp_of_is_exact() -> None:
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
     decoder = SampleDecoder(1)
-    message = RosbagsTypes().make("sensor_msgs/msg/JointState")
+    message = new_message("sensor_msgs/msg/JointState")
     message.name, message.position = ["cylinder_1"], np.array([0.1])
     assert decoder.put(Stream.STROKES, stamp, message) is None
     assert decoder.oddities == {name: 1}
@@ -198,7 +197,7 @@ def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], rea
     other = {"cylinder_2": "cylinder_1", "joint_1": "joint_2"}[channel]
     sample = SampleDecoder(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
     assert sample is not None
-    values = dict(zip(channels(stream, 2), sample.values.tolist(), strict=True))
+    values = dict(zip(SENSORS[stream].channels(2), sample.values.tolist(), strict=True))
     assert values == {channel: pytest.approx(expected, rel=1e-12), other: 0.7}
 
 

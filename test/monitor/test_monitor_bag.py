@@ -17,7 +17,7 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
@@ -169,18 +169,17 @@ def test_a_session_whose_strokes_cannot_be_used_says_so(tmp_path: Path) -> None:
 def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) -> None:
     """A result bag of a few rows; one of its joint_states has no effort."""
     displacement, states = (load_topics().outputs[role] for role in (ENOUGH, Output.JOINT_STATES))
-    types = RosbagsTypes()
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kinds = (displacement, states)
         links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in kinds}
         for row in range(10):
             stamp = 1_700_000_000 * 10**9 + row * 5_000_000
             for topic, link in links.items():
-                message = types.make(topic.type)
+                message = new_message(topic.type)
                 message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
                 if topic is states:
-                    message.name, message.position = ["cylinder_1"], types.doubles([0.1])
-                    message.effort = types.doubles([] if row == 4 else [1.0])
+                    message.name, message.position = ["cylinder_1"], np.array([0.1])
+                    message.effort = np.array([] if row == 4 else [1.0])
                 writer.write(link, stamp, jazzy().serialize_cdr(message, topic.type))
     feed = read_all(bag_feed(tmp_path / "bag", load_scene(), Settings()))
     assert not feed.trouble and feed.store.tables["acceleration"].count == 10

@@ -17,7 +17,7 @@ import pytest
 
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
-from boom_twin.messages.type_store import RosbagsTypes, jazzy
+from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor import log_limit as log
 from boom_twin.monitor.data import topic_rows as catching
 from boom_twin.monitor.data.analyst import Analyst
@@ -29,7 +29,7 @@ from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked, Stream
 
-TOPICS, MAKE = load_topics(), RosbagsTypes()
+TOPICS = load_topics()
 EPOCH, STEP = 1_700_000_000 * 10**9, 5_000_000
 CAPACITY = 2000
 JOINTS, CYLINDERS = [f"joint_{i}" for i in (1, 2, 3, 4)], [f"cylinder_{i}" for i in (1, 2, 3, 4)]
@@ -43,7 +43,7 @@ def topic(role: Role) -> Topic:
 
 def joint_state(names: list[str], lengths: tuple[int, int, int] | None = None, value: float = 0.1) -> Any:
     """Three arrays, of as many values as there are names, or as given."""
-    message = MAKE.make("sensor_msgs/msg/JointState")
+    message = new_message("sensor_msgs/msg/JointState")
     message.name = names
     for field, length in zip(("position", "velocity", "effort"), lengths or (len(names),) * 3, strict=True):
         setattr(message, field, np.full(length, value))
@@ -51,18 +51,18 @@ def joint_state(names: list[str], lengths: tuple[int, int, int] | None = None, v
 
 
 def shape(points: int = 5, cylinders: int = 4, x: float = 1.0) -> Any:
-    message = MAKE.make(TYPES[Output.SHAPE])
+    message = new_message(TYPES[Output.SHAPE])
     lines = [("boom", 0, points), ("boom_undeflected", 0, points), *(("cylinders", i + 1, 2) for i in range(cylinders))]
     for space, number, count in lines:
-        marker = MAKE.make("visualization_msgs/msg/Marker")
-        marker.ns, marker.id, marker.points = space, number, [MAKE.make("geometry_msgs/msg/Point") for _ in range(count)]
+        marker = new_message("visualization_msgs/msg/Marker")
+        marker.ns, marker.id, marker.points = space, number, [new_message("geometry_msgs/msg/Point") for _ in range(count)]
         marker.points[0].x = x
         message.markers.append(marker)
     return message
 
 
 def vector(role: Role, x: float = 0.5) -> Any:
-    message = MAKE.make(TYPES[role])
+    message = new_message(TYPES[role])
     {
         Output.TIP_DISPLACEMENT: lambda: message.vector,
         Output.TIP_UNCERTAINTY: lambda: message.vector,
@@ -74,12 +74,12 @@ def vector(role: Role, x: float = 0.5) -> Any:
 
 
 def statuses(*names: str, role: Output = Output.DIAGNOSTICS, text: str = "well", **values: str) -> Any:
-    message = MAKE.make(TYPES[role])
+    message = new_message(TYPES[role])
     for name in names:
-        status = MAKE.make("diagnostic_msgs/msg/DiagnosticStatus")
+        status = new_message("diagnostic_msgs/msg/DiagnosticStatus")
         status.name, status.message = name, text
         for key, value in values.items():
-            pair = MAKE.make("diagnostic_msgs/msg/KeyValue")
+            pair = new_message("diagnostic_msgs/msg/KeyValue")
             pair.key, pair.value = key, value
             status.values.append(pair)
         message.status.append(status)
@@ -95,7 +95,7 @@ def health(**changes: str) -> Any:
 
 
 def event(text: str = "mark") -> Any:
-    message = MAKE.make("rcl_interfaces/msg/Log")
+    message = new_message("rcl_interfaces/msg/Log")
     message.msg = text
     return message
 
@@ -154,7 +154,7 @@ MALFORMED: dict[str, tuple[Role | None, Callable[[], Any], str]] = {
     "control": (Output.RESIDUALS, lambda: joint_state(["joint_1\n\x1b[2J"]), r"not 'joint_1\n\x1b[2J'"),
     "no sigma": (Output.RESIDUALS, lambda: joint_state(JOINTS, (4, 4, 1)), "1 of effort"),
     "huge residual": (Output.RESIDUALS, lambda: joint_state(JOINTS, value=-1e300), "a number is -1e+300"),
-    "empty shape": (Output.SHAPE, lambda: MAKE.make(TYPES[Output.SHAPE]), "no lines of the boom"),
+    "empty shape": (Output.SHAPE, lambda: new_message(TYPES[Output.SHAPE]), "no lines of the boom"),
     "shape of no points": (Output.SHAPE, lambda: shape(1), "no lines of the boom"),
     "shape of other points": (Output.SHAPE, lambda: shape(6), "numbers, but"),
     "shape of many points": (Output.SHAPE, lambda: shape(5000), "numbers of a shape, at most 1000"),

@@ -16,7 +16,7 @@ from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes
+from boom_twin.messages.type_store import new_message
 from boom_twin.types import Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
@@ -60,10 +60,9 @@ def rig(arrays, tmp_path_factory):
     """The bag of the rig, with its mapping; every fourth message has the angles too."""
     path = tmp_path_factory.mktemp("rig") / "bag"
     topic = load_topics().inputs[Stream.STROKES].model_copy(update={"name": "/rig/joint_states"})
-    types = RosbagsTypes()
     with SessionWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
         for row, (stamp, strokes, angles) in enumerate(zip(*arrays, strict=True)):
-            msg = types.make(JOINT_STATE)
+            msg = new_message(JOINT_STATE)
             fill_header(msg.header, int(stamp))
             values = {
                 "slew": 0.3,
@@ -76,7 +75,7 @@ def rig(arrays, tmp_path_factory):
                 gon = -angles[3] * 200.0 / np.pi
                 own = {"delta": gon, "joint_3": angles[2], "beta": 2 * angles[1], "alpha": 90.0 + np.degrees(angles[0])}
                 values = {**own, **values}
-            msg.name, msg.position = list(values), types.doubles([*values.values()])
+            msg.name, msg.position = list(values), np.array([*values.values()])
             bag.write("all", int(stamp), msg)
     SessionSheet("test", "", "", MAPPING, {}).write(path)
     return path

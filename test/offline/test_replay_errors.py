@@ -14,7 +14,7 @@ from boom_twin.cli.replay import as_text
 from boom_twin.errors import BagError
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes
+from boom_twin.messages.type_store import new_message
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Stream
 
@@ -83,12 +83,12 @@ def test_stray_stamps_are_dropped_and_told(tmp_path):
     scene = load_scene()
     still = strokes_of_posture(scene, "arch")
     topic = load_topics().inputs[Stream.STROKES]
-    types, stray = RosbagsTypes(), {50: (2**31 - 1) * 10**9, 70: 10**9, 90: 0}
+    stray = {50: (2**31 - 1) * 10**9, 70: 10**9, 90: 0}
     with SessionWriter(tmp_path / "bag", {"strokes": topic}) as bag:
         for row in range(200):
-            msg = types.make(topic.type)
+            msg = new_message(topic.type)
             fill_header(msg.header, stray.get(row, START + row * STEP))
-            msg.name, msg.position = [f"cylinder_{i}" for i in range(1, 5)], types.doubles(still)
+            msg.name, msg.position = [f"cylinder_{i}" for i in range(1, 5)], np.array(still)
             bag.write("strokes", START + row * STEP, msg)
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
     assert (result.summary["samples"], result.summary["dropped"]) == (197, 3)

@@ -21,7 +21,7 @@ from boom_twin.errors import BagError
 from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes
+from boom_twin.messages.type_store import new_message
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME, default_text
 from boom_twin.types import Report, Residuals, Sample, Stream
@@ -108,12 +108,12 @@ def test_three_cylinders_on_four_sections(tmp_path):
 
 def write_names(path, names, rows=20):
     """Strokes of the names given, at rest."""
-    topic, types = load_topics().inputs[Stream.STROKES], RosbagsTypes()
+    topic = load_topics().inputs[Stream.STROKES]
     with SessionWriter(path, {"strokes": topic}) as bag:
         for row in range(rows):
-            msg = types.make(topic.type)
+            msg = new_message(topic.type)
             fill_header(msg.header, 10**18 + row * 5_000_000)
-            msg.name, msg.position = names, types.doubles(np.zeros(len(names)))
+            msg.name, msg.position = names, np.zeros(len(names))
             bag.write("strokes", 10**18 + row * 5_000_000, msg)
     return path
 
@@ -140,7 +140,7 @@ def test_the_intake_takes_nothing_of_another_boom():
     names = [f"cylinder_{i}" for i in range(1, 6)]
     decoder, msg = SampleDecoder(4), SimpleNamespace(name=names, position=[0.1] * 5)
     assert decoder.put(Stream.STROKES, 10**18, msg) is None
-    assert decoder.oddities == {"names of another boom": 1} and decoder.strangers == {Stream.STROKES: ["cylinder_5"]}
+    assert decoder.oddities == {"names of another boom": 1} and decoder.other_boom_names == {Stream.STROKES: ["cylinder_5"]}
     assert decoder.put(Stream.STROKES, 10**18, SimpleNamespace(name=names[:4], position=[0.1] * 4)) is not None
 
 

@@ -16,7 +16,7 @@ import boom_twin
 from boom_twin.cli.main import COMMANDS, _parser
 from boom_twin.messages.marker_encoder import ShapeMarkers
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import RosbagsTypes
+from boom_twin.messages.type_store import new_message
 
 ROOT = Path(boom_twin.__file__).parent
 LAUNCH = sorted((ROOT / "launch").iterdir())
@@ -118,7 +118,7 @@ def test_rviz_shows_topics_and_namespaces_that_exist() -> None:
 
 def field(type_name: str, path: list[str]) -> Any:
     """What a field path leads to in a message of that type; arrays of a JointState have eight entries and more."""
-    value: Any = RosbagsTypes().make(type_name)
+    value: Any = new_message(type_name)
     for part in path:
         name, _, index = part.partition("[")
         value = getattr(value, name)

@@ -24,6 +24,7 @@ from boom_twin.bag.reader import read_both, scan
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import NODE, TYPES, Output
 from boom_twin.ros.bag.recorder import COMPLETE
+from boom_twin.types import Stream
 
 MAPPING = """
 inputs:

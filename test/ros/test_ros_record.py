@@ -31,7 +31,7 @@ from boom_twin.errors import UsageError
 from boom_twin.messages.type_store import jazzy
 from boom_twin.ros.bag import subscriptions as definition
 from boom_twin.ros.bag.recorder import COMPLETE
-from boom_twin.ros.bag.subscriptions import wanted_of
+from boom_twin.ros.bag.subscriptions import requested_topics
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "boom_twin_recorder: recording"
@@ -253,7 +253,7 @@ def test_definitions_from_classes_are_those_of_the_packages(name: str, monkeypat
 
 
 def test_names_of_topics() -> None:
-    (found,) = wanted_of(["a:std_msgs/String"], {})
+    (found,) = requested_topics(["a:std_msgs/String"], {})
     assert (found.name, found.type, found.required) == ("/a", "std_msgs/msg/String", True)
     with pytest.raises(UsageError, match="named twice"):
-        wanted_of(["/a", "a"], {})
+        requested_topics(["/a", "a"], {})

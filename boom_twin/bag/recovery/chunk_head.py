@@ -13,7 +13,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from ..integrity import STUMBLES
+from ..integrity import PARSE_ERRORS
 from ..mcap_records import LARGEST, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
 
 _FIELDS = struct.Struct("<BQQQQII")
@@ -109,7 +109,7 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudg
         for limit in dict.fromkeys((min(head.unpacked, LARGEST), LARGEST)):
             try:
                 content = _unpacked(file, head, packed, compression, limit, budget)
-            except STUMBLES as error:
+            except PARSE_ERRORS as error:
                 reason = str(error)
                 break
             if zlib.crc32(content) == head.crc:
@@ -128,7 +128,7 @@ def _fitting_content(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
         raise UnsoundError("its lengths do not agree")
     try:
         content = _unpacked(file, head, head.size, head.compression, head.unpacked, budget)
-    except STUMBLES as error:
+    except PARSE_ERRORS as error:
         raise UnsoundError(str(error)) from error
     if len(content) != head.unpacked:
         raise UnsoundError(f"unpacks to another size than the {head.unpacked} bytes that it states", content)
@@ -149,7 +149,7 @@ def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
         content = _unpacked(file, head, min(head.size, LARGEST), head.compression, min(head.unpacked, LARGEST), budget)
     except UnpackError:
         raise
-    except STUMBLES:
+    except PARSE_ERRORS:
         return b""
     return whole_parts(content)
 

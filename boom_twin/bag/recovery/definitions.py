@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, DataEnd, Header, Metadata, Schema, Statistics
 
 from ...errors import BagError
 from ...system.received_files import open_received
 from ..integrity import checksum_of, summary_start
-from ..mcap_records import LARGEST, definition_of, parts
+from ..mcap_records import LARGEST, by_topic, parts, record_of
 from ..mcap_summary import NOTES, PROFILE
 from ..metadata import BagMetadata, Recorded, offered_qos, profiles
 from .scanner import SoundRecords, scan_damaged
+
+_DEFINITIONS = {Opcode.CHANNEL, Opcode.SCHEMA}
+_NOTES = {Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END}
+_INDEXES = {Opcode.STATISTICS, Opcode.CHUNK_INDEX}
 
 
 @dataclass(slots=True)
@@ -77,8 +78,7 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     BagError
         The file is of another profile than ros2.
     """
-    definitions = FileDefinitions()
-    loose = FileDefinitions()
+    definitions, unvouched = FileDefinitions(), FileDefinitions()
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST, True
@@ -86,63 +86,38 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
-        taker = definitions if piece.vouched or is_in_summary else loose
+        target = definitions if piece.vouched or is_in_summary else unvouched
+        others = _NOTES | _INDEXES if is_in_summary else _NOTES
         for opcode, body in parts(piece.content):
-            if opcode == Opcode.HEADER:
-                _check_profile(path, body)
-            elif opcode == Opcode.METADATA:
-                _note(definitions, body)
-            elif opcode == Opcode.DATA_END:
-                is_data = False
-                definitions.is_summed = _is_summed(path, piece.offset, body)
-            elif opcode == Opcode.STATISTICS and is_in_summary:
-                statistics = Statistics.read(ReadDataStream(BytesIO(body)))
-            elif opcode == Opcode.CHUNK_INDEX and is_in_summary:
-                index = ChunkIndex.read(ReadDataStream(BytesIO(body)))
-                definitions.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
-            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (taker is definitions or is_data):
+            if opcode in _DEFINITIONS and (target is definitions or is_data):
                 budget -= len(body)
                 if budget < 0:
                     raise BagError(f"{path}: more than {LARGEST} bytes of definitions. It is not the work of a recorder.")
-                _define(taker, opcode, body)
-    definitions.channels = {**loose.channels, **definitions.channels}
-    definitions.schemas = {**loose.schemas, **definitions.schemas}
+            elif opcode not in others:
+                continue
+            match record_of(opcode, body):
+                case Channel() as channel:
+                    target.channels.setdefault(channel.id, channel)
+                case Schema() as schema:
+                    target.schemas.setdefault(schema.id, schema)
+                case Header(profile=("ros1" | "px4") as profile):
+                    raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
+                case Metadata(name=name, metadata=notes) if name == NOTES:
+                    definitions.notes |= notes
+                case DataEnd(data_section_crc=checksum):
+                    is_data = False
+                    definitions.is_summed = checksum != 0 and checksum == _checksum_before(path, piece.offset)
+                case Statistics() as found:
+                    statistics = found
+                case ChunkIndex() as index:
+                    definitions.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
+    definitions.channels = {**unvouched.channels, **definitions.channels}
+    definitions.schemas = {**unvouched.schemas, **definitions.schemas}
     if statistics is not None and statistics.channel_message_counts.keys() <= definitions.channels.keys():
-        definitions.told = _by_topic(statistics.channel_message_counts, definitions.channels)
+        definitions.told = by_topic(statistics.channel_message_counts, definitions.channels)
     return definitions
 
 
-def _check_profile(path: Path, body: bytes) -> None:
-    profile = Header.read(ReadDataStream(BytesIO(body))).profile
-    if profile in ("ros1", "px4"):
-        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
-
-
-def _note(definitions: FileDefinitions, body: bytes) -> None:
-    record: Metadata = Metadata.read(ReadDataStream(BytesIO(body)))
-    if record.name == NOTES:
-        definitions.notes |= record.metadata
-
-
-def _is_summed(path: Path, offset: int, body: bytes) -> bool:
-    """Whether the checksum at the end of the data fits."""
-    told: int = DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc
-    if told == 0:
-        return False
+def _checksum_before(path: Path, offset: int) -> int:
     with open_received(path) as file:
-        return checksum_of(file, 0, offset) == told
-
-
-def _define(definitions: FileDefinitions, opcode: int, body: bytes) -> None:
-    record = definition_of(opcode, body)
-    if isinstance(record, Channel):
-        definitions.channels.setdefault(record.id, record)
-    elif isinstance(record, Schema):
-        definitions.schemas.setdefault(record.id, record)
-
-
-def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:
-    told: Counter[str] = Counter()
-    for channel, count in counts.items():
-        told[channels[channel].topic] += count
-    return told
+        return checksum_of(file, 0, offset)

@@ -95,7 +95,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
             all_definitions.append(definitions_of(file, unverified))
     outcome = Recovery()
     notes = {key: value for definitions in all_definitions for key, value in definitions.notes.items()}
-    notes |= {key: str(value) for key, value in (metadata.custom_data or {}).items()} if metadata else {}
+    notes |= metadata.notes if metadata else {}
     bag = BagWriter(out, {**notes, RECOVERED: path.name}, distro=metadata.ros_distro if metadata else "")
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
@@ -208,10 +208,7 @@ def _counts_told(
     if None not in counts:
         yield sum((each for each in counts if each is not None), Counter[str]())
     if metadata is not None and {file.name for file in files} <= {Path(name).name for name in metadata.relative_file_paths}:
-        told = Counter[str]()
-        for entry in metadata.topics_with_message_count:
-            told[entry.topic_metadata.name] += entry.message_count
-        yield told
+        yield metadata.counts
 
 
 def _first(outcome: Recovery) -> str:

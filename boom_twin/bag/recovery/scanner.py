@@ -3,40 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap import records as kinds
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from ...system.received_files import open_received
-from ..integrity import BLOCK, STUMBLES
-from ..mcap_records import LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, whole_parts
+from ..integrity import BLOCK, PARSE_ERRORS
+from ..mcap_records import KINDS, LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, record_of, whole_parts
 from .chunk_head import ChunkHead, UnsoundError, head_at, sound_content, unverified_start
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""
-
-_READERS: dict[int, Callable[[ReadDataStream], kinds.McapRecord]] = {
-    Opcode.HEADER: kinds.Header.read,
-    Opcode.FOOTER: kinds.Footer.read,
-    Opcode.SCHEMA: kinds.Schema.read,
-    Opcode.CHANNEL: kinds.Channel.read,
-    Opcode.MESSAGE_INDEX: kinds.MessageIndex.read,
-    Opcode.CHUNK_INDEX: kinds.ChunkIndex.read,
-    Opcode.ATTACHMENT: kinds.Attachment.read,
-    Opcode.ATTACHMENT_INDEX: kinds.AttachmentIndex.read,
-    Opcode.STATISTICS: kinds.Statistics.read,
-    Opcode.METADATA: kinds.Metadata.read,
-    Opcode.METADATA_INDEX: kinds.MetadataIndex.read,
-    Opcode.SUMMARY_OFFSET: kinds.SummaryOffset.read,
-    Opcode.DATA_END: kinds.DataEnd.read,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,17 +124,17 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
     if opcode == Opcode.MESSAGE:
         is_whole = length >= MESSAGE_HEAD.size and _may_begin(file, offset + PREFIX.size + length, size)
     else:
-        is_whole = opcode in _READERS and _fills(body, _READERS[opcode])
+        is_whole = opcode in KINDS and _fills(opcode, body)
     return raw + body if is_whole else b""
 
 
-def _fills(body: bytes, read: Callable[[ReadDataStream], kinds.McapRecord]) -> bool:
-    stream = ReadDataStream(BytesIO(body))
+def _fills(opcode: int, body: bytes) -> bool:
+    """Whether a record can be read and fills its body."""
     try:
-        read(stream)
-    except STUMBLES:
+        record_of(opcode, body)
+    except PARSE_ERRORS:
         return False
-    return stream.count == len(body)
+    return True
 
 
 def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
@@ -161,9 +142,9 @@ def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
     file.seek(offset)
     raw = file.read(PREFIX.size)
     if len(raw) < PREFIX.size:
-        return raw[:1] in (b"", MCAP0_MAGIC[:1]) or raw[0] in {Opcode.MESSAGE, *_READERS}
+        return raw[:1] in (b"", MCAP0_MAGIC[:1]) or raw[0] in {Opcode.MESSAGE, *KINDS}
     opcode, length = PREFIX.unpack(raw)
-    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *_READERS) and length <= LARGEST
+    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *KINDS) and length <= LARGEST
 
 
 def _ends(file: BinaryIO, offset: int) -> bool:

@@ -108,7 +108,7 @@ def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     if numbers[0] == numbers[-1] and (numbers == numbers[0]).all():
         yield int(numbers[0]), rows
         return
-    for number in np.unique(numbers).tolist():
+    for number in sorted(set(numbers.tolist())):
         own = numbers == number
         yield number, type(rows)(*(column[own] for column in rows))
 

@@ -9,28 +9,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+from builtin_interfaces.msg import Time
 from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
 
 from ...bag.advice import publishable
 from ...bag.reader import Session, read_both
 from ...errors import BagError, BoomTwinError
-from ...messages.type_store import jazzy
 from ...types import NANO, SECOND
 from ..node.diagnostics import node_name
-from ..runtime import message_class, qos_profile
+from ..runtime import qos_profile
 from .subscriptions import installed_class
 
-CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
-
-
-def clock_message(stamp: int) -> bytes:
-    """A message for ``/clock`` in CDR."""
-    types = jazzy().types
-    time_class, clock_class = types["builtin_interfaces/msg/Time"], types[CLOCK_TYPE]
-    now = time_class(sec=stamp // SECOND, nanosec=stamp % SECOND)
-    return bytes(jazzy().serialize_cdr(clock_class(clock=now), CLOCK_TYPE))
-
-
+CLOCK = "/clock"
 NAME = "boom_twin_player"
 LOOK = 0.05
 """Time (s) between looks for listeners."""
@@ -77,7 +68,7 @@ class Player:
         }
         self._clock: Publisher[Any] | None = None
         if clock_rate is not None:
-            self._clock = self._node.create_publisher(message_class(CLOCK_TYPE), CLOCK, 10)
+            self._clock = self._node.create_publisher(Clock, CLOCK, 10)
         self._sent: Counter[str] = Counter()
         self._latest = self._wall = self._ask = 0.0
 
@@ -86,7 +77,7 @@ class Player:
         """The names of what is published."""
         return tuple(self._types)
 
-    def lonely(self, listeners: int = 1) -> list[str]:
+    def unmatched(self, listeners: int = 1) -> list[str]:
         """The topics that fewer than so many subscriptions have matched."""
         return [name for name, each in self._publishers.items() if each.get_subscription_count() < listeners]
 
@@ -96,14 +87,14 @@ class Player:
         A little longer still, because a subscription may know of its publisher a moment after the publisher of it.
         """
         end = time.monotonic() + timeout
-        while (lonely := self.lonely(listeners)) and time.monotonic() < end:
+        while (unmatched := self.unmatched(listeners)) and time.monotonic() < end:
             check()
             time.sleep(LOOK)
         if timeout > 0.0:
             time.sleep(SETTLE)
-        return lonely
+        return unmatched
 
-    def refuse_rivals(self) -> None:
+    def refuse_other_publishers(self) -> None:
         """Raise BoomTwinError if anybody else publishes one of the topics."""
         for name in self._publishers:
             ends = self._node.get_publishers_info_by_topic(name)
@@ -177,7 +168,7 @@ class Player:
         while is_held():
             was_held = True
             if self._clock is not None:
-                self._clock.publish(clock_message(stamp))
+                self._clock.publish(_clock_at(stamp))
             time.sleep(LOOK if self._clock_rate is None else min(LOOK, 1.0 / self._clock_rate))
         return time.monotonic() - began if was_held else 0.0
 
@@ -190,20 +181,25 @@ class Player:
         """Take the publishers away."""
         self._node.destroy_node()
 
-    def _publish(self, name: str, data: bytes) -> None:
+    def _publish(self, name: str, data: bytes | Clock) -> None:
         if name == CLOCK and self._clock is not None:
             self._clock.publish(data)
             return
         self._publishers[name].publish(data)
         self._sent[name] += 1
 
-    def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes]]:
-        """Log time (ns), topic and CDR of every message of that span in order, those of the clock among them."""
+    def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
+        """Log time (ns), topic and message (in CDR, or a Clock) of all that is published in that span, in order."""
         tick, period = first, round(rate / self._clock_rate / NANO) if self._clock_rate else 0
         for name, stamp, data, _ in read_both(self._session, self._types):
             if not first <= stamp < end:
                 continue
             while period and tick <= stamp:
-                yield tick, CLOCK, clock_message(tick)
+                yield tick, CLOCK, _clock_at(tick)
                 tick += period
             yield stamp, name, data
+
+
+def _clock_at(stamp: int) -> Clock:
+    """The message for ``/clock`` at a time, ns."""
+    return Clock(clock=Time(sec=stamp // SECOND, nanosec=stamp % SECOND))

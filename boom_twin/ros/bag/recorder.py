@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import rclpy
@@ -19,63 +20,60 @@ from std_srvs.srv import Trigger
 from ...bag.async_writer import Storage
 from ...bag.writer import LARGEST_MESSAGE
 from ...config.settings import Settings, Thresholds
+from ...diagnostics.levels import Evaluation
 from ...diagnostics.recorder_status import RecordingJudge, TopicState
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
-from .subscriptions import Wanted, subscription_of
+from .subscriptions import RequestedTopic, subscription_of
 
 NAMES = ("scene", *Settings.model_fields)
 
 
-class RemoteParameters:
-    """Asks the node ``boom_twin`` once, as soon as it is there; `node` is the one that asks."""
-
-    def __init__(self, node: Node) -> None:
-        self._client = AsyncParameterClient(node, NODE)
-        self._answer: Future | None = None
-        self._is_told = False
-
-    def look(self) -> Mapping[str, object]:
-        """The values by name, once; empty at any other time. Never waits."""
-        if self._answer is None:
-            if self._client.services_are_ready():
-                self._answer = self._client.get_parameters(list(NAMES))
-            return {}
-        if self._is_told or not self._answer.done():
-            return {}
-        self._is_told = True
-        pairs = zip(NAMES, self._answer.result().values, strict=False)
-        return {name: value for name, each in pairs if (value := parameter_value_to_python(each)) is not None}
-
-
-class RemoteText:
-    """Asks the node ``boom_twin`` once, as soon as it is configured, for a text that its model was built from.
+class RemoteValue:
+    """Asks another node once, as soon as it is there, and never waits.
 
     Parameters
     ----------
-    node : Node
-        That asks.
-    name : str
-        Of the service: scene or baseline, see `boom_twin.ros.node.services.Services`.
+    is_ready : callable
+        Whether the service is there.
+    ask : callable
+        Sends the request.
+    read : callable
+        Gives the value of the response.
     """
 
-    def __init__(self, node: Node, name: str) -> None:
-        self._client = node.create_client(Trigger, f"{NODE}/{name}")
+    def __init__(self, is_ready: Callable[[], bool], ask: Callable[[], Future], read: Callable[[Any], Any]) -> None:
+        self._is_ready, self._ask, self._read = is_ready, ask, read
         self._answer: Future | None = None
         self._is_told = False
 
-    def look(self) -> str:
-        """The text, once; empty at any other time. Never waits."""
+    def poll(self) -> Any:
+        """The value, once; None at any other time."""
         if self._answer is None:
-            if self._client.service_is_ready():
-                self._answer = self._client.call_async(Trigger.Request())
-            return ""
-        if self._is_told or not self._answer.done():
-            return ""
+            self._answer = self._ask() if self._is_ready() else None
+        if self._is_told or self._answer is None or not self._answer.done():
+            return None
         self._is_told = True
-        return str(self._answer.result().message)
+        return self._read(self._answer.result())
+
+
+def twin_values(node: Node) -> dict[str, RemoteValue]:
+    """What the node ``boom_twin`` tells the node that asks: its ``parameters``, and by the services' names its `TEXTS`."""
+
+    def read_parameters(response: Any) -> dict[str, object]:
+        pairs = zip(NAMES, response.values, strict=False)
+        return {name: value for name, each in pairs if (value := parameter_value_to_python(each)) is not None}
+
+    client = AsyncParameterClient(node, NODE)
+    ask = partial(client.get_parameters, list(NAMES))
+    found = {"parameters": RemoteValue(client.services_are_ready, ask, read_parameters)}
+    for name in TEXTS:
+        service = node.create_client(Trigger, f"{NODE}/{name}")
+        ask = partial(service.call_async, Trigger.Request())
+        found[name] = RemoteValue(service.service_is_ready, ask, lambda response: str(response.message))
+    return found
 
 
 NAME = "boom_twin_recorder"
@@ -110,7 +108,7 @@ class Count:
 class _Channel:
     """One topic while it is recorded."""
 
-    def __init__(self, wanted: Wanted, storage: Storage, tell: Callable[[str], None]) -> None:
+    def __init__(self, wanted: RequestedTopic, storage: Storage, tell: Callable[[str], None]) -> None:
         self.wanted, self._storage, self._tell = wanted, storage, tell
         self.subscription: Any = None
         self.count = Count(wanted.name)
@@ -185,13 +183,12 @@ class _Recording:
     """What is recorded, told on ``/diagnostics``."""
 
     def __init__(
-        self, node: Any, storage: Storage, wanted: Sequence[Wanted], thresholds: Thresholds, tell: Callable[[str], None]
+        self, node: Any, storage: Storage, wanted: Sequence[RequestedTopic], thresholds: Thresholds, tell: Callable[[str], None]
     ) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage, tell) for each in wanted]
-        self._board, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
-        self._parameters = RemoteParameters(node)
-        self._texts = {name: RemoteText(node, name) for name in TEXTS}
+        self._publisher, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self._twin_values = twin_values(node)
 
     def look(self) -> bool:
         """Subscribe to what has come up; whether every required topic has a publisher. BagError if the disk fails."""
@@ -202,19 +199,17 @@ class _Recording:
         return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
 
     def twin(self) -> dict[str, object]:
-        """What the twin has said of itself since the last look: `TEXTS` by name, its parameters as ``parameters``."""
-        found: dict[str, object] = {"parameters": self._parameters.look()}
-        found |= {name: text.look() for name, text in self._texts.items()}
-        return {name: value for name, value in found.items() if value}
+        """What the twin has said of itself since the last look, by the names of `twin_values`."""
+        return {name: value for name, each in self._twin_values.items() if (value := each.poll())}
 
     def tell(self, end: str | None = None) -> None:
         """Publish the state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * NANO
-        disk = self.storage.state()
-        self._board.show([self._judge.status(topics, disk, end, self._thresholds, time.monotonic(), clock)])
+        at = Evaluation(self._thresholds, time.monotonic(), clock)
+        self._publisher.show([self._judge.status(topics, self.storage.state(), end, at)])
         if end is not None:
-            self._board.settle()
+            self._publisher.settle()
 
 
 @contextmanager
@@ -230,11 +225,11 @@ def recorder_node() -> Iterator[Any]:
 def record(
     node: Any,
     storage: Storage,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[RequestedTopic],
     thresholds: Thresholds,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
-    meet: Callable[[Mapping[str, object]], None],
+    on_twin: Callable[[Mapping[str, object]], None],
 ) -> list[Count]:
     """Record until `stopped`. Log times are those of the reception.
 
@@ -244,14 +239,14 @@ def record(
         See `recorder_node`.
     storage : Storage
         Completed at the end.
-    wanted : sequence of Wanted
+    wanted : sequence of RequestedTopic
     thresholds : Thresholds
         Of the state on ``/diagnostics``.
     stopped : callable
         Asked after every message, and ten times a second.
     tell : callable
         Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
-    meet : callable
+    on_twin : callable
         Told what the twin says of itself, if there is one: its ``parameters``, and `TEXTS` by name.
 
     Returns
@@ -269,7 +264,7 @@ def record(
     recording = _Recording(node, storage, wanted, thresholds, tell)
     try:
         try:
-            _spin(recording, stopped, tell, meet)
+            _spin(recording, stopped, tell, on_twin)
         finally:
             written = storage.close()
         counts = [channel.finish(written) for channel in recording.channels]
@@ -287,7 +282,7 @@ def _spin(
     recording: _Recording,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
-    meet: Callable[[Mapping[str, object]], None],
+    on_twin: Callable[[Mapping[str, object]], None],
 ) -> None:
     """Receive until `stopped`."""
     executor = SingleThreadedExecutor()
@@ -302,7 +297,7 @@ def _spin(
                 is_complete = True
                 tell(COMPLETE)
             if told := recording.twin():
-                meet(told)
+                on_twin(told)
             if looks % LOOKS == 0:
                 recording.tell()
         executor.spin_once(timeout_sec=WAKE)

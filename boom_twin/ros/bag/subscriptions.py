@@ -9,7 +9,7 @@ from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from ...bag.metadata import Recorded, dump, offered_qos
+from ...bag.metadata import Recorded
 from ...bag.writer import recorded
 from ...config.yaml_text import plain, with_value
 from ...errors import UsageError
@@ -103,7 +103,7 @@ DEPTH = 4000
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class RequestedTopic:
     """One topic.
 
     Attributes
@@ -127,7 +127,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class TopicSubscription:
     """How a topic is subscribed to and how it stands in the bag."""
 
     kind: Any
@@ -135,7 +135,7 @@ class Found:
     recorded: Recorded
 
 
-def wanted_of(names: Sequence[str], known: Mapping[str, Topic]) -> list[Wanted]:
+def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
     """Topics from the words of a command line: ``NAME`` or ``NAME:package/msg/Name``.
 
     Parameters
@@ -149,7 +149,7 @@ def wanted_of(names: Sequence[str], known: Mapping[str, Topic]) -> list[Wanted]:
     UsageError
         A type is not installed, or a topic is named twice.
     """
-    found: dict[str, Wanted] = {}
+    found: dict[str, RequestedTopic] = {}
     for text in names:
         name, _, type_name = text.partition(":")
         name = "/" + name.lstrip("/")
@@ -159,11 +159,11 @@ def wanted_of(names: Sequence[str], known: Mapping[str, Topic]) -> list[Wanted]:
         if type_name:
             type_name = full_name(installed_class(type_name))
             topic = topic if topic is not None and topic.type == type_name else None
-        found[name] = Wanted(name, type_name or (topic.type if topic else None), topic)
+        found[name] = RequestedTopic(name, type_name or (topic.type if topic else None), topic)
     return list(found.values())
 
 
-def resolved(wanted: Wanted, node: Any) -> Wanted:
+def resolved(wanted: RequestedTopic, node: Any) -> RequestedTopic:
     """The topic by the name that it has in the namespace of `node`, with its remappings.
 
     A name private to the twin is taken to be that of the node ``boom_twin`` there.
@@ -190,7 +190,7 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
     return text
 
 
-def subscription_of(node: Any, wanted: Wanted) -> Found | None:
+def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | None:
     """How to subscribe; None as long as the type is not known.
 
     Raises
@@ -200,7 +200,7 @@ def subscription_of(node: Any, wanted: Wanted) -> Found | None:
     """
     if wanted.topic is not None:
         topic = wanted.topic
-        return Found(installed_class(topic.type), qos_profile(topic.qos, DEPTH), recorded(topic))
+        return TopicSubscription(installed_class(topic.type), qos_profile(topic.qos, DEPTH), recorded(topic))
     publishers = node.get_publishers_info_by_topic(wanted.name)
     types = {wanted.type} if wanted.type else {each.topic_type for each in publishers}
     if len(types) > 1:
@@ -208,8 +208,11 @@ def subscription_of(node: Any, wanted: Wanted) -> Found | None:
     if not publishers or not types:
         return None
     kind = installed_class(types.pop())
-    qos = _qos([each.qos_profile for each in publishers])
-    return Found(kind, qos_profile(qos, DEPTH), _recorded(wanted.name, kind, qos, publishers[0]))
+    type_name, qos = full_name(kind), _qos([each.qos_profile for each in publishers])
+    is_known = type_name in jazzy().types
+    type_hash = jazzy().hash_rihs01(type_name) if is_known else str(publishers[0].topic_type_hash)
+    described = Recorded.offered(wanted.name, type_name, definition_of(kind), qos, type_hash)
+    return TopicSubscription(kind, qos_profile(qos, DEPTH), described)
 
 
 def _qos(offered: list[QoSProfile]) -> Qos:
@@ -221,11 +224,3 @@ def _qos(offered: list[QoSProfile]) -> Qos:
         durability="transient_local" if is_kept else "volatile",
         depth=min(max(max(each.depth for each in offered), 1), 10_000),
     )
-
-
-def _recorded(name: str, kind: Any, qos: Qos, publisher: Any) -> Recorded:
-    type_name, offered = full_name(kind), offered_qos(qos)
-    known = type_name in jazzy().types
-    type_hash = jazzy().hash_rihs01(type_name) if known else str(publisher.topic_type_hash)
-    details = {"offered_qos_profiles": dump(offered), "topic_type_hash": type_hash}
-    return Recorded(name, type_name, definition_of(kind).encode(), details, offered, type_hash)

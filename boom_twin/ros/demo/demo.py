@@ -152,11 +152,11 @@ def main() -> int:
         if holds_file(args.bag / TRUTH):
             with open_received(args.bag / TRUTH) as truth:
                 write_atomic(recorded / TRUTH, truth.read())
-        card = score(recorded)
+        live = score(recorded)
         with result_folder(args.out / "replay", REPLAY, [recorded]) as building:
             again = replay_into(building, recorded, None)
             pictures = [path.name for path in draw(again, history_of(again.recording, taken.scene), building.folder)]
-        print("\n".join(card.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(card, again))))
+        print("\n".join(live.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(live, again))))
         for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
@@ -187,7 +187,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
 
     with ros([]):
         player = Player(session)
-        running.meet(player)
+        running.wait_for_discovery(player)
         with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
             for elapsed in running.play(player, duration):
                 bar.update(elapsed * NANO - bar.n)
@@ -197,11 +197,11 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
     return player.played.sent
 
 
-def _equal(card: DemoResult, again: Replay) -> int:
+def _equal(live: DemoResult, again: Replay) -> int:
     """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
     rows = again.recording.predictions
     replayed = dict(zip(rows.stamps.tolist(), map(tuple, rows.tip_position.tolist()), strict=True))
-    return sum(replayed.get(stamp) == position for stamp, position in card.positions.items())
+    return sum(replayed.get(stamp) == position for stamp, position in live.positions.items())
 
 
 if __name__ == "__main__":

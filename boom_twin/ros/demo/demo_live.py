@@ -53,8 +53,8 @@ def _play(args: Namespace, running: DemoProcesses) -> None:
     monitor = running.start("monitor", command, signal.SIGTERM)
     with ros([]):
         player = Player(scan(args.bag))
-        running.meet(player)
-        while not (found := re.search(r"open (http://\S+)", monitor.said())):
+        running.wait_for_discovery(player)
+        while not (found := re.search(r"open (http://\S+)", monitor.output())):
             running.check()
             time.sleep(0.1 * LOOK)
         print(f"open {found[1]} in a browser; Ctrl-C ends it", file=sys.stderr, flush=True)

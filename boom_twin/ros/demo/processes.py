@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from ...bag.async_writer import PATIENCE as DISK_PATIENCE
 from ...errors import BoomTwinError
-from ...system.child_process import python_command
+from ...system.child_process import end_process, python_command
 from ..isolation import isolated
 from ..startup import on_stop_signal
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 300.0
 """Seconds that the node may take to get ready; compiling takes up to a minute on a machine of its own."""
-PARTING = 2 * DISK_PATIENCE
+END_TIMEOUT = 2 * DISK_PATIENCE
 """Seconds that a process may take to end: longer than a recorder waits for its disk, or a slow disk would cost messages."""
 LOOK = 1.0
 """Seconds between looks at whether all have found each other."""
@@ -41,36 +41,31 @@ class DemoProcess:
         The module and its arguments.
     log : Path
         New.
-    parting : Signals
+    end_signal : Signals
         What ends it in order.
     lock : int
         Of the domain, see `boom_twin.ros.isolation.Isolation`: held as long as this runs, even if its parent is killed.
     """
 
-    def __init__(self, arguments: list[str], log: Path, parting: signal.Signals, lock: int) -> None:
-        self._name, self._log, self._parting = " ".join(arguments[:2]), log, parting
+    def __init__(self, arguments: list[str], log: Path, end_signal: signal.Signals, lock: int) -> None:
+        self._name, self._log, self._end_signal = " ".join(arguments[:2]), log, end_signal
         with _new(log) as file:
             command = python_command(*arguments)
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
-    def said(self) -> str:
+    def output(self) -> str:
         """All that it said so far."""
         return self._log.read_text(encoding="utf-8")
 
     def check(self) -> None:
         """Raise BoomTwinError if it has ended."""
         if self._process.poll() is not None:
-            last = (self.said().strip().splitlines() or ["nothing was said"])[-1]
+            last = (self.output().strip().splitlines() or ["nothing was said"])[-1]
             raise BoomTwinError(f"{self._name} ended with {self._process.returncode}: {last} (see {self._log})")
 
     def end(self) -> None:
         """Ask it to end, and wait until it has."""
-        self._process.send_signal(self._parting)
-        try:
-            self._process.wait(PARTING)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, END_TIMEOUT, self._end_signal)
 
 
 class DemoProcesses:
@@ -105,9 +100,9 @@ class DemoProcesses:
         record = ["boom_twin.cli.main", "record", "--out", str(self.recorded), "--origin", origin, "--scene", str(scene)]
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
-    def start(self, name: str, arguments: list[str], parting: signal.Signals) -> DemoProcess:
+    def start(self, name: str, arguments: list[str], end_signal: signal.Signals) -> DemoProcess:
         """Start one more."""
-        self._children.append(DemoProcess(arguments, self._beside(f"{name}.log"), parting, self._lock))
+        self._children.append(DemoProcess(arguments, self._beside(f"{name}.log"), end_signal, self._lock))
         return self._children[-1]
 
     def _beside(self, name: str) -> Path:
@@ -134,17 +129,17 @@ class DemoProcesses:
 
         return player.play(duration=duration, is_held=is_held)
 
-    def meet(self, player: Player) -> None:
+    def wait_for_discovery(self, player: Player) -> None:
         """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
         from ..bag.recorder import COMPLETE
 
         print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
         end = time.monotonic() + PATIENCE
-        while player.wait(LOOK, LISTENERS, self.check) or COMPLETE not in self._recorder.said():
+        while player.wait(LOOK, LISTENERS, self.check) or COMPLETE not in self._recorder.output():
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
-        player.refuse_rivals()
+        player.refuse_other_publishers()
 
     def end(self) -> None:
         """End all, the last first."""

@@ -160,14 +160,14 @@ class Diagnostics:
         self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        self._board = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
+        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._scene, self._joints = "", 0
-        self._strangers: dict[Stream, list[str]] = {}
+        self._other_boom_names: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
 
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
@@ -175,7 +175,7 @@ class Diagnostics:
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
         self._counts = {"samples": twin.counts, "messages": decoder.oddities}
-        self._scene, self._joints, self._strangers = scene, twin.plan.joints, decoder.strangers
+        self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()
 
     def tune(self, thresholds: Thresholds) -> None:
@@ -223,7 +223,7 @@ class Diagnostics:
         peers = self._peers
         others, received = self._other_booms(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        self._board.show(self._watch.look(told, self._active, *ends, clock, received, others))
+        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others))
         self._tell_oddities()
         self._tell_clock(clock)
 
@@ -231,9 +231,9 @@ class Diagnostics:
         """The inputs that named cylinders or joints of another boom since the last look, in words."""
         found = {
             stream: told_beyond(self._inputs[stream], names, stream, self._joints, self._scene)
-            for stream, names in self._strangers.items()
+            for stream, names in self._other_boom_names.items()
         }
-        self._strangers.clear()
+        self._other_boom_names.clear()
         return found
 
     def _tell_oddities(self) -> None:

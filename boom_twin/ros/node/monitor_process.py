@@ -9,12 +9,12 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ...messages.topic_table import NODE, Topics
-from ...system.child_process import python_command
+from ...system.child_process import end_process, python_command
 from ..bag.recorder import TEXTS
 
 LOOK = 1.0
 """Seconds of steady time between looks at whether it still runs."""
-PARTING = 1.0
+END_TIMEOUT = 1.0
 """Seconds that it may take to end."""
 
 
@@ -50,12 +50,7 @@ class MonitorProcess:
     def close(self) -> None:
         """End it."""
         self._timer.destroy()
-        self._process.terminate()
-        try:
-            self._process.wait(PARTING)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, END_TIMEOUT)
 
     def _look(self) -> None:
         code = self._process.poll()

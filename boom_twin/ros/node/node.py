@@ -11,7 +11,7 @@ from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, T
 from rclpy.subscription import Subscription
 
 from ...bag.session_model import scene_from
-from ...config.settings import Settings
+from ...config.settings import Settings, Thresholds
 from ...errors import BoomTwinError
 from ...messages.cdr_decoder import CdrDecoder
 from ...messages.mapping import load_mapping
@@ -25,9 +25,9 @@ from ..log import Log
 from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
-from .parameters import baseline_of, baseline_text, declare, guard, mapping_path, scene_path, settings_of, thresholds_of
+from .parameters import baseline_of, baseline_text, current, declare, guard, path_of
 from .receive_queue import ReceiveQueue
-from .services import Services, Started
+from .services import Services, StartLog
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -53,10 +53,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         declare(self)
-        self._topics = load_mapping(mapping_path(self))
+        self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
         self._diagnostics = Diagnostics(self, self._topics, self.queue)
-        self._diagnostics.tune(thresholds_of(self))
+        self._diagnostics.tune(current(self, Thresholds))
         guard(self, lambda: self._twin is not None, self._tune)
 
     @property
@@ -109,7 +109,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen no more."""
         self.queue.catch_up()
-        self._go_quiet()
+        self._stop_listening()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -119,14 +119,14 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of everything, from whatever state."""
-        self._go_quiet()
+        self._stop_listening()
         self._discard()
         self.finished = True
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of everything; the node can be configured anew."""
-        self._go_quiet()
+        self._stop_listening()
         self._discard()
         return super().on_error(state)
 
@@ -137,12 +137,12 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _build(self) -> None:
         """Scene and settings to a compiled twin."""
-        found = scene_from(scene_path(self))
+        found = scene_from(path_of(self, "scene"))
         scene, name = found.scene, found.source
         for oddity in found.oddities:
             self._log.warning(str(oddity))
-        settings, joints = settings_of(self), len(scene.joints)
-        topics = load_mapping(mapping_path(self), joints)
+        settings, joints = current(self, Settings), len(scene.joints)
+        topics = load_mapping(path_of(self, "mapping"), joints)
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
@@ -150,20 +150,20 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._encoder = ReportEncoder(scene, settings)
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
-        self._asked = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
-        self._started = Started(self._log)
+        self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
+        self._start_log = StartLog(self._log)
         self._diagnostics.watch(twin, self._decoder, name)
         self._log.info("model ready")
 
     def _tune(self, live: dict[str, float]) -> None:
         """Live parameters were set."""
-        self._diagnostics.tune(thresholds_of(self))
+        self._diagnostics.tune(current(self, Thresholds))
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
             self.queue.catch_up()
             self._twin.requests.tune(asked)
 
-    def _go_quiet(self) -> None:
+    def _stop_listening(self) -> None:
         self._diagnostics.stop()
         while self._subscriptions_in:
             self.destroy_subscription(self._subscriptions_in.pop())
@@ -175,7 +175,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
         if self._twin is not None:
-            self._asked.close()
+            self._twin_services.close()
         self._twin = None
         if self._page is not None:
             self._page.close()
@@ -183,11 +183,11 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     # -- one message --------------------------------------------------------------------------------------------------
 
-    def _receive(self, streams: list[Stream], wire: CdrDecoder, data: bytes) -> None:
+    def _receive(self, streams: list[Stream], decoder: CdrDecoder, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
         for stream in streams:
             try:
-                self._take(stream, *wire.read(data))
+                self._take(stream, *decoder.read(data))
             except Exception as error:  # the last resort, such as a message that is not whole
                 self._diagnostics.broken(stream, error)
 
@@ -198,6 +198,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._diagnostics.took(*step)
             for each in step.report.all:
                 if each.change is not None:
-                    self._started.tell(each, each.change)
+                    self._start_log.tell(each, each.change)
                 for key, encoded in self._encoder.fill(each):
                     self._outputs[key].publish(encoded)

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ...config.settings import Settings, Thresholds, settings_from, thresholds_from
+from ...config.settings import Settings, Table, Thresholds, checked
 from ...errors import UsageError
 from ...health.baseline import Baseline, load_baseline
 from ..runtime import one_line
@@ -81,8 +80,8 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
             reason = f"{', '.join(refused)}: {FIXED}. Deactivate and clean it up first."
             return SetParametersResult(successful=False, reason=reason)
         try:
-            settings_from(_only(Settings, values), SOURCE)
-            thresholds_from(_only(Thresholds, values), SOURCE)
+            for table in (Settings, Thresholds):
+                checked(table, {name: value for name, value in values.items() if name in table.model_fields}, SOURCE)
         except UsageError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -96,46 +95,26 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
     node.add_post_set_parameters_callback(apply)
 
 
-def _only(table: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in values.items() if name in table.model_fields}
-
-
-def scene_path(node: Node) -> Path | None:
-    """The scene to load; None = the package's own."""
-    text: str = node.get_parameter("scene").value
-    return Path(text) if text else None
-
-
-def mapping_path(node: Node) -> Path | None:
-    """The mapping to load; None = the package's own."""
-    text: str = node.get_parameter("mapping").value
+def path_of(node: Node, name: str) -> Path | None:
+    """The path in the parameter ``scene``, ``mapping`` or ``baseline``; None = the package's own."""
+    text: str = node.get_parameter(name).value
     return Path(text) if text else None
 
 
 def baseline_of(node: Node) -> Baseline | None:
     """What the rig's health is judged by; None if it is not to be judged. UsageError if the file cannot be used."""
-    return load_baseline(_baseline_path(node)) if node.get_parameter("health").value else None
+    return load_baseline(path_of(node, "baseline")) if node.get_parameter("health").value else None
 
 
 def baseline_text(node: Node) -> dict[str, str]:
     """The text of that file under ``baseline``; nothing if it is the package's own, or none is used."""
-    path = _baseline_path(node)
+    path = path_of(node, "baseline")
     return {"baseline": path.read_text(encoding="utf-8-sig")} if path and node.get_parameter("health").value else {}
 
 
-def _baseline_path(node: Node) -> Path | None:
-    text: str = node.get_parameter("baseline").value
-    return Path(text) if text else None
-
-
-def settings_of(node: Node) -> Settings:
-    """The settings as the parameters stand; UsageError if a value is out of bounds."""
-    return settings_from({name: node.get_parameter(name).value for name in Settings.model_fields}, SOURCE)
-
-
-def thresholds_of(node: Node) -> Thresholds:
-    """The thresholds of ``/diagnostics`` as the parameters stand."""
-    return thresholds_from({name: node.get_parameter(name).value for name in Thresholds.model_fields}, SOURCE)
+def current(node: Node, table: type[Table]) -> Table:
+    """`Settings` or `Thresholds` as the parameters stand; UsageError if a value is out of bounds."""
+    return checked(table, {name: node.get_parameter(name).value for name in table.model_fields}, SOURCE)
 
 
 def _descriptor(row: ParameterRow) -> ParameterDescriptor:

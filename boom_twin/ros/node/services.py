@@ -103,12 +103,12 @@ def _tell(text: str, request: Any, response: Any) -> Any:
     return response
 
 
-BETWEEN = 1.0
+LOG_PERIOD = 1.0
 """Least time (s) between starts that are told: a source whose clock jumps at every sample does not fill the log."""
 
 
-class Started:
-    """Tells what changed.
+class StartLog:
+    """Logs from when on the model goes on with other settings, zeros or from rest.
 
     Parameters
     ----------
@@ -118,14 +118,14 @@ class Started:
     def __init__(self, log: Log) -> None:
         self._log = log
         self._before: dict[str, float] | None = None
-        self._told = -BETWEEN
+        self._told = -LOG_PERIOD
 
     def tell(self, report: Report, change: Change) -> None:
         """Log one line on a report that has a change."""
         now = {**change.settings, **{f"zero of {name}": value for name, value in change.zeros.items()}}
         before, self._before = now if self._before is None else self._before, now
         words = [f"{name} {value:g}" for name, value in now.items() if before.get(name) != value]
-        if not words and time.monotonic() < self._told + BETWEEN:
+        if not words and time.monotonic() < self._told + LOG_PERIOD:
             return
         if not report.accepted:
             words.insert(0, f"could not start: {report.status}")
