@@ -13,7 +13,7 @@ from mcap.records import Chunk, ChunkIndex, Message
 
 from ..messages.message_block import MessageBlock, gather, joined
 from ..system.received_files import open_received
-from .mcap_records import MESSAGE_HEAD, UnpackBudget, bounds, chunk_at, fault_named_by_times, outer_records, record_of, unpack
+from .mcap_records import MESSAGE_HEAD, UnpackBudget, bounds, chunk_at, fault_named_by_times, inner_record, outer_records, unpack
 
 TOGETHER = 2**30
 """Bytes of messages that are held together, where the file does not keep them in order, at most."""
@@ -113,5 +113,5 @@ def _bodies(content: bytes) -> list[int]:
         if opcode == _MESSAGE and end - start >= MESSAGE_HEAD.size:
             found.append(start)
         else:
-            record_of(opcode, content[start:end])  # refuses one that is not whole
+            inner_record(opcode, content[start:end])  # refuses one that is not whole
     return found

@@ -246,7 +246,7 @@ def chunk_at(file: BinaryIO, index: ChunkIndex) -> Chunk:
 def _content(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
     """The messages and definitions inside a chunk, its checksum verified."""
     with fault_named_by_times(chunk):
-        return [record for opcode, body in parts(unpack(chunk, budget)) if (record := record_of(opcode, body)) is not None]
+        return [record for opcode, body in parts(unpack(chunk, budget)) if (record := inner_record(opcode, body)) is not None]
 
 
 @contextmanager
@@ -259,7 +259,7 @@ def fault_named_by_times(chunk: Chunk) -> Iterator[None]:
         raise McapError(f"chunk with log times {span}: {error}") from error
 
 
-def record_of_message(opcode: int, body: bytes) -> McapRecord | None:
+def inner_record(opcode: int, body: bytes) -> McapRecord | None:
     """A message, a channel or a schema from the body of its record; None for any other record."""
     if opcode == Opcode.MESSAGE:
         return message_of(body)
