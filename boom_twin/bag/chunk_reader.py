@@ -13,7 +13,16 @@ from mcap.records import Chunk, ChunkIndex, Message
 
 from ..messages.message_block import MessageBlock, gather, joined
 from ..system.received_files import open_received
-from .mcap_records import MESSAGE_HEAD, UnpackBudget, bounds, chunk_at, fault_named_by_times, inner_record, outer_records, unpack
+from .mcap_records import (
+    MESSAGE_HEAD,
+    UnpackBudget,
+    bounds,
+    chunk_at,
+    fault_named_by_times,
+    inner_record,
+    outer_records,
+    unpack,
+)
 
 TOGETHER = 2**30
 """Bytes of messages that are held together, where the file does not keep them in order, at most."""
