@@ -139,7 +139,7 @@ class Runner:
             self.resting[boom] = at_rest(rig, self.problem.scene, motion.first, *boom)
         scheme = rig.Scheme(kept=case.kept, tolerance=case.tolerance)
         count = round(motion.duration / case.step)
-        efforts = []
+        efforts: list[Any] = []
         while not efforts or (len(efforts) < REPEATS and efforts[-1].seconds < BRIEF):
             columns, effort = rig.move(self.resting[boom], motion, motion.duration, case.step, ROW, scheme)
             efforts.append(effort)
