@@ -97,7 +97,8 @@ def _wanted(file: McapFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock
 
 def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
     """The blocks of all files by log time; at equal times in the order of the files."""
-    waiting = [next(file, None) for file in files]
+    filling = [(block for block in file if len(block)) for file in files]
+    waiting = [next(file, None) for file in filling]
     while filled := [(number, block) for number, block in enumerate(waiting) if block is not None]:
         last, first = min((block.log_times[-1], number) for number, block in filled)
         due = []
@@ -108,4 +109,4 @@ def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
                 due.append(block.chosen(slice(0, end)))
                 waiting[number] = block.chosen(slice(end, None))
         yield joined([block for block in due if len(block)])
-        waiting[first] = next(files[first], None)
+        waiting[first] = next(filling[first], None)

@@ -61,6 +61,8 @@ def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
     """The messages of all blocks by log time; those of equal times as they stand, a block after the other."""
     if len(blocks) == 1:
         return _by_log_time(blocks[0])
+    if not blocks:
+        return MessageBlock(b"", *(np.zeros(0, kind) for kind in (np.int64, np.uint64, np.int64, np.int64)))
     content = b"".join(block.data(row) for block in blocks for row in range(len(block)))
     ends = np.cumsum(np.concatenate([block.ends - block.starts for block in blocks]))
     starts = np.concatenate([[0], ends[:-1]])

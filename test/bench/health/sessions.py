@@ -30,7 +30,7 @@ from boom_twin.validation.rig import Programme, Scheme, Sensors, Session, at_res
 from boom_twin.validation.rig.faults import spoil, with_faults
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)
-STEP_OF_PLAY, SCHEME_OF_PLAY = 2e-3, Scheme(modified=False)
+STEP_OF_PLAY, SCHEME_OF_PLAY = 2e-3, Scheme(kept=0)
 NICE = 10
 AT_ONCE = 20  # sessions of one process: what Exudyn does not give back, its end does
 

@@ -18,7 +18,7 @@ from boom_twin.validation.study.error import problem as error_problem
 from boom_twin.validation.study.error import report as error
 from boom_twin.validation.study.error import runner as error_run
 from boom_twin.validation.study.error.cases import Own, Peer, Stiff, own_cases, peer_cases, stiff_cases, with_modes
-from boom_twin.validation.study.error.pareto_tables import Match, better, fastest, front, matches, order
+from boom_twin.validation.study.error.pareto_tables import Match, better, fastest, fastest_at_step, front, matches, order
 from boom_twin.validation.study.error.problem import Problem, pose
 from boom_twin.validation.study.error.runner import Row, Runner
 
@@ -63,7 +63,7 @@ def test_rows_are_complete(content):
 
 def test_witnesses_agree(content):
     """Exudyn extrapolated, finite segments, and the transfer-matrix boom with many shapes: one motion."""
-    assert content["references_differ"]["tip_mm"] < 0.1
+    assert content["references_differ"]["tip_mm"] < 0.005  # shear as of GA = 10 EA would be 0.016 mm
     assert content["references_differ"]["acceleration"] < 1e-3
     assert min(row["own_mm"] for row in rows_of(content, program="exudyn")) < 1.5
     assert min(row["own_mm"] for row in rows_of(content, program="scipy")) < 1.5
@@ -87,14 +87,14 @@ def test_front_is_a_front(content, measure):
 
 def test_same_step_is_compared(content):
     duel = content["same_step"]
-    assert duel["step_s"] == 1e-3 and duel["elements"] == 4
+    assert duel["step_s"] == 1e-3 and duel["elements"] in (2, 4) and "tangent kept for 1 pass" in duel["exudyn_method"]
     assert duel["ratio_of_minima"] == pytest.approx(min(duel["exudyn_s"]) / min(duel["boom_twin_s"]))
     assert duel["ratio_of_minima"] > 5.0
 
 
 def test_text_and_pictures(report):
     text = (report / "error.md").read_text()
-    for part in ("## The default", "Pareto front", "At equal error", "Exudyn, 4 elements", "SciPy Radau", "surrogates"):
+    for part in ("## The default", "Pareto front", "At equal error", "Exudyn, 4 elements, lumped", "SciPy Radau", "surrogates"):
         assert part in text
     assert "nan" not in text and "What failed" not in text
     from matplotlib.image import imread
@@ -136,17 +136,17 @@ def test_failures_are_rows(problem, monkeypatch):
     refused = runner.row(Own(3e-3))
     assert refused.status.startswith("UsageError: duration") and not refused.good
     monkeypatch.setattr(error_run, "load_rig", lambda: (None, "no exudyn"))
-    assert runner.row(Peer(1e-3, 4, True, 1e-6)).status == "RuntimeError: no exudyn"
+    assert runner.row(Peer(1e-3, 4, 1, 1e-3)).status == "RuntimeError: no exudyn"
     assert "645" not in runner.row(Stiff(1, 1e-3, "Radau")).status
     assert "coordinates" in runner.row(Stiff(20, 1e-3, "Radau")).status
 
 
-def test_rounds_give_the_median(problem, monkeypatch):
+def test_rounds_give_the_fastest(problem, monkeypatch):
     runner, turns = Runner(problem), iter([3.0, 9.0, 1.0, 2.0, 5.0])
     monkeypatch.setattr(runner, "row", lambda case: Row(case, 1.0, 0.1, seconds=next(turns)))
     ticks = []
     (row,) = runner.rows([Own()], 5, lambda: ticks.append(1))
-    assert row.seconds == 3.0 and len(ticks) == 5
+    assert row.seconds == 1.0 and len(ticks) == 5
 
 
 def made(seconds, wrong, acceleration=0.1, case=None):
@@ -164,10 +164,24 @@ def test_front_and_fastest_of_made_up_rows():
 
 
 def test_equal_error_of_made_up_rows():
-    peer = Peer(1e-3, 4, True, 1e-6)
+    peer = Peer(1e-3, 4, 1, 1e-3)
     found = {match.most: match for match in matches([made(0.5, 0.9), made(0.1, 2.0), made(5.0, 0.8, case=peer)])}
     assert found[0.3].ratio is None and found[1.0].ratio == pytest.approx(10.0) and found[3.0].ratio == pytest.approx(50.0)
     assert Match(1.0, None, None).ratio is None
+
+
+def test_equal_step_is_met_by_the_fastest_that_is_exact_enough():
+    exact, fast, wrong = (Peer(1e-3, n, 1, 1e-3) for n in (8, 4, 2))
+    rows = [made(0.3, 0.1, case=exact), made(0.2, 0.25, case=fast), made(0.1, 0.9, case=wrong), made(0.01, 0.1)]
+    assert fastest_at_step(rows, 1e-3) is rows[1] and fastest_at_step(rows, 2e-3) is None
+    assert fastest_at_step(rows, 1e-3, 1.0) is rows[2]
+
+
+def test_labels_tell_the_peers_apart():
+    labels = {case.label for case in peer_cases(False)}
+    assert len(labels) == 4 * 6 + 3 * 3
+    assert "Exudyn, 1 element, lumped, tangent kept for 1 pass, tolerance 0.001" in labels
+    assert "Exudyn, 16 elements, tangent anew, tolerance 0.001" in labels
 
 
 def test_order_of_made_up_rows():

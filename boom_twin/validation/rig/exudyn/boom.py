@@ -2,7 +2,8 @@
 
 The model shares no equation with the twin. Every node holds absolute x, y and rotation in the base's axes; the rigid
 root and head of a section sit on the end nodes of its beam, so they add no unknowns. A part that the scene does not
-name has no mass here; massless links stay as bodies, held by as many constraints as they have unknowns.
+name has no mass here; massless links stay as bodies, held by as many constraints as they have unknowns. A lumped boom
+has no bodies for cylinders and two-force links; see `lumped_masses`.
 
 Sources: J. Simo and L. Vu-Quoc, "On the dynamics of flexible beams under large overall motions - the plane case",
 J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything that is solved.
@@ -15,12 +16,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from ....errors import UsageError
 from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
 from ....types import Array
 from . import masses
+from .lumped_masses import lump_masses
+from .masses import Lump, Lumps
 from .module import exudyn, items
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
-from .system import Boom, BuiltSection, Frame, Station, gravity_in_base, section_frames, six_bar_points
+from .six_bar import Link, six_bar
+from .system import Boom, BuiltSection, Frame, Station, gravity_in_base, section_frames
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
@@ -28,27 +33,31 @@ SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default
 
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
     """Section `index` (0-based) of about `elements` finite elements; a rigid frame carries every cylinder pin."""
+    borne = boom.lumps.sections[index] if boom.lumps else {}
     if not boom.scene.is_flexible(index):
-        mass = masses.gather(masses.rigid_section(boom.scene, index), 0.0)
-        return BuiltSection(None, [_station(boom, frame, 0.0, mass)])
+        return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
     section = boom.scene.sections[index]
     assert section.beam is not None
     inside = _bracket_places(boom.scene, index)
-    root = masses.gather(masses.flexible_root(boom.scene, section), section.beam[0])
-    head = masses.gather(masses.flexible_head(boom.scene, index), section.beam[1])
-    none = masses.gather([], 0.0)
-    stations = [_station(boom, frame, section.beam[0], root)]
-    stations += [_station(boom, frame, x, none) for x in inside]
-    stations.append(_station(boom, frame, section.beam[1], head))
+    places = [section.beam[0], *inside, section.beam[1]]
+    own = [masses.flexible_root(boom.scene, section), *([] for _ in inside), masses.flexible_head(boom.scene, index)]
+    near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
+    stations = [
+        _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])
+        for number, (x, lumps) in enumerate(zip(places, own, strict=True))
+    ]
     for start, end in pairwise(stations):
         share = (end.x - start.x) / (section.beam[1] - section.beam[0])
         _beam_part(boom, frame, index, (start, end), max(1, round(elements * share)))
     return BuiltSection(section.beam, stations)
 
 
-def _station(boom: Boom, frame: Frame, x: float, mass: masses.Gathered) -> Station:
+def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
+    """A rigid frame with its `own` masses and with what it bears for its neighbours."""
+    mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
+    weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
-    return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia), frame.angle)
+    return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia, weight), frame.angle)
 
 
 def _bracket_places(scene: Scene, index: int) -> list[float]:
@@ -74,7 +83,7 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
     inner = [boom.node(frame.point((float(x), 0.0)), frame.angle) for x in places[1:-1]]
     nodes = [ends[0].node, *inner, ends[1].node]
     length = float(places[1] - places[0])
-    shear = shear_stiffness(axial, bending, length if boom.nodally_exact else 0.0)
+    shear = shear_stiffness(boom.shear_over_axial * axial, bending, length if boom.nodally_exact else 0.0)
     for pair in pairwise(nodes):
         beam = boom.system.AddObject(
             items.ObjectBeamGeometricallyExact2D(
@@ -93,15 +102,15 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
         boom.weigh(int(beam))
 
 
-def shear_stiffness(axial: float, bending: float, length: float) -> float:
-    """Shear stiffness (N) of an element: the beam's, in series with 12 EI / `length`^2.
+def shear_stiffness(shear: float, bending: float, length: float) -> float:
+    """Shear stiffness (N) of an element: the beam's, `shear`, in series with 12 EI / `length`^2.
 
     An element of constant curvature lacks the bending of a constant shear force, whose flexibility is length^2 / 12 EI. Given
     back as shear, it makes nodes of a straight beam exact under loads at nodes; a `length` of 0 leaves it out.
 
     Source: R. MacNeal, "A simple quadrilateral shell element", Computers & Structures 8 (1978), residual bending flexibility.
     """
-    return 1.0 / (1.0 / (SHEAR_OVER_AXIAL * axial) + length**2 / (12.0 * bending))
+    return 1.0 / (1.0 / shear + length**2 / (12.0 * bending))
 
 
 def add_pivot(boom: Boom, index: int) -> None:
@@ -125,6 +134,9 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
         ends = np.array(boom.scene.base.cylinder_pin), frames[0].point(place)
     else:
         barrel_pin, rod_pin, ends = _six_bar(boom, frames, index)
+    if boom.lumps:
+        _drive(boom, cylinder, (barrel_pin, rod_pin), stroke)
+        return
     worn = pin_with_play(boom.scene, index)
     rod_end = _cylinder_part(boom, cylinder.rod, (rod_pin, barrel_pin), (ends[1], ends[0]), worn)
     _drive(boom, cylinder, (barrel_pin, rod_end), stroke)
@@ -133,27 +145,33 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
 
 def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tuple[Array, Array]]:
     """Links of a B joint; gives the markers of barrel pin and rod pin with their places."""
-    joint, carrier, turned = boom.scene.joints[index], boom.sections[index - 1], boom.sections[index]
-    length, place = boom.scene.sections[index - 1].length, six_bar_points(boom.scene, frames, index)
-    assert joint.C and joint.D and joint.E and joint.lL and joint.lR
-    left, left_frame = _link(boom, joint.mL or 0.0, joint.lL, place["D"], place["Q"])
-    right, right_frame = _link(boom, joint.mR or 0.0, joint.lR, place["Q"], place["E"])
-    boom.pin(boom.point(carrier.head, (length + joint.D[0], joint.D[1])), boom.marker(left, (-joint.lL / 2, 0.0)))
-    boom.pin(boom.marker(left, (joint.lL / 2, 0.0)), boom.marker(right, (-joint.lR / 2, 0.0)))
-    boom.pin(boom.marker(right, (joint.lR / 2, 0.0)), boom.point(turned.root, joint.E))
-    along, aside = joint.R or (joint.lL, 0.0)  # B1 has no R: its rod pin is Q
-    link, frame, half = (right, right_frame, joint.lR / 2) if joint.kind == "B3" else (left, left_frame, joint.lL / 2)
-    local = (along - half, aside)
-    bracket = (length + joint.C[0], joint.C[1])
-    barrel_pin = boom.point(carrier.at(bracket[0]), bracket)
-    return barrel_pin, boom.marker(link, local), (place["C"], frame.point(local))
+    linkage, carrier, turned = six_bar(boom.scene, frames, index), boom.sections[index - 1], boom.sections[index]
+    if boom.lumps:
+        bearing = _link(boom, linkage.bearing, boom.lumps.links[index])
+    else:
+        left, right = _link(boom, linkage.left), _link(boom, linkage.right)
+        bearing = right if linkage.bears_right else left
+    hinge, turned_hinge = boom.point(carrier.head, linkage.hinge), boom.point(turned.root, linkage.turned_hinge)
+    if boom.lumps:
+        near, far = (turned_hinge, hinge) if linkage.bears_right else (hinge, turned_hinge)
+        boom.pin(near, boom.marker(bearing, linkage.bearing.outer))
+        boom.rod(boom.marker(bearing, linkage.bearing.apex), far, linkage.two_force.length)
+    else:
+        boom.pin(hinge, boom.marker(left, linkage.left.outer))
+        boom.pin(boom.marker(left, linkage.left.apex), boom.marker(right, linkage.right.apex))
+        boom.pin(boom.marker(right, linkage.right.outer), turned_hinge)
+    barrel_pin = boom.point(carrier.at(linkage.bracket[0]), linkage.bracket)
+    ends = frames[index - 1].point(linkage.bracket), linkage.bearing.frame.point(linkage.rod_pin)
+    return barrel_pin, boom.marker(bearing, linkage.rod_pin), ends
 
 
-def _link(boom: Boom, mass: float, length: float, start: Array, end: Array) -> tuple[int, Frame]:
-    """A uniform rod with its frame in its middle, x along it."""
-    middle = (start + end) / 2
-    frame = Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
-    return boom.body(boom.node(middle, frame.angle), mass, (0.0, 0.0), mass * length**2 / 12), frame
+def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
+    """Body of a link, with what it bears for its neighbours."""
+    node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
+    if borne is None:
+        return boom.body(node, link.mass, link.lump.com, link.lump.inertia)
+    mass, weight = (masses.gather([link.lump, *lumps], 0.0) for lumps in (borne.inertia, borne.weight))
+    return boom.body(node, mass.mass, mass.com, mass.inertia, weight)
 
 
 def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float) -> None:
@@ -200,7 +218,14 @@ def _cylinder_part(
     return own if worn else pins[0]
 
 
-def build(scene: Scene, strokes: Array, elements: int = 16, nodally_exact: bool = False) -> Boom:
+def build(
+    scene: Scene,
+    strokes: Array,
+    elements: int = 16,
+    nodally_exact: bool = False,
+    lumped: bool = False,
+    shear_over_axial: float = SHEAR_OVER_AXIAL,
+) -> Boom:
     """The undeformed boom with its drives at absolute `strokes` (m), shape (n,); sensors may still be added.
 
     Parameters
@@ -209,18 +234,26 @@ def build(scene: Scene, strokes: Array, elements: int = 16, nodally_exact: bool 
         Finite elements per flexible section, at least one per part between cylinder brackets.
     nodally_exact : bool
         Whether few elements bend as many do; see `sections.shear_stiffness`.
+    lumped : bool
+        Whether cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
+    shear_over_axial : float
+        GA over EA.
 
     Raises
     ------
     UsageError
-        The scene has pins with clearance other than of rods, or on a rod without mass.
+        The scene has pins with clearance other than of rods, on a rod without mass, or in a lumped boom.
     """
     refuse_other_pins(scene)
+    if lumped and any(pin_with_play(scene, index) is not None for index in range(len(scene.joints))):
+        raise UsageError("clearance.pins: a rod pin with clearance needs the rod as a body. Build the boom with lumped=False.")
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))
-    boom = Boom(scene, container, system, [*gravity_in_base(scene), 0.0], ground, nodally_exact)
     frames = section_frames(scene, strokes)
+    lumps = lump_masses(scene, frames, strokes) if lumped else None
+    gravity = [*gravity_in_base(scene), 0.0]
+    boom = Boom(scene, container, system, gravity, ground, nodally_exact, shear_over_axial, lumps)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))
         add_pivot(boom, index)

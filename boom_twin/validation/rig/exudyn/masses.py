@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ....scene.schema import Point, RigidPart, Scene, Section
 
@@ -23,6 +23,44 @@ class Gathered:
     mass: float
     com: Point
     inertia: float
+
+
+@dataclass(slots=True)
+class Lumps:
+    """What a body bears for its neighbours: lumps that resist acceleration, and lumps that weigh."""
+
+    inertia: list[Lump] = field(default_factory=list)
+    weight: list[Lump] = field(default_factory=list)
+
+    def both(self, lump: Lump) -> None:
+        """Add a lump that does both."""
+        self.inertia.append(lump)
+        self.weight.append(lump)
+
+
+@dataclass(frozen=True, slots=True)
+class LumpedMasses:
+    """What bodies bear for cylinders and links that are no bodies.
+
+    Attributes
+    ----------
+    sections : list of dict
+        Of every section, by the place x (m) of the pin; in the section's axes.
+    links : list of Lumps
+        On the bearing link of every joint, in its axes.
+    """
+
+    sections: list[dict[float, Lumps]]
+    links: list[Lumps]
+
+    @classmethod
+    def none(cls, count: int) -> LumpedMasses:
+        """No lumps yet, for `count` sections."""
+        return cls([{} for _ in range(count)], [Lumps() for _ in range(count)])
+
+    def on_section(self, index: int, x: float) -> Lumps:
+        """What section `index` (0-based) bears at `x` (m)."""
+        return self.sections[index].setdefault(x, Lumps())
 
 
 def gather(lumps: list[Lump], reference_x: float) -> Gathered:

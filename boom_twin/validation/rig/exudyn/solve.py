@@ -16,7 +16,7 @@ import numpy as np
 from ....errors import SolverError, UsageError
 from ....scene.schema import Scene
 from ....types import Array
-from .boom import build
+from .boom import SHEAR_OVER_AXIAL, build
 from .module import exudyn
 from .probes import Probes, attach, read
 from .stepping import Effort, Scheme, step_through
@@ -143,9 +143,16 @@ class Resting:
     forces: Array
 
 
-def at_rest(scene: Scene, strokes: Array, elements: int, nodally_exact: bool = False) -> Resting:
+def at_rest(
+    scene: Scene,
+    strokes: Array,
+    elements: int,
+    nodally_exact: bool = False,
+    lumped: bool = False,
+    shear_over_axial: float = SHEAR_OVER_AXIAL,
+) -> Resting:
     """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest; see `build`."""
-    boom = build(scene, strokes, elements, nodally_exact)
+    boom = build(scene, strokes, elements, nodally_exact, lumped, shear_over_axial)
     probes = attach(boom)
     settle(boom, strokes)
     return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])

@@ -16,6 +16,7 @@ from .module import exudyn
 from .system import Boom
 
 STEP_FORCE = 1e-6  # N, absolute tolerance of a step
+FEW = 3  # passes with a kept tangent, below which tangents are many
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +27,16 @@ class Scheme:
     ----------
     rho : float
         Spectral radius at infinite frequency.
-    modified : bool
-        Keep the tangent over many steps (Exudyn's modified Newton), or make it anew in every pass.
+    kept : int
+        Passes that a step may take with the tangent of earlier steps (Exudyn's modified Newton) before it is made anew;
+        0 makes it in every pass, 9 is Exudyn's own choice.
     tolerance : float
-        Relative, of a step; Exudyn's rounding allows no less than 1e-6.
+        Of a step, relative to its residual without accelerations and constraint forces; Exudyn's rounding allows no less
+        than 1e-6.
     """
 
     rho: float = 0.8
-    modified: bool = True
+    kept: int = 9
     tolerance: float = 1e-6
 
 
@@ -44,7 +47,7 @@ class Effort:
     Attributes
     ----------
     seconds : float
-        Wall time of Exudyn's stepping alone.
+        CPU time of Exudyn's stepping alone.
     feeding : float
         Of which in the Python function that hands the drives their lengths.
     passes, tangents : int
@@ -62,7 +65,7 @@ def step_through(boom: Boom, strokes: Array, rates: Array, step: float, output_s
     count = len(strokes) - 1
     feeding = _feed(boom, strokes, rates, step)
     settings = _settings(count, step, output_step, scheme)
-    begun = time.perf_counter()
+    begun = time.process_time()
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             boom.system.SolveDynamic(settings)
@@ -70,7 +73,7 @@ def step_through(boom: Boom, strokes: Array, rates: Array, step: float, output_s
         raise SolverError(
             f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
         ) from failure
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     counted = boom.system.sys["dynamicSolver"].it
     return Effort(seconds, feeding[0], int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
 
@@ -78,12 +81,12 @@ def step_through(boom: Boom, strokes: Array, rates: Array, step: float, output_s
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
     """The sparse solver was the fastest from 4 elements a section on, and as fast as the dense ones below.
 
-    A tangent that is made anew in every pass keeps at least the pattern of its factors.
+    A tangent that is made often keeps at least the pattern of its factors.
     """
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
     settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
-    settings.linearSolver.reuseAnalyzedPattern = not scheme.modified
+    settings.linearSolver.reuseAnalyzedPattern = scheme.kept < FEW
     settings.solution.sensors.writePeriod = output_step
     time_integration = settings.timeIntegration
     time_integration.numberOfSteps, time_integration.endTime = count, count * step
@@ -91,30 +94,29 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
     time_integration.verboseMode = 0
     newton = time_integration.newton
     newton.relativeTolerance, newton.absoluteTolerance = scheme.tolerance, STEP_FORCE
-    newton.useModifiedNewton = scheme.modified
+    newton.useModifiedNewton = scheme.kept > 0
+    newton.maxModifiedNewtonIterations = max(0, scheme.kept - 1)
     time_integration.generalizedAlpha.spectralRadius = scheme.rho
     time_integration.generalizedAlpha.computeInitialAccelerations = False  # at rest they are zero
     return settings
 
 
 def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
-    """Before every step, hand the drives that move their lengths and rates at its end; returns the seconds it takes.
+    """Before every step, hand the drives that move their lengths without force at its end; returns the seconds it takes.
 
     All drives get those of the start at once. Pins with play note then whether they touch.
     """
     closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
-    lengths, speeds = (strokes + closed).tolist(), rates.tolist()
-    last = [[float("nan")] * 2 for _ in boom.drives]
+    rests = [_rests(boom, i, strokes[:, i] + closed[i], rates[:, i]) for i in range(len(boom.drives))]
+    moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
+    last = [float("nan")] * len(moving)
     spent = [0.0]
 
     def hand_over(row: int) -> None:
-        for i, (drive, name) in enumerate(boom.drives):
-            now = [lengths[row][i], speeds[row][i]]
-            if now != last[i]:
-                last[i] = now
-                boom.system.SetObjectParameter(drive, name, now[0])
-                if name == "referenceLength":
-                    boom.system.SetObjectParameter(drive, "velocityOffset", now[1])
+        for i, (drive, name, rest) in enumerate(moving):
+            if rest[row] != last[i]:
+                last[i] = rest[row]
+                boom.system.SetObjectParameter(drive, name, rest[row])
 
     def before_step(_: Any, at: float) -> bool:
         begun = time.perf_counter()
@@ -124,8 +126,16 @@ def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
         spent[0] += time.perf_counter() - begun
         return True
 
-    hand_over(0)
+    for (drive, name), rest in zip(boom.drives, rests, strict=True):
+        boom.system.SetObjectParameter(drive, name, rest[0])
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
     return spent
+
+
+def _rests(boom: Boom, index: int, lengths: Array, rates: Array) -> list[float]:
+    """Lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
+    cylinder = boom.scene.joints[index].cylinder
+    lead = 0.0 if cylinder.k is None else (cylinder.d or 0.0) / cylinder.k
+    return [float(rest) for rest in lengths + lead * rates]

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ....scene.kinematics import joint_angles_of_strokes
-from ....scene.schema import Joint, Point, Scene
+from ....scene.schema import Point, Scene
 from ....types import Array
+from .masses import Gathered, LumpedMasses
 from .module import items
 from .pin_clearance import Bush
 
@@ -62,6 +63,10 @@ class Boom:
     sections : list of BuiltSection
     nodally_exact : bool
         Whether a straight, lightly bent beam is exact at its nodes however few they are.
+    shear_over_axial : float
+        GA over EA.
+    lumps : LumpedMasses or None
+        Masses of cylinders and two-force links, where these are no bodies.
     drives : list of (int, str)
         Connector of each cylinder, and the name of its length parameter.
     bushes : list of Bush
@@ -74,6 +79,8 @@ class Boom:
     gravity: list[float]
     ground: int
     nodally_exact: bool
+    shear_over_axial: float
+    lumps: LumpedMasses | None
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)
     bushes: list[Bush] = field(default_factory=list)
@@ -101,12 +108,19 @@ class Boom:
         """A new node with three unknowns."""
         return int(self.system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*place, angle])))
 
-    def body(self, node: int, mass: float, com: Point, inertia: float) -> int:
-        """A rigid body on a node; inertia (kg m^2) about the NODE."""
+    def rod(self, one: int, other: int, length: float) -> None:
+        """Two markers keep their distance."""
+        self.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[one, other], distance=length))
+
+    def body(self, node: int, mass: float, com: Point, inertia: float, weight: Gathered | None = None) -> int:
+        """A rigid body on a node; inertia (kg m^2) about the NODE. Its mass weighs where it is, or as `weight` says."""
         body = int(
             self.system.AddObject(items.ObjectRigidBody2D(mass=mass, inertia=inertia, centerOfMass=[*com], nodeNumber=node))
         )
-        if mass > 0.0:
+        if weight is not None:
+            load = [weight.mass * part for part in self.gravity]
+            self.system.AddLoad(items.LoadForceVector(markerNumber=self.marker(body, weight.com), loadVector=load))
+        elif mass > 0.0:
             self.weigh(body)
         return body
 
@@ -129,6 +143,12 @@ class Frame:
         c, s = math.cos(self.angle), math.sin(self.angle)
         return np.array([self.x + c * local[0] - s * local[1], self.y + s * local[0] + c * local[1]])
 
+    def local(self, place: Array) -> Array:
+        """Coordinates (2,) in the section's axes of a point given in the base's."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        x, y = place[0] - self.x, place[1] - self.y
+        return np.array([c * x + s * y, c * y - s * x])
+
 
 def gravity_in_base(scene: Scene) -> Point:
     """Gravity (m/s^2) in the axes of the base, which its inclination turns anticlockwise."""
@@ -145,23 +165,3 @@ def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
         frames.append(Frame(float(origin[0]), float(origin[1]), float(angle)))
         origin = frames[-1].point((section.length, 0.0))
     return frames
-
-
-def six_bar_points(scene: Scene, frames: list[Frame], index: int) -> dict[str, Array]:
-    """Points C, D, E, Q (m, base axes) of the six-bar at joint `index` (0-based)."""
-    joint: Joint = scene.joints[index]
-    length = scene.sections[index - 1].length
-    assert joint.C and joint.D and joint.E and joint.lL and joint.lR
-    c = frames[index - 1].point((length + joint.C[0], joint.C[1]))
-    d = frames[index - 1].point((length + joint.D[0], joint.D[1]))
-    e = frames[index].point(joint.E)
-    return {"C": c, "D": d, "E": e, "Q": _left_apex(d, e, joint.lL, joint.lR)}
-
-
-def _left_apex(start: Array, end: Array, from_start: float, from_end: float) -> Array:
-    """Third corner, left of start->end, of the triangle with these two sides (law of cosines)."""
-    base = end - start
-    span = float(np.hypot(*base))
-    opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))
-    heading = math.atan2(base[1], base[0]) + opening
-    return start + from_start * np.array([math.cos(heading), math.sin(heading)])

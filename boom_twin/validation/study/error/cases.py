@@ -20,9 +20,11 @@ INTEGRATORS = (
     Method("houbolt", 0.0),
     Method("park", 0.0),
 )
-ELEMENTS = (2, 4, 8, 16)
 EXUDYN_STEPS = STEPS[1:]
-SCHEMES = ((True, 1e-6), (True, 1e-3), (False, 1e-3))  # keep the tangent or not, tolerance
+LUMPED_ELEMENTS = (1, 2, 3, 4)
+LUMPED_SCHEMES = ((1, 1e-3), (1, 5e-4), (1, 3e-4), (2, 3e-3), (2, 1e-3), (0, 1e-3))  # passes with a kept tangent, tolerance
+ELEMENTS = (4, 8, 16)
+SCHEMES = ((1, 1e-4), (2, 1e-3), (0, 1e-3))
 FINENESS = (1, 2, 4)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 
@@ -66,18 +68,24 @@ PAPERS = Own(method=Method("newmark", 0.5, passes=1, product="plain"), modes=3, 
 
 @dataclass(frozen=True)
 class Peer:
-    """Exudyn's geometrically exact beams, generalised-alpha."""
+    """Exudyn's geometrically exact beams, generalised-alpha; see `rig.Scheme` for `kept`, `rig.exudyn` for `lumped`."""
 
     step: float
     elements: int
-    modified: bool
+    kept: int
     tolerance: float
+    lumped: bool = True
+
+    @property
+    def model(self) -> str:
+        """How the boom is made."""
+        return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property
     def label(self) -> str:
         """All but the step."""
-        tangent = "tangent kept" if self.modified else "tangent anew"
-        return f"Exudyn, {self.elements} elements, {tangent}, tolerance {self.tolerance:g}"
+        times = {0: "anew", 1: "kept for 1 pass"}.get(self.kept, f"kept for {self.kept} passes")
+        return f"{self.model}, tangent {times}, tolerance {self.tolerance:g}"
 
 
 @dataclass(frozen=True)
@@ -134,10 +142,14 @@ def _variants() -> Iterator[Own]:
 
 
 def peer_cases(quick: bool) -> list[Peer]:
-    """Elements and steps with every way to solve a step that may be the fastest."""
-    elements, steps = ((2, 4), EXUDYN_STEPS[1:5]) if quick else (ELEMENTS, EXUDYN_STEPS)
-    schemes = SCHEMES[:1] if quick else SCHEMES
-    return [Peer(step, n, *scheme) for n in elements for scheme in schemes for step in steps]
+    """Elements and steps with every way to solve a step that may be the fastest; with bodies for all parts where that shows."""
+    if quick:
+        return [Peer(step, n, *LUMPED_SCHEMES[0]) for n in LUMPED_ELEMENTS[1::2] for step in EXUDYN_STEPS[1:5]]
+    kinds = ((LUMPED_ELEMENTS, LUMPED_SCHEMES, EXUDYN_STEPS[1:], True), (ELEMENTS, SCHEMES, EXUDYN_STEPS, False))
+    return [
+        Peer(step, n, *scheme, lumped) for elements, schemes, steps, lumped in kinds
+        for n in elements for scheme in schemes for step in steps
+    ]  # fmt: skip
 
 
 def stiff_cases(quick: bool) -> list[Stiff]:

@@ -10,7 +10,7 @@ from ....plots.style import TONES
 from ....scene.schema import Scene
 from .cases import PAPERS, Case, Own, Peer, Stiff
 from .default_choice import find
-from .pareto_tables import Measure, acceleration, best_way, front, of, tip
+from .pareto_tables import Measure, acceleration, front, of, tip
 from .problem import Problem
 from .runner import Row
 
@@ -18,7 +18,7 @@ PAPERS_NAME = "as in the papers"
 
 
 def main_panels(problem: Problem, rows: Sequence[Row]) -> tuple[Panel, Panel]:
-    """Tip and acceleration, all programs; of Exudyn's ways to solve a step, the fastest at each number of elements."""
+    """Tip and acceleration, all programs; of Exudyn's ways to solve a step, the front for each way to make the boom."""
     apart = problem.apart or (None, None)
     percent: Measure = lambda row: 100.0 * acceleration(row)  # noqa: E731
     return (
@@ -33,15 +33,15 @@ def main_panels(problem: Problem, rows: Sequence[Row]) -> tuple[Panel, Panel]:
 def _panel(title: str, label: str, rows: Sequence[Row], error: Measure, floor: float | None) -> Panel:
     default = find(rows, Own())
     chosen = None if default is None or not default.good else (default.seconds, error(default))
-    curves = [_curve(group, error) for group in _groups(rows)]
+    curves = [_curve(group, error) for group in _groups(rows, error)]
     return Panel(title, label, tuple(curves), tuple((r.seconds, error(r)) for r in front(rows, error)), chosen, floor)
 
 
-def _groups(rows: Sequence[Row]) -> list[list[Row]]:
+def _groups(rows: Sequence[Row], error: Measure) -> list[list[Row]]:
     """Rows of one curve each."""
     own = list(_by_label(of(rows, Own)).values())
     stiff = [group for label, group in _by_label(of(rows, Stiff)).items() if "Radau" in label]
-    return [*own, *_exudyn(of(rows, Peer)), *stiff]
+    return [*own, *_exudyn(of(rows, Peer), error), *stiff]
 
 
 def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
@@ -52,17 +52,11 @@ def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
     return groups
 
 
-def _exudyn(rows: Sequence[Row]) -> list[list[Row]]:
-    """One curve per number of elements: at every step its best way."""
-    curves = []
-    cases = [row.case for row in rows if isinstance(row.case, Peer)]
-    for elements in sorted({case.elements for case in cases}):
-        curve = []
-        for step in sorted({case.step for case in cases}):
-            best = best_way(rows, elements, step)
-            curve += [best] if best is not None else []
-        curves += [curve] if curve else []
-    return curves
+def _exudyn(rows: Sequence[Row], error: Measure) -> list[list[Row]]:
+    """One curve per way to make the boom: the front of all ways to solve its steps."""
+    models = dict.fromkeys(row.case.model for row in rows if isinstance(row.case, Peer))
+    groups = [[row for row in rows if isinstance(row.case, Peer) and row.case.model == model] for model in models]
+    return [curve for curve in (front(group, error) for group in groups) if curve]
 
 
 def _curve(rows: list[Row], error: Measure) -> Curve:
@@ -84,7 +78,7 @@ def _notes(rows: list[Row]) -> tuple[str, ...]:
         return tuple(f"{1e3 * row.case.step:g} ms" if isinstance(row.case, Own) else "" for row in rows)
     if isinstance(case, Own):
         return ()
-    text = f"{case.elements}" if isinstance(case, Peer) else f"{4 * case.fineness}"
+    text = f"{case.elements}{' l' if case.lumped else ''}" if isinstance(case, Peer) else f"{4 * case.fineness}"
     slowest = max(range(len(rows)), key=lambda i: rows[i].seconds)
     return tuple(text if i == slowest else "" for i in range(len(rows)))
 

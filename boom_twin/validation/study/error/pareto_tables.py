@@ -46,10 +46,9 @@ def of(rows: Sequence[Row], kind: type) -> list[Row]:
     return [row for row in rows if isinstance(row.case, kind)]
 
 
-def best_way(rows: Sequence[Row], elements: int, step: float) -> Row | None:
-    """Exudyn's fastest way to solve a step that errs at the tip at most a tenth more than its best, None if none ran."""
-    here = [row for row in rows if isinstance(row.case, Peer) and (row.case.elements, row.case.step) == (elements, step)]
-    return fastest(here, SAME * min((row.tip_mm for row in here if row.good), default=0.0))
+def fastest_at_step(rows: Sequence[Row], step: float, most: float = EQUAL[0]) -> Row | None:
+    """Exudyn's fastest row of a step (s) that errs at the tip at most `most` (mm), None if there is none."""
+    return fastest([row for row in of(rows, Peer) if isinstance(row.case, Peer) and row.case.step == step], most)
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def matches(rows: Sequence[Row], kind: type = Peer) -> list[Match]:
 
 @dataclass(frozen=True)
 class Duel:
-    """The default against a case of Exudyn at its step, run in turn: wall seconds per simulated second of all runs."""
+    """The default against a case of Exudyn at its step, run in turn: CPU seconds per simulated second of all runs."""
 
     case: Peer
     own: tuple[float, ...]
@@ -136,7 +135,7 @@ def name(case: Case) -> str:
 
 
 def run_time(row: Row | None) -> float | None:
-    """Wall milliseconds per simulated second."""
+    """CPU milliseconds per simulated second."""
     return None if row is None else 1e3 * row.seconds
 
 

@@ -1,0 +1,78 @@
+"""Masses of cylinders and of two-force links, lumped on the bodies that they are pinned to.
+
+A boom without bodies for them is held by 10 pins and rods instead of 29 pins and guides, which most of a step's time goes into.
+Weights act at the pins by the law of the lever. Of what resists acceleration, a barrel turns with the section that carries it
+(the first one's about its pin on the base), a rod is two masses at the cylinder's pins, a two-force link is half its mass at
+either end. Everything is placed for the strokes at which the boom is built.
+
+Of the default boom in the motion of the error study, all this is 0.08 mm of the tip and 0.4 % of its acceleration.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....scene.schema import CylinderPart, Point, Scene
+from ....types import Array
+from .masses import Lump, LumpedMasses
+from .six_bar import SixBar, six_bar
+from .system import Frame
+
+NO_PART = CylinderPart(mass=0.0, inertia=0.0, com=0.0)
+
+
+def lump_masses(scene: Scene, frames: list[Frame], strokes: Array) -> LumpedMasses:
+    """Lumps of all cylinders and two-force links, for straight sections at `frames` and `strokes` (m), shape (n,)."""
+    found = LumpedMasses.none(len(frames))
+    for index, joint in enumerate(scene.joints):
+        length = joint.cylinder.closed_length + float(strokes[index])
+        if index == 0:
+            _first_cylinder(found, scene, length)
+        else:
+            linkage = six_bar(scene, frames, index)
+            _two_force_link(found, linkage, index)
+            _cylinder(found, scene, frames, linkage, index, length)
+    return found
+
+
+def _first_cylinder(found: LumpedMasses, scene: Scene, length: float) -> None:
+    """Cylinder on the base: seen from its rod pin, masses at their distances from the barrel pin."""
+    cylinder, place = scene.joints[0].cylinder, scene.sections[0].rod_pin
+    assert place is not None
+    barrel, rod = cylinder.barrel or NO_PART, cylinder.rod or NO_PART
+    inertia = weight = 0.0
+    for part, distance in ((barrel, barrel.com), (rod, length - rod.com)):
+        inertia += (part.inertia + part.mass * distance**2) / length**2
+        weight += part.mass * distance / length
+    at = found.on_section(0, place[0])
+    at.inertia.append(Lump(inertia, place, 0.0))
+    at.weight.append(Lump(weight, place, 0.0))
+
+
+def _two_force_link(found: LumpedMasses, linkage: SixBar, index: int) -> None:
+    link = linkage.two_force
+    place = linkage.hinge if linkage.bears_right else linkage.turned_hinge
+    found.on_section(index - 1 if linkage.bears_right else index, place[0]).both(Lump(link.mass / 2, place, 0.0))
+    found.links[index].both(Lump(link.mass / 2, linkage.bearing.apex, 0.0))
+
+
+def _cylinder(found: LumpedMasses, scene: Scene, frames: list[Frame], linkage: SixBar, index: int, length: float) -> None:
+    """Cylinder of a six-bar, between a bracket of the section before the joint and the bearing link."""
+    cylinder = scene.joints[index].cylinder
+    barrel, rod = cylinder.barrel or NO_PART, cylinder.rod or NO_PART
+    bracket, link = found.on_section(index - 1, linkage.bracket[0]), found.links[index]
+    bracket.inertia.append(Lump(barrel.mass, _barrel_centre(frames[index - 1], linkage, barrel.com), barrel.inertia))
+    far = barrel.mass * barrel.com / length
+    bracket.weight.append(Lump(barrel.mass - far, linkage.bracket, 0.0))
+    link.weight.append(Lump(far, linkage.rod_pin, 0.0))
+    far = rod.mass * rod.com / length
+    bracket.both(Lump(far, linkage.bracket, 0.0))
+    link.both(Lump(rod.mass - far, linkage.rod_pin, 0.0))
+
+
+def _barrel_centre(carrier: Frame, linkage: SixBar, distance: float) -> Point:
+    """Centre of a barrel, `distance` (m) from its pin towards the rod pin, in the axes of the section that carries it."""
+    pin = carrier.point(linkage.bracket)
+    axis = linkage.bearing.frame.point(linkage.rod_pin) - pin
+    x, y = carrier.local(pin + distance * axis / float(np.hypot(*axis)))
+    return float(x), float(y)

@@ -1,0 +1,101 @@
+"""Six-bar linkage of a B joint: where its links lie, and which of them bears the rod pin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....scene.schema import Point, Scene
+from ....types import Array
+from .masses import Lump
+from .system import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A uniform rod with its frame in its middle: mass (kg), length (m), and its pins in its own axes (m).
+
+    Attributes
+    ----------
+    apex, outer : Point
+        Pin that it shares with the other link, pin on its section.
+    """
+
+    mass: float
+    length: float
+    frame: Frame
+    apex: Point
+    outer: Point
+
+    @property
+    def lump(self) -> Lump:
+        """Its mass about its middle."""
+        return Lump(self.mass, (0.0, 0.0), self.mass * self.length**2 / 12)
+
+
+@dataclass(frozen=True, slots=True)
+class SixBar:
+    """Both links, and the cylinder's pins.
+
+    Attributes
+    ----------
+    bears_right : bool
+        Whether the right link bears the rod pin.
+    rod_pin : Point
+        m, in the axes of the link that bears it.
+    bracket, hinge : Point
+        Barrel pin and pin of the left link, m, in the axes of the section before the joint.
+    turned_hinge : Point
+        Pin of the right link, m, in the axes of the section that the joint turns.
+    """
+
+    left: Link
+    right: Link
+    bears_right: bool
+    rod_pin: Point
+    bracket: Point
+    hinge: Point
+    turned_hinge: Point
+
+    @property
+    def bearing(self) -> Link:
+        """The link that bears the rod pin."""
+        return self.right if self.bears_right else self.left
+
+    @property
+    def two_force(self) -> Link:
+        """The other link."""
+        return self.left if self.bears_right else self.right
+
+
+def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
+    """Linkage of joint `index` (0-based) between straight sections at `frames`."""
+    joint, length = scene.joints[index], scene.sections[index - 1].length
+    assert joint.C and joint.D and joint.E and joint.lL and joint.lR
+    hinge = (length + joint.D[0], joint.D[1])
+    start, end = frames[index - 1].point(hinge), frames[index].point(joint.E)
+    apex = _left_apex(start, end, joint.lL, joint.lR)
+    half_left, half_right = (joint.lL / 2, 0.0), (joint.lR / 2, 0.0)
+    left = Link(joint.mL or 0.0, joint.lL, _between(start, apex), half_left, (-joint.lL / 2, 0.0))
+    right = Link(joint.mR or 0.0, joint.lR, _between(apex, end), (-joint.lR / 2, 0.0), half_right)
+    bears_right = joint.kind == "B3"
+    along, aside = joint.R or (joint.lL, 0.0)  # B1 has no R: its rod pin is the apex
+    rod_pin = (along - (half_right if bears_right else half_left)[0], aside)
+    return SixBar(left, right, bears_right, rod_pin, (length + joint.C[0], joint.C[1]), hinge, joint.E)
+
+
+def _between(start: Array, end: Array) -> Frame:
+    """Frame in the middle of two places, x from the first to the second."""
+    middle = (start + end) / 2
+    return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
+
+
+def _left_apex(start: Array, end: Array, from_start: float, from_end: float) -> Array:
+    """Third corner, left of start->end, of the triangle with these two sides (law of cosines)."""
+    base = end - start
+    span = float(np.hypot(*base))
+    opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))
+    heading = math.atan2(base[1], base[0]) + opening
+    return start + from_start * np.array([math.cos(heading), math.sin(heading)])
