@@ -100,14 +100,14 @@ def follow(
     span, first = (float(times[0]), float(times[-1])), np.concatenate([start, np.zeros(size)])
     seconds: list[float] = []
     while not seconds or (len(seconds) < repeats and sum(seconds) < LONG):
-        begun = time.process_time()
+        begun = time.thread_time()
         try:
             found = solve_ivp(rates, span, first, solver, t_eval=times, rtol=tolerance, atol=absolute, jac=slopes)
         except np.linalg.LinAlgError:
             raise SolverError("the mass matrix is singular: a part can move without any mass. Give it one.") from None
         if not found.success:
             raise SolverError(f"{solver} stopped at t = {found.t[-1]:g} s: {found.message}. Take another tolerance.")
-        seconds.append(time.process_time() - begun)
+        seconds.append(time.thread_time() - begun)
     rows = [_row(equations, at, state[:size], state[size:]) for at, state in zip(times, found.y.T, strict=True)]
     tip, acceleration, joints, forces = (np.array(column) for column in zip(*rows, strict=True))
     return Followed(tip, acceleration, joints, forces, min(seconds), int(found.nfev), size)
