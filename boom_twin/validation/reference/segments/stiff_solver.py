@@ -91,9 +91,9 @@ def follow(
     equations, start = Equations(scene, drive, fineness), _start(scene, drive(float(times[0]))[0], angles, fineness)
     seconds: list[float] = []
     while not seconds or (len(seconds) < repeats and sum(seconds) < LONG):
-        begun = time.process_time()
+        begun = time.thread_time()
         found = _solved(equations, start, times, tolerance, solver)
-        seconds.append(time.process_time() - begun)
+        seconds.append(time.thread_time() - begun)
     rows = [_row(equations, at, state[:size], state[size:]) for at, state in zip(times, found.y.T, strict=True)]
     tip, acceleration, joints, forces = (np.array(column) for column in zip(*rows, strict=True))
     return SegmentMotion(tip, acceleration, joints, forces, min(seconds), int(found.nfev), size)
