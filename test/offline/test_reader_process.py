@@ -239,14 +239,47 @@ def test_a_message_that_cannot_be_decoded_is_told_as_the_first_one(tmp_path: Pat
     compare(tmp_path / "bag", topics, expected)
 
 
+USUAL = {"names": ["cylinder_2", "cylinder_1"], "count": 2, "frame": "", "little": True, "effort": 0}
+
+
+def strokes(rows: int) -> list[Entry]:
+    """Messages that are laid out alike."""
+    rig, topic = Rig(np.random.default_rng(1), odd=0.0), load_topics().inputs[Stream.STROKES]
+    return [(log, topic.absolute, rig.message(topic.type, log, USUAL)) for log in range(START, START + STEP * rows, STEP)]
+
+
+def test_a_length_behind_the_numbers_is_not_passed_over(tmp_path: Path) -> None:
+    topics, entries = load_topics(), strokes(100)
+    log, name, data = entries[70]
+    entries[70] = (log, name, data[:-4] + b"\xff\xff\xff\x7f")
+    write(tmp_path / "bag", [entries], FILES[3:4], topics)
+    expected = Expected(tmp_path / "bag", [entries], topics)
+    assert f"at log time {log} ns" in expected.error
+    with pytest.raises(BagError) as caught:
+        list(items_of(tmp_path / "bag", topics, [topics.inputs[Stream.STROKES].name], JOINTS))
+    assert str(caught.value) == expected.error
+
+
+def test_a_message_at_fault_is_told_before_a_chunk_that_comes_later(tmp_path: Path) -> None:
+    topics, entries = load_topics(), strokes(50)
+    log, name, data = entries[3]
+    entries[3] = (log, name, data[:-9])
+    write(tmp_path / "bag", [entries], FILES[:1], topics)
+    file = tmp_path / "bag" / "session_0.mcap"
+    whole = file.read_bytes()
+    last = whole.rindex(b"cylinder_1")
+    file.write_bytes(whole[:last] + b"cylinder_3" + whole[last + 10 :])
+    with pytest.raises(BagError, match=f"at log time {log} ns"):
+        list(items_of(tmp_path / "bag", topics, [topics.inputs[Stream.STROKES].name], JOINTS))
+
+
 def test_a_topic_is_decoded_by_itself_only_where_its_layout_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Else the reader takes four times as long."""
     topics, decoded = load_topics(), list[int]()
     rig = Rig(np.random.default_rng(1), odd=0.0)
-    layout = {"names": ["cylinder_2", "cylinder_1"], "count": 2, "frame": "", "little": True, "effort": 0}
     entries = []
     for row in range(1000):
-        layout = layout | {"frame": "base_link" if row >= 500 else ""}
+        layout = USUAL | {"frame": "base_link" if row >= 500 else ""}
         for topic in topics.inputs.values():
             log = START + STEP * row
             entries.append((log, topic.absolute, rig.message(topic.type, log, layout)))
