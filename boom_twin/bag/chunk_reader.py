@@ -11,7 +11,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, Message
 
-from ..messages.message_block import MessageBlock, gather, joined
+from ..messages.message_block import MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
 from .mcap_records import (
     MESSAGE_HEAD,
@@ -29,6 +29,9 @@ TOGETHER = 2**30
 MOST_TOGETHER = 2**22
 """Messages, likewise: an empty one takes ten times its bytes."""
 
+ENOUGH = 256
+"""Messages in a block, at least, where the next ones come after them."""
+
 _LENGTH = 8
 """Bytes of a record's length, right before its body."""
 _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
@@ -43,8 +46,25 @@ _LOOSE, _LARGE = 256, 2**16
 def message_blocks(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[MessageBlock]:
     """All messages by log time, at equal times in the order of the file; their sources are their channels.
 
-    Only chunks that overlap in time are held together, as one block; without an index of chunks, the whole file is.
+    Only chunks that overlap in time are held together, and some small ones; without an index of chunks, the whole file is.
     """
+    waiting: list[MessageBlock] = []
+    try:
+        for block in _groups(path, chunks):
+            waiting.append(block)
+            if sum(map(len, waiting)) >= ENOUGH:
+                yield joined(waiting)
+                waiting = []
+    except Exception:
+        if waiting:
+            yield joined(waiting)  # what comes before the fault
+        raise
+    if waiting:
+        yield joined(waiting)
+
+
+def _groups(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[MessageBlock]:
+    """The messages of chunks that overlap in time, or of the whole file, by log time."""
     if not chunks:
         yield _held(_outside_and_inside(path))
         return
@@ -78,7 +98,7 @@ def _held(found: Iterable[MessageBlock]) -> MessageBlock:
         if size > TOGETHER or count > MOST_TOGETHER:
             raise McapError(f"more than {TOGETHER} bytes or {MOST_TOGETHER} messages are out of order, or without an index")
         blocks.append(block)
-    return joined(blocks)
+    return by_log_time(joined(blocks))
 
 
 def _outside_and_inside(path: Path) -> Iterator[MessageBlock]:

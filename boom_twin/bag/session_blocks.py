@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..errors import BagError
-from ..messages.message_block import MessageBlock, joined
+from ..messages.message_block import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from .chunk_reader import message_blocks
 from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
@@ -108,5 +108,5 @@ def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
                 end = int(np.searchsorted(block.log_times, last, side))
                 due.append(block.chosen(slice(0, end)))
                 waiting[number] = block.chosen(slice(end, None))
-        yield joined([block for block in due if len(block)])
+        yield by_log_time(joined([block for block in due if len(block)]))
         waiting[first] = next(filling[first], None)

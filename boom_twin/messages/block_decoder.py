@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -25,9 +26,9 @@ from .topic_table import TYPES, Topics
 
 FEW = 8
 """Messages of one topic in a block that are decoded one by one rather."""
-MOST_LAYOUTS = 4
+MOST_LAYOUTS = 8
 """Layouts of one topic that are tried on each of its blocks."""
-MOST_NEW = 2
+MOST_NEW = 4
 """Layouts of one topic that are learnt from one block: from messages that all differ there is nothing to learn."""
 
 
@@ -76,12 +77,8 @@ class _Known:
     oddities: list[str]
 
 
-class _Turn(NamedTuple):
-    """What is to do at a message: to count oddities for so many as it, or if that is 0, to decode it by itself."""
-
-    row: int
-    known: _Known | None
-    covers: int
+_Turn = tuple[int, _Known | None, int]
+"""A message, and what to do when it is its turn: count oddities for so many as it, or if that is 0, decode it by itself."""
 
 
 class BlockDecoder:
@@ -131,8 +128,8 @@ class BlockDecoder:
                     usual, values = self._read(known, block, rows, stamps[rows])
                     found += [(rows[usual], _of_stream(stream, stamps[rows[usual]], each[usual])) for stream, each in values]
                     if known.oddities and usual.any():
-                        turns.append(_Turn(int(rows[usual][0]), known, int(usual.sum())))
-                turns += [_Turn(row, known, 0) for row in rows[~usual].tolist()]
+                        turns.append((int(rows[usual][0]), known, int(usual.sum())))
+                turns += zip(rows[~usual].tolist(), repeat(known), repeat(0))
         found.append(self._one_by_one(block, sorted(turns, key=itemgetter(0)), stamps))
         rows, samples = np.concatenate([rows for rows, _ in found]), together([samples for _, samples in found])
         order = np.lexsort((samples.streams, rows))
@@ -151,10 +148,12 @@ class BlockDecoder:
             if known is None:
                 break
             alike = known.layout.are_of(block, left)
-            if alike.any():
+            if np.count_nonzero(alike) >= FEW:
                 met.append(known)
                 yield known, left[alike]
                 left = left[~alike]
+            elif new:  # hardly another message is like the one that was learnt from
+                break
         self._known[source] = [*met, *(known for known in before if known not in met)][:MOST_LAYOUTS]
         if len(left):
             yield None, left
@@ -201,18 +200,20 @@ class BlockDecoder:
 
     def _one_by_one(self, block: MessageBlock, turns: list[_Turn], stamps: Integers) -> tuple[Integers, SampleBlock]:
         """The samples of single messages, each with its message, whose stamps are filled in."""
-        rows, samples = list[int](), list[Sample]()
+        rows, samples, sources = list[int](), list[Sample](), block.sources.tolist() if turns else []
         for row, known, covers in turns:
-            if known is not None and covers:
+            if known is None:
+                message = self._decoded(block, row)
+                stamps[row] = stamp = stamp_of(message)
+            elif covers:
                 for name in known.oddities:
                     self.oddities[name] += covers
                 continue
-            message = self._decoded(block, row) if known is None else known.layout.read(block.data(row))
-            if known is None:
-                stamps[row] = stamp_of(message)
-            found = list(self._decoder.samples(self._streams[block.sources[row]], int(stamps[row]), message))
-            rows += [row] * len(found)
-            samples += found
+            else:
+                message, stamp = known.layout.read(block.data(row)), int(stamps[row])
+            for sample in self._decoder.samples(self._streams[sources[row]], stamp, message):
+                rows.append(row)
+                samples.append(sample)
         return np.array(rows, np.int64), block_of(samples, self._joints)
 
 

@@ -58,18 +58,19 @@ def gather(content: bytes, places: Integers, size: int) -> NDArray[np.uint8]:
 
 
 def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
-    """The messages of all blocks by log time; those of equal times as they stand, a block after the other."""
+    """The messages of all blocks, a block after the other."""
     if len(blocks) == 1:
-        return _by_log_time(blocks[0])
+        return blocks[0]
     if not blocks:
         return MessageBlock(b"", *(np.zeros(0, kind) for kind in (np.int64, np.uint64, np.int64, np.int64)))
-    content = b"".join(block.data(row) for block in blocks for row in range(len(block)))
+    spans = ((block.content, zip(block.starts.tolist(), block.ends.tolist(), strict=True)) for block in blocks)
+    content = b"".join(content[start:end] for content, pairs in spans for start, end in pairs)
     ends = np.cumsum(np.concatenate([block.ends - block.starts for block in blocks]))
-    starts = np.concatenate([[0], ends[:-1]])
     sources, log_times = (np.concatenate(rows) for rows in zip(*((b.sources, b.log_times) for b in blocks), strict=True))
-    return _by_log_time(MessageBlock(content, sources, log_times, starts, ends))
+    return MessageBlock(content, sources, log_times, np.concatenate([[0], ends[:-1]]), ends)
 
 
-def _by_log_time(block: MessageBlock) -> MessageBlock:
+def by_log_time(block: MessageBlock) -> MessageBlock:
+    """The same in the order of log times, those of equal times as they stand."""
     times = block.log_times
     return block if (times[1:] >= times[:-1]).all() else block.chosen(np.argsort(times, kind="stable"))

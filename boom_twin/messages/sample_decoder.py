@@ -175,7 +175,7 @@ class SampleDecoder:
         odd = ["unequal arrays"] if end != len(names) else []
         if -1 in places:
             odd.append("missing names")
-        return [place if place < end else -1 for place in places], odd
+        return [place if place < end else -1 for place in places] if end < len(names) else places, odd
 
     def scales(self, stream: Stream) -> Array:
         """What is taken off a reading, and by what it is then multiplied, shape (2, channels)."""

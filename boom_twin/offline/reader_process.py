@@ -6,7 +6,7 @@ import pickle
 import sys
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
-from itertools import repeat
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -140,60 +140,62 @@ class SampleReader:
         self._pipe.stop()
 
 
-class _Outbox:
-    """Puts samples together on their way up the pipe."""
+def items_of(path: Path, topics: Topics, wanted: list[str], joints: int) -> Iterator[SampleBlock | Change | int | Counter[str]]:
+    """What goes up the pipe, as `SampleReader` is to give it; a whole number is that of the None, the last are the oddities.
 
-    def __init__(self) -> None:
-        self._waiting: list[SampleBlock] = []
-        self._messages = self._without = 0
-
-    def put(self, found: DecodedBlock) -> None:
-        """Samples, and how many messages had none, in their turn."""
-        self._waiting.append(found.samples)
-        self._messages += len(found.stamps)
-        self._without += found.without
-        if self._messages >= BATCH:
-            self.empty()
-
-    def empty(self) -> None:
-        """Send what is there."""
-        if self._messages:
-            post([together(self._waiting), self._without])
-        self._waiting, self._messages, self._without = [], 0, 0
-
-
-def _in_turn(block: MessageBlock, found: DecodedBlock, changes: Changes, strokes: list[int]) -> Iterator[DecodedBlock | Change]:
-    """What was found in a block, its messages from `strokes` being those that changes begin with."""
-    done = 0
-    for row in np.flatnonzero(np.isin(block.sources, strokes)).tolist() if changes.are_left else ():
-        due = tuple(changes.due(int(block.log_times[row]), int(found.stamps[row])))
-        if due:
-            yield found.part(done, row)
-            yield from due
-            done = row
-    yield found.part(done, len(block))
-
-
-def _send(path: Path, topics: Topics, wanted: list[str], joints: int) -> None:
-    """The samples of a session, then what was odd, up the pipe."""
+    Raises
+    ------
+    BagError
+        The session cannot be read.
+    """
     heard: dict[str, list[Stream]] = topics.heard
     session = scan(path)
     changes = recorded_changes(session, topics)
     blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted})
     streams = [heard[source.name] for source in blocks.sources]
-    strokes = [number for number, group in enumerate(streams) if Stream.STROKES in group]
-    decoder, outbox = BlockDecoder(joints, topics, streams, blocks.decoded), _Outbox()
-    for block in blocks:
-        for first in range(0, len(block), MOST):
-            part = block.chosen(slice(first, first + MOST))
-            for found in _in_turn(part, decoder.decode(part), changes, strokes):
-                if isinstance(found, Change):
-                    outbox.empty()
-                    post([found])
-                else:
-                    outbox.put(found)
-    outbox.empty()
-    post([decoder.oddities, END])
+    decoder = BlockDecoder(joints, topics, streams, blocks.decoded)
+    yield from _batches(_in_turn(blocks, decoder, changes, [Stream.STROKES in group for group in streams]))
+    yield decoder.oddities
+
+
+def _in_turn(
+    blocks: Iterable[MessageBlock], decoder: BlockDecoder, changes: Changes, are_strokes: list[bool]
+) -> Iterator[DecodedBlock | Change]:
+    """What was found in blocks, and the changes that begin with messages of some sources."""
+    for block in chain.from_iterable(map(_parts, blocks)):
+        found, done = decoder.decode(block), 0
+        for row in np.flatnonzero(np.array(are_strokes)[block.sources]).tolist() if changes.are_left else ():
+            if due := tuple(changes.due(int(block.log_times[row]), int(found.stamps[row]))):
+                yield found.part(done, row)
+                yield from due
+                done = row
+        yield found.part(done, len(block))
+
+
+def _parts(block: MessageBlock) -> Iterator[MessageBlock]:
+    return (block.chosen(slice(first, first + MOST)) for first in range(0, len(block), MOST))
+
+
+def _batches(found: Iterable[DecodedBlock | Change]) -> Iterator[SampleBlock | Change | int]:
+    """What was found, samples of at least `BATCH` messages together if no change comes between."""
+    waiting: list[DecodedBlock] = []
+    for each in found:
+        if isinstance(each, DecodedBlock):
+            waiting.append(each)
+            if sum(len(block.stamps) for block in waiting) < BATCH:
+                continue
+        yield from _batch(waiting)
+        waiting = []
+        if isinstance(each, Change):
+            yield each
+    yield from _batch(waiting)
+
+
+def _batch(found: list[DecodedBlock]) -> Iterator[SampleBlock | int]:
+    if any(len(block.rows) for block in found):
+        yield together([block.samples for block in found])
+    if without := sum(block.without for block in found):
+        yield without
 
 
 def main() -> int:
@@ -203,7 +205,9 @@ def main() -> int:
         jazzy().get_msgdef(kind.message)  # compiles its decoder
     say_ready()
     try:
-        _send(*task)
+        for item in items_of(*task):
+            post([item])
+        post([END])
     except BrokenPipeError:
         return 0
     except BoomTwinError as error:

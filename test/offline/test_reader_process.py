@@ -1,0 +1,316 @@
+"""What a replay reads of sessions of every kind against the same messages taken one by one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, IndexType, Writer
+
+from boom_twin.bag.integrity import RESCUE
+from boom_twin.bag.session_blocks import SessionBlocks
+from boom_twin.errors import BagError
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.report_encoder import decode_changes, encode_changes
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import TYPES, Output, Topics, load_topics
+from boom_twin.messages.type_store import decode, jazzy
+from boom_twin.offline.reader_process import Changes, SampleReader, items_of
+from boom_twin.twin.blocks import SampleBlock, samples_in
+from boom_twin.types import Change, Sample, Stream
+
+JOINTS = 3
+START = 1_700_000_000_000_000_000
+STEP = 5_000_000
+MESSAGES = jazzy().types
+CHANGES = load_topics().outputs[Output.CHANGES].absolute
+MAPPING = """
+sensors:
+  cylinder_1: {zero: 3.25, scale: 1.01, unit: mm}
+  cylinder_3: {name: boom, sign: -1}
+  joint_2: {unit: deg, zero: -0.5, sign: -1}
+  tip_imu_x: {name: z, sign: -1, unit: g}
+  tip_imu_z: {name: x}
+"""
+SHARED = "inputs: {cylinder_strokes: {name: /rig}, joint_angles: {name: /rig}}\n"
+FILES: list[dict[str, Any]] = [
+    {"compression": CompressionType.NONE, "chunk_size": 300},
+    {"compression": CompressionType.LZ4, "chunk_size": 20_000},
+    {"compression": CompressionType.ZSTD, "chunk_size": 5_000},
+    {"compression": CompressionType.ZSTD, "chunk_size": 2**20},
+    {"index_types": IndexType.NONE, "chunk_size": 4_000},
+    {"use_chunking": False},
+]
+Entry = tuple[int, str, bytes]  # log time, topic, encoded message
+
+
+class Rig:
+    """Makes the messages of a rig: mostly alike for a while, some odd."""
+
+    def __init__(self, random: np.random.Generator, odd: float) -> None:
+        self._random, self._odd = random, odd
+
+    def chance(self, probability: float) -> bool:
+        return bool(self._random.random() < probability)
+
+    def any_of(self, choices: list[Any]) -> Any:
+        return choices[self._random.integers(len(choices))]
+
+    def names(self) -> list[str]:
+        cylinders = self.any_of([["cylinder_1", "cylinder_2", "cylinder_3"], ["boom", "cylinder_2"], ["cylinder_3"]])
+        joints = self.any_of([["joint_1", "joint_2", "joint_3"], ["joint_3", "joint_1"]])
+        names = self.any_of([cylinders, cylinders, joints, joints, [*joints, "valve", *cylinders], ["valve"], [], ["joint_4"]])
+        return list(self._random.permutation(names)) if self.chance(0.3) else names
+
+    def layout(self) -> dict[str, Any]:
+        """What a sensor keeps for a while."""
+        names = self.names()
+        count = len(names) if self.chance(0.8) else int(self._random.integers(0, 5))
+        frame = self.any_of(["", "base_link", "tip", "a longer frame of reference"])
+        return {"names": names, "count": count, "frame": frame, "little": self.chance(0.9), "effort": self.any_of([0, 0, 2])}
+
+    def number(self) -> float:
+        if self.chance(self._odd):
+            return float(self.any_of([np.nan, np.inf, -np.inf, 1e6, 1.0001e6, -1e300, 0.0, -0.0, 5e-324]))
+        return float(self._random.normal())
+
+    def stamp(self, log: int) -> tuple[int, int]:
+        """Seconds and nanoseconds."""
+        odd = [(0, 0), (-1, 5), (2**31 - 1, 4 * 10**9), (5, 2**32 - 1)]
+        return self.any_of(odd) if self.chance(self._odd) else divmod(log - 1234, 10**9)
+
+    def message(self, kind: str, log: int, layout: dict[str, Any]) -> bytes:
+        stamp = MESSAGES["builtin_interfaces/msg/Time"](*self.stamp(log))
+        header = MESSAGES["std_msgs/msg/Header"](stamp, layout["frame"])
+        if kind == TYPES[Stream.IMU]:
+            vector, covariance = MESSAGES["geometry_msgs/msg/Vector3"], np.zeros(9)
+            force = np.array([-1.0 if self.chance(self._odd) else 0.01, *covariance[1:]])
+            turned = MESSAGES["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+            parts = [turned, covariance, vector(0.0, 0.0, 0.0), covariance, vector(*(self.number() for _ in "xyz")), force]
+        else:
+            numbers = [np.array([self.number() for _ in range(count)]) for count in (layout["count"], 0, layout["effort"])]
+            parts = [layout["names"], *numbers]
+        data = bytes(jazzy().serialize_cdr(MESSAGES[kind](header, *parts), kind, little_endian=layout["little"]))
+        if self.chance(self._odd):
+            data += self._random.bytes(int(self._random.integers(0, 13)))
+        return data
+
+    def session(self, topics: Topics, files: int, rows: int) -> list[list[Entry]]:
+        """The messages of every file in its order, which is not quite that of the log times."""
+        inputs = {topic.absolute: topic.type for topic in topics.inputs.values()}
+        layouts = {name: self.layout() for name in inputs}
+        found: list[list[Entry]] = [[] for _ in range(files)]
+        overlap = self.any_of([0, 0, rows // 10, rows])
+        for row in range(rows):
+            for name, kind in inputs.items():
+                log = START + STEP * row + int(self._random.integers(-1, 2)) * self.any_of([0, 0, STEP])
+                if self.chance(0.02):
+                    layouts[name] = self.layout()
+                place = row + self._random.integers(0, overlap + 1)
+                found[min(int(place * files // rows), files - 1)].append((log, name, self.message(kind, log, layouts[name])))
+                if self.chance(0.1):
+                    found[-1].append((log, "/foreign", self._random.bytes(20)))
+            if self.chance(0.01):
+                change = Change(log - 1234, False, {"payload": float(row % 50)}, {})
+                found[0].append((log, CHANGES, encode_changes(change)))
+        return found
+
+
+def write(folder: Path, files: list[list[Entry]], options: list[dict[str, Any]], topics: Topics) -> None:
+    """A session as bare files, with definitions left empty."""
+    kinds = {topic.absolute: topic.type for topic in topics.inputs.values()} | {CHANGES: TYPES[Output.CHANGES]}
+    folder.mkdir()
+    for number, (entries, how) in enumerate(zip(files, options, strict=True)):
+        with (folder / f"session_{number}.mcap").open("wb") as stream:
+            writer, channels = Writer(stream, **how), dict[str, int]()
+            writer.start(profile="ros2", library="test")
+            for log, name, data in entries:
+                if name not in channels:
+                    schema = writer.register_schema(kinds.get(name, "other_msgs/msg/Other"), "ros2msg", b"")
+                    channels[name] = writer.register_channel(name, "cdr", schema)
+                writer.add_message(channels[name], log, data, log)
+            writer.finish()
+
+
+Found = list[tuple[Any, ...] | Change]
+
+
+class Expected:
+    """What taking one message after the other gives: samples and changes, and between changes how many messages had none."""
+
+    def __init__(self, folder: Path, files: list[list[Entry]], topics: Topics) -> None:
+        self.found: Found = []
+        self.without = [0]
+        self.error = ""
+        self._decoder, self._heard = SampleDecoder(JOINTS, topics), {f"/{k.lstrip('/')}": v for k, v in topics.heard.items()}
+        sorted_files = [sorted(entries, key=itemgetter(0)) for entries in files]
+        entries = [(*entry, number) for number, file in enumerate(sorted_files) for entry in file]
+        entries.sort(key=itemgetter(0))
+        told = [(log, decode(data, TYPES[Output.CHANGES])) for log, name, data, _ in entries if name == CHANGES]
+        self._changes = Changes((log, decode_changes(msg)) for log, msg in told)
+        for log, name, data, number in entries:
+            if name in self._heard and not self.error:
+                self._take(log, name, data, folder / f"session_{number}.mcap")
+        self.oddities = list(self._decoder.oddities.items())
+
+    def _take(self, log: int, name: str, data: bytes, file: Path) -> None:
+        streams = self._heard[name]
+        try:
+            msg = decode(data, TYPES[streams[0]])
+        except Exception as error:
+            self.error = f"{file}: topic {name} at log time {log} ns: {error} {RESCUE}"
+            return
+        stamp = stamp_of(msg)
+        for change in self._changes.due(log, stamp) if Stream.STROKES in streams else ():
+            self.found.append(change)
+            self.without.append(0)
+        samples = list(self._decoder.samples(streams, stamp, msg))
+        self.found += map(plain, samples)
+        self.without[-1] += not samples
+
+
+def plain(sample: Sample) -> tuple[Any, ...]:
+    return sample.stream, sample.stamp, sample.values.tobytes()
+
+
+def compare(folder: Path, topics: Topics, expected: Expected) -> None:
+    """That the session in `folder` is read as expected."""
+    wanted = list(topics.heard)
+    found: Found = []
+    without, oddities, error = [0], [], ""
+    try:
+        for item in items_of(folder, topics, wanted, JOINTS):
+            if isinstance(item, Counter):
+                oddities = list(item.items())
+            elif isinstance(item, int):
+                without[-1] += item
+            elif isinstance(item, Change):
+                found.append(item)
+                without.append(0)
+            else:
+                found += map(plain, samples_in(item, JOINTS))
+    except BagError as told:
+        error = str(told)
+    assert error == expected.error
+    if not error:
+        assert found == expected.found
+        assert (without, oddities) == (expected.without, expected.oddities)
+    else:
+        assert found == expected.found[: len(found)]
+
+
+def mapped(folder: Path, shared: bool, text: str) -> Topics:
+    (folder / "mapping.yaml").write_text((SHARED if shared else "") + text)
+    return load_mapping(folder / "mapping.yaml", JOINTS)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_session_of_any_layouts_is_read_as_one_message_after_the_other(tmp_path: Path, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    topics = mapped(tmp_path, shared=seed % 3 == 0, text=MAPPING if seed % 2 else "")
+    rig = Rig(random, odd=float(random.choice([0.0, 0.01, 0.2])))
+    count = int(random.integers(1, 4))
+    files = rig.session(topics, count, rows=int(random.choice([30, 400])))
+    write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(count)], topics)
+    expected = Expected(tmp_path / "bag", files, topics)
+    assert any(isinstance(each, tuple) for each in expected.found) and not expected.error
+    compare(tmp_path / "bag", topics, expected)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_message_that_cannot_be_decoded_is_told_as_the_first_one(tmp_path: Path, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    topics = mapped(tmp_path, shared=seed % 3 == 0, text="")
+    files = Rig(random, odd=0.01).session(topics, 2, rows=200)
+    for _ in range(2):
+        entries = files[random.integers(2)]
+        place = int(random.integers(len(entries)))
+        log, name, data = entries[place]
+        if name in (CHANGES, "/foreign"):
+            continue
+        bad = [data[: random.integers(len(data))], data + bytes(20), data[:16] + b"\xff" * 4 + data[20:], b"\7\7" + data[2:]]
+        entries[place] = (log, name, bad[random.integers(len(bad))])
+    write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(2)], topics)
+    expected = Expected(tmp_path / "bag", files, topics)
+    compare(tmp_path / "bag", topics, expected)
+
+
+USUAL = {"names": ["cylinder_2", "cylinder_1"], "count": 2, "frame": "", "little": True, "effort": 0}
+
+
+def strokes(rows: int) -> list[Entry]:
+    """Messages that are laid out alike."""
+    rig, topic = Rig(np.random.default_rng(1), odd=0.0), load_topics().inputs[Stream.STROKES]
+    return [(log, topic.absolute, rig.message(topic.type, log, USUAL)) for log in range(START, START + STEP * rows, STEP)]
+
+
+def test_a_length_behind_the_numbers_is_not_passed_over(tmp_path: Path) -> None:
+    topics, entries = load_topics(), strokes(100)
+    log, name, data = entries[70]
+    entries[70] = (log, name, data[:-4] + b"\xff\xff\xff\x7f")
+    write(tmp_path / "bag", [entries], FILES[3:4], topics)
+    expected = Expected(tmp_path / "bag", [entries], topics)
+    assert f"at log time {log} ns" in expected.error
+    with pytest.raises(BagError) as caught:
+        list(items_of(tmp_path / "bag", topics, [topics.inputs[Stream.STROKES].name], JOINTS))
+    assert str(caught.value) == expected.error
+
+
+def test_a_message_at_fault_is_told_before_a_chunk_that_comes_later(tmp_path: Path) -> None:
+    topics, entries = load_topics(), strokes(50)
+    log, name, data = entries[3]
+    entries[3] = (log, name, data[:-9])
+    write(tmp_path / "bag", [entries], FILES[:1], topics)
+    file = tmp_path / "bag" / "session_0.mcap"
+    whole = file.read_bytes()
+    last = whole.rindex(b"cylinder_1")
+    file.write_bytes(whole[:last] + b"cylinder_3" + whole[last + 10 :])
+    with pytest.raises(BagError, match=f"at log time {log} ns"):
+        list(items_of(tmp_path / "bag", topics, [topics.inputs[Stream.STROKES].name], JOINTS))
+
+
+def test_a_topic_is_decoded_by_itself_only_where_its_layout_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the reader takes four times as long."""
+    topics, decoded = load_topics(), list[int]()
+    rig = Rig(np.random.default_rng(1), odd=0.0)
+    entries = []
+    for row in range(1000):
+        layout = USUAL | {"frame": "base_link" if row >= 500 else ""}
+        for topic in topics.inputs.values():
+            log = START + STEP * row
+            entries.append((log, topic.absolute, rig.message(topic.type, log, layout)))
+    write(tmp_path / "bag", [entries], FILES[3:4], topics)
+    whole = SessionBlocks.decoded
+
+    def counted(blocks: SessionBlocks, block: Any, row: int) -> Any:
+        decoded.append(row)
+        return whole(blocks, block, row)
+
+    monkeypatch.setattr(SessionBlocks, "decoded", counted)
+    compare(tmp_path / "bag", topics, Expected(tmp_path / "bag", [entries], topics))
+    assert 4 <= len(decoded) <= 12
+
+
+def test_blocks_go_through_the_pipe_and_stay_small(tmp_path: Path) -> None:
+    topics = load_topics()
+    files = Rig(np.random.default_rng(4), odd=0.05).session(topics, 1, rows=2000)
+    write(tmp_path / "bag", files, FILES[4:5], topics)
+    expected = Expected(tmp_path / "bag", files, topics)
+    reader = SampleReader(tmp_path / "bag", topics, list(topics.heard), JOINTS)
+    reader.wait_ready()
+    items = list(reader)
+    assert list(reader.oddities.items()) == expected.oddities
+    blocks = [item for item in items if isinstance(item, SampleBlock)]
+    assert [plain(sample) for block in blocks for sample in samples_in(block, JOINTS)] == [
+        each for each in expected.found if not isinstance(each, Change)
+    ]
+    assert sum(item is None for item in items) == sum(expected.without)
+    assert len(blocks) >= 3 and max(len(block.stamps) for block in blocks) < 2000
+    again = SampleReader(tmp_path / "bag", topics, list(topics.heard), JOINTS)
+    again.wait_ready()
+    singles = list(again.samples())
+    assert [plain(each) if isinstance(each, Sample) else each for each in singles if each is not None] == expected.found
