@@ -62,7 +62,8 @@ def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
-        return MessageBlock(b"", *(np.zeros(0, kind) for kind in (np.int64, np.uint64, np.int64, np.int64)))
+        none = np.zeros(0, np.int64)
+        return MessageBlock(b"", none, np.zeros(0, np.uint64), none, none)
     spans = ((block.content, zip(block.starts.tolist(), block.ends.tolist(), strict=True)) for block in blocks)
     content = b"".join(content[start:end] for content, pairs in spans for start, end in pairs)
     ends = np.cumsum(np.concatenate([block.ends - block.starts for block in blocks]))
