@@ -426,7 +426,7 @@ class Twin:
         run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
         assert run is not None
         while True:
-            reason, row = update(self._boom.compiled, self._limits, self._state, *block, row, is_resumed, trusted, self._found)
+            reason, row = update(*self._boom.compiled, self._limits, self._state, *block, row, is_resumed, trusted, self._found)
             if is_resumed := reason == REFRESH:
                 interval = run.interval or self.settings.step
                 run.deviations.refresh(self._boom.prediction(run.newest), interval, self._boom.live, self._boom.angles)

@@ -55,13 +55,13 @@ was stepped to; the sample is complete and begins a slot or left the model's val
 
 
 @kernel
-def update(boom, limits, state, streams, stamps, values, first, resumed, trusted, found):
+def update(t, anchor, live, work, track, bending, out, limits, state, streams, stamps, values, first, resumed, trusted, found):
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
     Parameters
     ----------
-    boom : CompiledBoom
-        See `boom_twin.estimation.boom_predictor`.
+    t, anchor, live, work, track, bending, out : fields of CompiledBoom
+        See `boom_twin.estimation.boom_predictor`; as they are, because tuples of tuples take long to compile.
     limits : Limits
     state : TwinState
         Of a run that has begun.
@@ -89,16 +89,18 @@ def update(boom, limits, state, streams, stamps, values, first, resumed, trusted
             continue
         if not resumed:
             if not trusted:
-                if not is_ordinary(boom, limits, state, stamp, values[row]):
+                if not is_ordinary(track.x[0], limits, state, stamp, values[row]):
                     return ODD, row
                 note_stamp(state, STROKES, stamp)
-            state.clock[STATUS] = step(boom, limits, state, stamp)
+            time, tuning = begin_step(limits, state, stamp)
+            state.clock[STATUS] = follow(t, anchor, live, work, track, tuning, time, state.taken, out)
             if state.clock[STATUS] != OK:
                 return FAILED, row
+            end_step(state, stamp)
             if stamp >= state.clock[SEEN] + INTERVAL:
                 return REFRESH, row
         resumed = False
-        remember(boom, limits, state, stamp, row, found)
+        remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, stamp, row, found)
         settle(limits, state, row, found)
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
@@ -119,7 +121,7 @@ def measure(limits, state, stream, stamp, values, trusted, found):
 
 
 @inner
-def is_ordinary(boom, limits, state, stamp, values):
+def is_ordinary(estimates, limits, state, stamp, values):
     """Whether strokes come when they are due, all of them, where their cylinders can be; they are put into `state` then."""
     span = stamp - state.clock[NEWEST]
     most = STEP * state.usual[STROKES]
@@ -135,7 +137,7 @@ def is_ordinary(boom, limits, state, stamp, values):
         value = values[i] - state.zeros[zeros, STROKES, i]
         if not abs(values[i]) <= LIMIT or not limits.shortest[i] <= value <= limits.longest[i]:
             return False
-        if not abs(value - boom.track.x[0, i, 0]) <= limit:
+        if not abs(value - estimates[i, 0]) <= limit:
             return False
     for i in range(state.strokes.shape[0]):
         state.strokes[i] = values[i] - state.zeros[zeros, STROKES, i]
@@ -157,42 +159,44 @@ def note_stamp(state, stream, stamp):
 
 
 @inner
-def step(boom, limits, state, stamp):
-    """Step the boom to the strokes in `state`; a status of `boom_twin.kernels.tables`."""
+def begin_step(limits, state, stamp):
+    """Time (s since the start) of the strokes in `state`, and the tuning by which the boom is stepped to them."""
     time = (stamp - state.clock[EPOCH]) * NANO
     if time - state.pace[STEPPED] > PAUSE:
         state.pace[PAUSED] = time
     state.pace[STEPPED] = time
-    tuning = limits.tuning
     if time - state.pace[PAUSED] < AFTER_PAUSE:
-        tuning = limits.patient
-    status = follow(boom.tables, boom.anchor, boom.live, boom.work, boom.track, tuning, time, state.taken, boom.row)
-    if status == OK:
-        span = (stamp - state.clock[NEWEST]) * NANO
-        if state.pace[USUAL_STEP] != 0.0:
-            state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
-        else:
-            state.pace[USUAL_STEP] = span
-        slot = stamp // SLOT
-        state.clock[BEGINS_SLOT] = slot != state.clock[IN_SLOT]
-        state.clock[IN_SLOT], state.clock[NEWEST] = slot, stamp
-    return status
+        return time, limits.patient
+    return time, limits.tuning
 
 
 @inner
-def remember(boom, limits, state, stamp, row, found):
+def end_step(state, stamp):
+    """Note that the boom was stepped."""
+    span = (stamp - state.clock[NEWEST]) * NANO
+    if state.pace[USUAL_STEP] != 0.0:
+        state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
+    else:
+        state.pace[USUAL_STEP] = span
+    slot = stamp // SLOT
+    state.clock[BEGINS_SLOT] = slot != state.clock[IN_SLOT]
+    state.clock[IN_SLOT], state.clock[NEWEST] = slot, stamp
+
+
+@inner
+def remember(live, bending, out, pins, passes, limits, state, stamp, row, found):
     """Give the prediction, and keep what residuals need."""
-    n, pins, k = state.strokes.shape[0], boom.tables.clearances.shape[0], found.counts[0]
-    results, estimates = results_in(boom.row, n, pins), estimates_in(boom.row, n, pins)
-    found.at[k], found.stamps[k], found.passes[k] = row, stamp, boom.track.passes[0]
-    for i in range(boom.row.shape[0]):
-        found.rows[k, i] = boom.row[i]
+    n, k = state.strokes.shape[0], found.counts[0]
+    results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
+    found.at[k], found.stamps[k], found.passes[k] = row, stamp, passes
+    for i in range(out.shape[0]):
+        found.rows[k, i] = out[i]
     for i in range(n):
         found.measured[k, i] = state.strokes[i]
     for i in range(found.moments.shape[1]):
         moment = 0.0
-        for j in range(boom.live.z.shape[0]):
-            moment += boom.bending[i, j] * boom.live.z[j]
+        for j in range(live.z.shape[0]):
+            moment += bending[i, j] * live.z[j]
         found.moments[k, i] = moment
     found.counts[0] = k + 1
     off = math.hypot(results.tip[0, 0] - estimates.rigid_tip[0], results.tip[0, 1] - estimates.rigid_tip[1])
@@ -205,7 +209,7 @@ def remember(boom, limits, state, stamp, row, found):
     past.stamps[at] = stamp
     for i in range(n):
         past.strokes[at, i] = state.strokes[i]
-    write_expected(limits, state, boom.live, results, estimates, past.values[at], past.sigmas[at])
+    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
 
 
 # -- measured angles and accelerations --------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
-from boom_twin.bag.integrity import RESCUE
+from boom_twin.bag.integrity import REMEDY
 from boom_twin.bag.session_blocks import SessionBlocks
 from boom_twin.errors import BagError
 from boom_twin.messages.mapping import load_mapping
@@ -162,7 +162,7 @@ class Expected:
         try:
             msg = decode(data, TYPES[streams[0]])
         except Exception as error:
-            self.error = f"{file}: topic {name} at log time {log} ns: {error} {RESCUE}"
+            self.error = f"{file}: topic {name} at log time {log} ns: {error} {REMEDY}"
             return
         stamp = stamp_of(msg)
         for change in self._changes.due(log, stamp) if Stream.STROKES in streams else ():
