@@ -22,7 +22,8 @@ from tempfile import NamedTemporaryFile
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-KERNEL_FOLDERS = ("kernels", "estimation")
+KERNEL_SOURCES = ("kernels", "estimation", "twin", "types.py")
+"""Folders and modules of the package that kernels, or the constants in them, come from."""
 SUFFIX = ".kernel"
 _DIGEST = hashlib.sha256().digest_size
 
@@ -30,8 +31,8 @@ _DIGEST = hashlib.sha256().digest_size
 def source_hash(root: Path = ROOT) -> str:
     """Hash of every kernel source, and of numba's settings in the environment, 16 hex digits."""
     digest = hashlib.sha256()
-    for folder in KERNEL_FOLDERS:
-        for path in sorted((root / folder).rglob("*.py")):
+    for name in KERNEL_SOURCES:
+        for path in sorted((root / name).rglob("*.py")) or [root / name]:
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(path.read_bytes())
     settings = sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] != "NUMBA_CACHE_DIR")

@@ -14,8 +14,9 @@ from ..estimation.sensor_model import specific_force
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, State
-from ..types import NANO, Array, Prediction
-from .state import IMU, NONE, SEEN, TwinState
+from ..types import NANO, Array, Prediction, Stream
+from .blocks import CODES
+from .state import NONE, SEEN, TwinState
 
 SPAN = 2_000_000_000  # ns
 
@@ -122,6 +123,9 @@ class Deviations:
         copy_state(live, probe)
         tuned = self._settings
         return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
+
+
+IMU = CODES[Stream.IMU]
 
 
 @inner

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from ..estimation.look_ahead import Tuning
 from ..kernels.jit import inner
-from ..types import Array
+from ..types import Array, Stream
+from .blocks import CODES
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-STROKES, ANGLES, IMU = 0, 1, 2  # of `boom_twin.twin.blocks.CODES`
+STROKES = CODES[Stream.STROKES]
 NONE = -(2**62)  # no stamp yet, ns
 KEPT = 16_384  # most expected readings, of the last `SPAN`: 8 kHz
 WAITING = 4096  # most samples that wait for a stroke

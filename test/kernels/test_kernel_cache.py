@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -159,10 +160,19 @@ def test_relative_places_of_caches_are_not_taken_from_the_working_directory(monk
         assert cache_folder().parent == Path.home() / ".cache" / "boom_twin"
 
 
+def test_all_kernels_are_in_the_sources_that_are_hashed() -> None:
+    kernels = [path for path in ROOT.rglob("*.py") if re.search(r"^@(kernel|inner)$", path.read_text(), re.M)]
+    assert len(kernels) > 15
+    assert {path.relative_to(ROOT).parts[0] for path in kernels} <= set(kernel_cache.KERNEL_SOURCES)
+
+
 def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An edit of any kernel source, in any depth of folders, gives another folder; with NUMBA_CACHE_DIR too."""
-    for name in kernel_cache.KERNEL_FOLDERS:
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in kernel_cache.KERNEL_SOURCES:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copyfile(ROOT / name, tmp_path / name)
     before = source_hash(tmp_path)
     assert before == source_hash()
     (tmp_path / "kernels" / "deeper").mkdir()
@@ -173,6 +183,8 @@ def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: 
     edited = source_hash(tmp_path)
     (tmp_path / "kernels" / "deeper" / "step.py").rename(tmp_path / "kernels" / "other" / "step.py")
     assert len({before, deeper, edited, source_hash(tmp_path)}) == 4
+    (tmp_path / "types.py").write_text("NANO = 1e-9\n")
+    assert source_hash(tmp_path) != edited
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert cache_folder() == tmp_path / before
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
