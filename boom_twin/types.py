@@ -143,7 +143,7 @@ SENSORS: dict[Stream, SensorKind] = {
         is_smooth=False,
     ),
 }
-"""What they should read is in `boom_twin.twin.expected_readings.READINGS`, their topics are in ``topics.yaml``."""
+"""What they should read is in `boom_twin.twin.expected_readings.write_expected`, their topics are in ``topics.yaml``."""
 
 
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
