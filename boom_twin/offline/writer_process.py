@@ -7,58 +7,27 @@ from collections.abc import Iterable, Mapping
 from itertools import groupby
 from pathlib import Path
 
-import numpy as np
-
 from ..bag.writer import SessionWriter
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
-from ..twin.blocks import CODES, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Outline, Report
+from ..twin.blocks import ReportBlock, report_block
+from ..types import Report
 from .process_pipe import END, Pipe, received, say_ready
 
 BATCH = 200  # single reports in one pickle
 Packed = ReportBlock | Report
 
 
-def pack(reports: Iterable[Report]) -> list[Packed]:
+def pack(reports: Iterable[Report], joints: int) -> list[Packed]:
     """Reports as blocks, less what is not written to a bag: events, status. One with a change stays by itself."""
     packed: list[Packed] = []
     for has_change, run in groupby(reports, lambda report: report.change is not None):
         found = list(run)
-        packed += found if has_change else [_block(found)]
+        packed += found if has_change else [report_block(found, joints)]
     return packed
-
-
-def _block(reports: list[Report]) -> ReportBlock:
-    stamps = np.array([report.stamp for report in reports], np.int64)
-    health = {row: report.health for row, report in enumerate(reports) if report.health is not None}
-    return ReportBlock(stamps, _predictions(reports), _residuals(reports), health)
-
-
-def _predictions(reports: list[Report]) -> PredictionBlock:
-    found = [report.prediction for report in reports if report.prediction is not None]
-    at = np.flatnonzero([report.prediction is not None for report in reports])
-    stamps = np.array([p.stamp for p in found], np.int64)
-    columns = [np.array([getattr(p, name) for p in found]) for name in PredictionBlock._fields[2:-1]]
-    outlines = {
-        row: Outline(p.shape, p.undeflected, p.pins)
-        for row, p in enumerate(found)
-        if p.shape is not None and p.undeflected is not None and p.pins is not None
-    }
-    return PredictionBlock._make([at, stamps, *columns, outlines])
-
-
-def _residuals(reports: list[Report]) -> ResidualBlock:
-    rows = [(row, residuals) for row, report in enumerate(reports) for residuals in report.residuals]
-    values, sigmas = np.full((2, len(rows), max((len(r.names) for _, r in rows), default=0)), np.nan)
-    for own_values, own_sigmas, (_, residuals) in zip(values, sigmas, rows, strict=True):
-        own_values[: len(residuals.names)] = residuals.values
-        own_sigmas[: len(residuals.names)] = residuals.sigmas
-    at, streams, stamps = np.array([(row, CODES[r.stream], r.stamp) for row, r in rows], np.int64).reshape(-1, 3).T
-    return ResidualBlock(at, streams, stamps, values, sigmas)
 
 
 class ReportWriter:
@@ -89,6 +58,7 @@ class ReportWriter:
         self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings, lock: int
     ) -> None:
         self._reports: list[Report] = []
+        self._joints = len(scene.joints)
         self._pipe = Pipe(__name__, str(directory), inherited=[lock])
         self._pipe.send((dict(notes), topics.outputs, scene, settings))
 
@@ -114,7 +84,7 @@ class ReportWriter:
 
     def _send_reports(self) -> None:
         if self._reports:
-            self._pipe.send(pack(self._reports))
+            self._pipe.send(pack(self._reports, self._joints))
             self._reports.clear()
 
     def stop(self) -> None:

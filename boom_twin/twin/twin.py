@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,6 @@ from .state import (
     STROKES,
     UNMATCHED,
     USUAL_STEP,
-    Found,
     Limits,
     TwinState,
     keep_waiting,
@@ -244,10 +243,9 @@ class Twin:
         self.judge = None
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        self._limits, width = self._limited(SHARE * scene.reach), self._boom.compiled.row.shape[0]
-        size = len(self._counts), int(self._counts.max())
-        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, size[1]), np.nan))
-        self._found = new_found(CAPACITY, self.plan.joints, width, len(self._boom.compiled.bending), self._counts)
+        self._limits, compiled = self._limited(SHARE * scene.reach), self._boom.compiled
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, self._counts.max()), np.nan))
+        self._found = new_found(CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
         self._news = _News()
 
     def _limited(self, valid: float) -> Limits:
@@ -315,6 +313,7 @@ class Twin:
         for k in range(20):
             other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
         other.update(Sample(Stream.ANGLES, 0, middle))
+        other.update(Sample(Stream.STROKES, 7_000_000, strokes))  # a late one is looked up among those before
 
     def update(self, sample: Sample) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
@@ -391,7 +390,7 @@ class Twin:
 
     def _look_at(self, sample: Sample) -> Report:
         """Take a sample that may be out of the ordinary."""
-        self._news.clear(self._found)
+        self._forget_found()
         complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
@@ -409,8 +408,8 @@ class Twin:
 
         What they caused is in `_found` and `_news`. One sample that is `trusted` was looked at before.
         """
-        found, news = self._found, self._news
-        news.clear(found)
+        found = self._found
+        self._forget_found()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
             args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
             reason, row = (DONE, 1) if measure(self._limits, self._state, *args, trusted, found) else (ODD, 0)
@@ -421,6 +420,11 @@ class Twin:
             self.counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
         return reason, row
+
+    def _forget_found(self) -> None:
+        """Before the next call of the compiled update."""
+        self._found.counts[:] = 0
+        self._news = _News()
 
     def _advance_strokes(self, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
@@ -504,12 +508,12 @@ class Twin:
             cylinder_forces=rows[:, at.cylinder_forces],
             clearances=rows[:, at.pins].reshape(len(rows), len(self.plan.pins), PIN),
             moments=found.moments[own].copy(),
-            outlines=dict(self._news.outlines),
+            outlines=self._news.outlines,
         )
 
     def _reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
         """What the compiled update found of samples with these stamps (ns)."""
-        block = ReportBlock(stamps, self._predictions(), self._residuals(), dict(self._news.health))
+        block = ReportBlock(stamps, self._predictions(), self._residuals(), self._news.health)
         if not self._news.deflected:
             return [block]
         reports = enumerate(block.reports(self.plan.joints))
@@ -738,6 +742,7 @@ class Twin:
         return Report(sample.stamp, False, events=events, status=status)
 
 
+@dataclass
 class _News:
     """What one call of the compiled update gives beside numbers.
 
@@ -745,16 +750,10 @@ class _News:
     residuals that the health monitor knows.
     """
 
-    def __init__(self) -> None:
-        self.outlines: dict[int, Outline] = {}
-        self.health: dict[int, Health] = {}
-        self.deflected: set[int] = set()
-        self.told = 0, 0
-
-    def clear(self, found: Found) -> None:
-        """Before the next call."""
-        found.counts[:] = 0
-        self.__init__()  # type: ignore[misc]
+    outlines: dict[int, Outline] = field(default_factory=dict)
+    health: dict[int, Health] = field(default_factory=dict)
+    deflected: set[int] = field(default_factory=set)
+    told: tuple[int, int] = (0, 0)
 
 
 def _are_readings(values: list[float]) -> bool:

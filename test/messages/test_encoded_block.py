@@ -30,10 +30,10 @@ def told(block: EncodedBlock) -> Messages:
     return list(zip((keys[k] for k in range(len(keys))), block.log_times.tolist(), block.data() if keys else [], strict=True))
 
 
-def in_blocks(encoder: ReportEncoder, reports: list[Report], size: int) -> Messages:
+def in_blocks(encoder: ReportEncoder, reports: list[Report], size: int, joints: int) -> Messages:
     found: Messages = []
     for first in range(0, len(reports), size):
-        (block,) = pack(reports[first : first + size])
+        (block,) = pack(reports[first : first + size], joints)
         assert isinstance(block, ReportBlock)
         found += told(encoder.fill_block(block))
     return found
@@ -46,7 +46,7 @@ def test_a_block_gives_the_messages_of_its_reports(rig: Told, size: int) -> None
     one, many = (ReportEncoder(boom(rig.joints), Settings()) for _ in range(2))
     expected = one_by_one(one, reports)
     assert {key for key, _, _ in expected} >= {Output.SHAPE, Output.RESIDUALS, Output.TIP_ACCELERATION}
-    assert in_blocks(many, reports, size) == expected
+    assert in_blocks(many, reports, size, rig.joints) == expected
 
 
 def test_blocks_and_reports_in_turn() -> None:
@@ -56,12 +56,12 @@ def test_blocks_and_reports_in_turn() -> None:
     found = []
     for first in range(0, 400, 40):
         part = reports[first : first + 40]
-        found += in_blocks(other, part, 40) if first % 80 else one_by_one(other, part)
+        found += in_blocks(other, part, 40, 3) if first % 80 else one_by_one(other, part)
     assert found == one_by_one(one, reports)
 
 
 def test_a_block_without_messages() -> None:
-    (block,) = pack([Report(5, True), Report(6, True)])
+    (block,) = pack([Report(5, True), Report(6, True)], 3)
     assert isinstance(block, ReportBlock)
     encoded = ReportEncoder(boom(3), Settings()).fill_block(block)
     assert encoded.rows == [] and len(encoded.log_times) == 0
@@ -70,7 +70,7 @@ def test_a_block_without_messages() -> None:
 def test_a_block_says_the_same_as_its_reports() -> None:
     """Less events and status, which are not written."""
     reports = random_reports(2, 300, Told(3, pins=2, health=0.1))
-    (block,) = pack([replace(report, events=("deflected",), status="no") for report in reports])
+    (block,) = pack([replace(report, events=("deflected",), status="no") for report in reports], 3)
     assert isinstance(block, ReportBlock)
     encoder, other = (ReportEncoder(boom(3), Settings()) for _ in range(2))
     back = block.reports(3)
@@ -84,7 +84,7 @@ def test_a_block_says_the_same_as_its_reports() -> None:
 
 def test_a_report_with_a_change_stays_by_itself() -> None:
     reports = random_reports(3, 200, Told(2, changes=0.05))
-    packed = pack(reports)
+    packed = pack(reports, 2)
     changed = [report for report in reports if report.change is not None]
     assert len(changed) > 3 and [each for each in packed if isinstance(each, Report)] == changed
     one, other = (ReportEncoder(boom(2), Settings()) for _ in range(2))

