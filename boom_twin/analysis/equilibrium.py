@@ -281,7 +281,9 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
-    state.history[X, plan.tables.parts.history + 2] = 0.0  # of barrels and rods: angles within half a turn, whatever was tried
+    for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
+        own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
+        state.history[X, plan.tables.parts.history[own] + 2] = 0.0
     status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
     return bool(status == OK and is_stable(loaded, state, work))
 

@@ -15,10 +15,12 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.offline.ground_truth import load_truth
+from boom_twin.offline.recording import Recording
+from boom_twin.twin.blocks import SampleBlock
 
 ROOT = Path(__file__).parents[2]
 SESSION = ROOT / "bags" / "arch_session"
@@ -43,9 +45,11 @@ def errors(stamps, strokes, **tuning) -> tuple[float, float, float]:
     """Tip error (mm rms), acceleration error (m/s^2 rms), microseconds per sample."""
     twin, truth = Twin(load_scene(), Settings(**tuning)), load_truth(SESSION)
     start = time.perf_counter()
-    predictions = [twin.update(Sample(Stream.STROKES, t, y)).prediction for t, y in zip(stamps, strokes, strict=True)]
+    recording = Recording(strokes.shape[1])
+    for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), np.array(stamps), strokes)):
+        recording.add(part)
     spent = 1e6 * (time.perf_counter() - start) / len(stamps)
-    found = truth.errors(predictions)
+    found = truth.errors(recording.predictions, slice(None))
     return 1e3 * found["tip_error_rms_m"], found["tip_acceleration_error_rms_m_s2"], spent
 
 

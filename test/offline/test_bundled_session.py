@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin import Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.report_encoder import ReportEncoder
@@ -16,6 +16,8 @@ from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.ground_truth import load_truth
+from boom_twin.offline.recording import Recording
+from boom_twin.twin.blocks import SampleBlock
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SENSOR = 1.745e-4  # rad, a joint encoder's own noise
@@ -48,8 +50,10 @@ def test_true_strokes_leave_the_lag_of_the_estimator_alone():
     strokes = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)])
     stamps = np.round(truth["t_s"] * 1e9).astype(np.int64)
     twin = Twin(load_scene())
-    predictions = [twin.update(Sample(Stream.STROKES, int(t), y)).prediction for t, y in zip(stamps, strokes, strict=True)]
-    assert load_truth(SESSION).errors(predictions)["tip_acceleration_error_rms_m_s2"] < 0.10
+    recording = Recording(4)
+    for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), stamps, strokes)):
+        recording.add(part)
+    assert load_truth(SESSION).errors(recording.predictions, slice(None))["tip_acceleration_error_rms_m_s2"] < 0.10
 
 
 @pytest.mark.slow
