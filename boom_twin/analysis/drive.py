@@ -92,7 +92,7 @@ class Run(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Course:
+class DriveFromRest:
     """Rows of a drive, and the boom at rest at the first of them.
 
     Attributes

@@ -1,6 +1,7 @@
 """Estimate the error of a simulated motion by Richardson extrapolation, and say where the result cannot be trusted.
 
-Two estimates of errors: while stepping, the changes of the tip's acceleration give that of its place for nothing (`doubt`);
+Two estimates of errors: while stepping, the changes of the tip's acceleration give that of its place for nothing
+(`step_error_warning`);
 the same motion run again, otherwise resolved, gives those of acceleration and forces too.
 
 A finer step tells what stepping adds; every second row of the drive what the curve between the rows adds. (Hairer, Norsett
@@ -20,7 +21,7 @@ from ..config.settings import STROKE_RATE
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
 from ..types import Array
-from .drive import Course, Run
+from .drive import DriveFromRest, Run
 
 COARSE = 0.01  # estimated error as a share of the tip's travel
 SHORTEST = 1e-3  # m of travel that an error is measured against at least
@@ -57,7 +58,7 @@ class EstimatedError:
         return f"{self.what} may be off by {share} of {self.of} at t = {self.time:g} s (bound {self.bound:.0%})"
 
 
-def doubt(jolt: float, shake: float, travel: float, square: float) -> str:
+def step_error_warning(jolt: float, shake: float, travel: float, square: float) -> str:
     """A sentence with its remedy, or nothing.
 
     One step of a second-order scheme errs by about h^2/12 |a' - a|.
@@ -79,16 +80,16 @@ def doubt(jolt: float, shake: float, travel: float, square: float) -> str:
     return ""
 
 
-def told(deviations: Iterable[EstimatedError], cause: str, remedy: str) -> tuple[str, ...]:
+def warnings_of(deviations: Iterable[EstimatedError], cause: str, remedy: str) -> tuple[str, ...]:
     """A sentence for each deviation beyond its bound."""
     return tuple(f"{cause}: {deviation}; {remedy}" for deviation in deviations if not deviation.share <= deviation.bound)
 
 
 def ringing(jolt: float, shake: float, square: float) -> tuple[str, ...]:
-    """A sentence where the acceleration of the tip changes sign from step to step; parameters as those of `doubt`."""
+    """A sentence where the tip's acceleration changes sign from step to step; parameters as of `step_error_warning`."""
     rings = jolt > RINGING * shake and shake > QUIET * square
-    told = "the accelerations change sign from step to step; take more numerical damping, a rho well below 1"
-    return (told,) if rings else ()
+    sentence = "the accelerations change sign from step to step; take more numerical damping, a rho well below 1"
+    return (sentence,) if rings else ()
 
 
 def too_fast(times: Array, rates: Array) -> tuple[str, ...]:
@@ -109,13 +110,13 @@ BY_STEPS = 2.0  # error over the change that a finer step makes; by halves 4/3 f
 BY_ROWS = 1.5  # error over the change that every second row makes: 1/3 for smooth drives, 1 and more at kinks
 
 
-def step_errors(course: Course, own: Run, dt: float) -> tuple[EstimatedError, ...]:
+def step_errors(course: DriveFromRest, own: Run, dt: float) -> tuple[EstimatedError, ...]:
     """What steps of at most `dt` (s) added to the motion `own`; `differences` tells of what."""
     rows, finer = np.arange(len(course.times)), 8 if course.plan.pins else 2
     return _compared(course.times, own.rows, course.stepped(rows, dt, finer), BY_STEPS)
 
 
-def row_errors(course: Course, own: Run) -> tuple[EstimatedError, ...]:
+def row_errors(course: DriveFromRest, own: Run) -> tuple[EstimatedError, ...]:
     """What may lie between the rows of the motion `own`; nothing for less than three rows.
 
     Rows are left out in both ways, the odd ones and the even ones, because a kink shows in one of them only.

@@ -21,7 +21,7 @@ from ..scene.schema import Scene
 from ..types import Array
 from .drive import PASSES, TOLERANCE
 from .equilibrium import settle
-from .error_estimate import doubt
+from .error_estimate import step_error_warning
 from .simulate import RHO
 
 FAMILIES = {
@@ -73,7 +73,7 @@ class Method:
 
 
 @dataclass(frozen=True)
-class March:
+class MethodRun:
     """Rows of a motion. Rows after a failure are NaN.
 
     Attributes
@@ -110,7 +110,7 @@ class March:
     doubt: str = ""
 
 
-def march(
+def integrate_with(
     scene: Scene,
     drive: Drive,
     duration: float,
@@ -120,7 +120,7 @@ def march(
     basis: BasisName = "end-shapes",
     angles: Array | None = None,
     repeats: int = 1,
-) -> March:
+) -> MethodRun:
     """Start at rest in the equilibrium of the drive at t = 0 and follow it in equal steps.
 
     Parameters
@@ -134,7 +134,7 @@ def march(
 
     Returns
     -------
-    March
+    MethodRun
         Rows of the motion, the status of its steps, and the time that they took.
 
     Raises
@@ -156,7 +156,7 @@ def march(
     last, found = runs[-1], taken_apart(plan, runs[-1].out)
     tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
-    return March(
+    return MethodRun(
         times=np.asarray(step * every * np.arange(rows + 1), float),
         tip=tip[:, 0, :2],
         tip_acceleration=tip[:, 2, :2],
@@ -167,7 +167,7 @@ def march(
         steps=rows * every,
         passes=last.passes / (max(last.row, 1) * every),
         status="ok" if last.status == OK else SENTENCES[last.status],
-        doubt=doubt(last.jolt, last.shake, travel, step * rows * every * step) if last.status == OK else "",
+        doubt=step_error_warning(last.jolt, last.shake, travel, step * rows * every * step) if last.status == OK else "",
     )
 
 

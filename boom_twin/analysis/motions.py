@@ -158,7 +158,7 @@ FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
 
 
 @dataclass(frozen=True)
-class Halt:
+class StopMotion:
     """Strokes that reach full speed within `ramp`, brake from `stop` on within `brake` (s), and hold. n cylinders.
 
     Attributes
@@ -194,14 +194,14 @@ class Halt:
         return self.first + np.outer(gone, self.speed), np.outer(ease(x) - ease(y), self.speed)
 
 
-def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> Halt:
+def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> StopMotion:
     """Full speed in the directions of the study's motion, no farther than it goes; `only` one cylinder (from 0): up to half."""
     own = motion_of(scene, posture)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     travel = np.where(np.arange(len(full)) == only, 0.5 * full, 0.0) if only is not None else own.travel
     lasting = STOP - 0.5 * RAMP + 0.5 * brake
     speed = np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
-    return Halt(own.angles, own.first, speed, brake)
+    return StopMotion(own.angles, own.first, speed, brake)
 
 
 def ease(x: Array) -> Array:

@@ -14,9 +14,9 @@ from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
-from .drive import Course, Run
+from .drive import DriveFromRest, Run
 from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
-from .error_estimate import EstimatedError, ringing, row_errors, step_errors, told, too_fast
+from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
 
 RHO = 0.8
 
@@ -132,7 +132,7 @@ def simulate(
     """
     times, strokes = _checked(scene, times, strokes, dt)
     plan, start, work = rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-    course = Course(plan, start, work, times, strokes, rho)
+    course = DriveFromRest(plan, start, work, times, strokes, rho)
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
@@ -155,8 +155,10 @@ def _doubts(
     """What the motion `own` in steps of `dt` (s), rows at `times` (s), itself gives reason to doubt."""
     apart = float(np.diff(times, prepend=times[0]).max())
     yield from ringing(own.jolt, own.shake, own.square)
-    yield from told(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")
-    yield from told(by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together")
+    yield from warnings_of(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")
+    yield from warnings_of(
+        by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"
+    )
     yield from too_fast(times, own.rates)
 
 

@@ -43,7 +43,7 @@ def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints:
     """
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
-            yield told_beyond(topics.inputs[stream].absolute, beyond, stream, joints, scene)
+            yield extra_names_message(topics.inputs[stream].absolute, beyond, stream, joints, scene)
     found = names.get(Stream.STROKES, ())
     lacking = [sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values() if sensor.name not in found]
     if found and lacking:
@@ -53,7 +53,7 @@ def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints:
         )
 
 
-def told_beyond(topic: str, names: Collection[str], stream: Stream, joints: int, scene: str) -> str:
+def extra_names_message(topic: str, names: Collection[str], stream: Stream, joints: int, scene: str) -> str:
     """That a topic names cylinders or joints beyond those of the scene, and what to do about it."""
     kind = KINDS[stream]
     return (

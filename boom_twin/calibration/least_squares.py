@@ -153,7 +153,7 @@ HELPS = 0.5  # of the deviation left, from which on a posture is worth the way
 
 
 @dataclass(frozen=True)
-class Group:
+class InseparableUnknowns:
     """Unknowns that the sessions cannot tell apart, or do not show.
 
     Attributes
@@ -180,7 +180,7 @@ class Group:
         return f"{what}; a hold of {MORE:g} s in posture {self.posture} {verb}. Left as before."
 
 
-def groups_of(problem: CalibrationProblem, fit: Fit) -> list[Group]:
+def groups_of(problem: CalibrationProblem, fit: Fit) -> list[InseparableUnknowns]:
     """Unknowns whose estimates are too uncertain to be of use, together with those that they are confused with."""
     covariance = fit.covariance()
     spread = np.sqrt(np.diag(covariance))
@@ -202,7 +202,7 @@ def _useful(problem: CalibrationProblem) -> Array:
     return np.array([unknown.kind.useful / unknown.kind.prior for unknown in problem.unknowns])
 
 
-def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> Group:
+def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> InseparableUnknowns:
     """The group with the posture that leaves least of its uncertainty."""
     names, useful = tuple(problem.unknowns[i].name for i in group), _useful(problem)
 
@@ -212,8 +212,8 @@ def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> Gr
     found = {posture: left(more) for posture, more in _in_postures(problem, fit).items()}
     best = min(found, key=lambda posture: found[posture], default=None)
     if best is None or found[best] > max(1.0, HELPS * left(0.0)):
-        return Group(names)
-    return Group(names, best, found[best] <= 1.0)
+        return InseparableUnknowns(names)
+    return InseparableUnknowns(names, best, found[best] <= 1.0)
 
 
 def _in_postures(problem: CalibrationProblem, fit: Fit) -> dict[str, Array]:

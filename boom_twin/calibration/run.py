@@ -15,7 +15,7 @@ from ..scene.edit import with_parameters
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Stream
 from .forward_model import READINGS, CalibrationProblem
-from .least_squares import Fit, Group, fitted, groups_of
+from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
 from .noise_model import block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
 from .unknowns import Unknown, unknowns_of, usual_names
@@ -66,7 +66,7 @@ class Calibration:
     zeros : dict of str to float
         What sensors read too much (SI) beyond the mapping, by channel; likewise.
     estimates : tuple of Estimate
-    groups : tuple of Group
+    groups : tuple of InseparableUnknowns
         What the sessions do not tell.
     misfit : float
         Root mean square of the white residuals of the fit; 1 where the model explains all but noise.
@@ -85,7 +85,7 @@ class Calibration:
     scene: Scene
     zeros: dict[str, float]
     estimates: tuple[Estimate, ...]
-    groups: tuple[Group, ...]
+    groups: tuple[InseparableUnknowns, ...]
     misfit: float
     passes: int
     sessions: tuple[MeasuredSession, ...]
@@ -226,7 +226,7 @@ def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], course
                 )
 
 
-def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Group]) -> tuple[Estimate, ...]:
+def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[InseparableUnknowns]) -> tuple[Estimate, ...]:
     untold = {name for group in groups for name in group.names}
     reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
     found = []

@@ -91,7 +91,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     ahead, old = False, track.nodes[0] - 1
     boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
     while True:
-        if not ahead and not left_behind(track, tuning, old):
+        if not ahead and not anchor_must_advance(track, tuning, old):
             track.nodes[0] = old + 1
             if track.moved[0] == 0:
                 hold(track, track.x[old])
@@ -130,7 +130,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
 
 
 @inner
-def left_behind(track, tuning, old):
+def anchor_must_advance(track, tuning, old):
     """Whether the anchor, at the oldest node, has to go on: the node before it is older than the lag, or room runs out."""
     return old > 1 and (track.times[0] - track.times[old - 1] >= tuning.lag or old == NODES - 1)
 

@@ -54,7 +54,7 @@ def learn(
     rounds = [(ratio, key) for ratio in RATIOS for _ in range(ROUNDS) for key in SEARCHED]
     for done, (ratio, key) in enumerate(rounds):
         progress(done / len(rounds))
-        best = _climb(sessions, known, joints, best, key, ratio)
+        best = _line_search(sessions, known, joints, best, key, ratio)
     progress(1.0)
     regression, _ = _run(sessions, known, joints, best)
     learnt = [i for i, each in enumerate(known) if each.healthy > 0.0]
@@ -68,7 +68,7 @@ def learn(
     )
 
 
-def _climb(
+def _line_search(
     sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, start: Baseline, key: str, ratio: float
 ) -> Baseline:
     """Go up or down with one value as long as innovations get more probable."""

@@ -12,7 +12,7 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
-from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, Compared, Followed, means
+from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import SensorCheck, SensorMonitor, sensor_ranges
 
@@ -68,11 +68,11 @@ class HealthMonitor:
             self._ended.append(ended)
         self.residuals.begin()
 
-    def predicted(self, followed: Followed) -> None:
+    def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
         self._blocks.predicted(followed)
 
-    def measured(self, stream: Stream, compared: Compared) -> None:
+    def measured(self, stream: Stream, compared: MeasuredRows) -> None:
         """Samples of one stream with their residuals, at least one."""
         self._blocks.measured(stream, compared)
 
@@ -132,7 +132,7 @@ class HealthMonitor:
             self.residuals.forget()
         return news
 
-    def _means(self, block: Block, predictions: Followed, left: dict[Stream, Array]) -> BlockMeans:
+    def _means(self, block: Block, predictions: PredictionRows, left: dict[Stream, Array]) -> BlockMeans:
         """Means of the residuals (k, channels) of every stream that is judged."""
         stamps, found = predictions.stamps, []
         for stream in JUDGED:

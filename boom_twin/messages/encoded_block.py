@@ -51,7 +51,7 @@ class EncodedBlock(NamedTuple):
         return [found[row] for row in np.argsort(places)]
 
 
-class BlockBuilder:
+class EncodedBlockBuilder:
     """Brings groups of encoded messages into the order of the samples that caused them."""
 
     def __init__(self) -> None:

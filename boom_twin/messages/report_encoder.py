@@ -19,7 +19,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, Integers, PredictionBlock, ReportBlock, ResidualBlock
 from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
-from .encoded_block import BlockBuilder, Bytes, EncodedBlock
+from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
 from .message_fields import fill_header, fill_xz
 from .sample_decoder import stamp_of
@@ -175,7 +175,7 @@ class ReportEncoder:
 
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
         """The messages of many reports: those that `fill` gives of one after the other."""
-        p, residuals, found = block.predictions, block.residuals, BlockBuilder()
+        p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
         turn = len(self._predicted)  # of joint_states among the messages of one sample; residuals follow
         last = turn + 1 + len(residuals.at)  # of health; shape follows
         if len(p.at):

@@ -163,7 +163,7 @@ def swing_picture(path: Path, title: str, note: str, traces: list[Trace], until:
 
 
 @dataclass(frozen=True)
-class Sinking:
+class RestOffsetCurve:
     """Distance (m) of the resting tip from that with ideal pins over clearances (m), both (k,), for one pin in a posture."""
 
     posture: str
@@ -172,7 +172,7 @@ class Sinking:
     shifts: Array
 
 
-def sinking_picture(path: Path, title: str, note: str, found: list[Sinking], switch: float) -> None:
+def sinking_picture(path: Path, title: str, note: str, found: list[RestOffsetCurve], switch: float) -> None:
     """Write a panel a posture; below `switch` (m) a pin is ideal."""
     postures = list(dict.fromkeys(own.posture for own in found))
     with picture(path, title, note, (4.6 * max(len(postures), 2), 6.4)) as figure:

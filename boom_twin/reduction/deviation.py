@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.equilibrium import settle
-from ..analysis.methods import march
+from ..analysis.methods import integrate_with
 from ..analysis.modal import natural_modes
 from ..analysis.motions import DURATION, Motion, motion_of
 from ..compiler.compile import compile_scene
@@ -103,7 +103,9 @@ def answer(scene: Scene, course: StrokeCourse, frequencies: int = 0) -> Response
     try:
         plan = compile_scene(scene)
         rest, found = _at_rest(plan, course, frequencies)
-        moved = march(scene, course.motion, course.motion.duration, course.step, course.every, angles=course.motion.angles)
+        moved = integrate_with(
+            scene, course.motion, course.motion.duration, course.step, course.every, angles=course.motion.angles
+        )
     except SolverError as error:
         nothing = np.zeros((0, 2))
         return Response(nothing, np.zeros(0), nothing, np.nan, str(error))
@@ -161,6 +163,6 @@ def step_times(scenes: Sequence[Scene], course: StrokeCourse, rounds: int) -> Ar
     motion, least = course.motion, np.full(len(scenes), np.inf)
     for _ in range(rounds):
         for k, scene in enumerate(scenes):
-            run = march(scene, motion, STEPS * course.step, course.step, every=STEPS, angles=motion.angles)
+            run = integrate_with(scene, motion, STEPS * course.step, course.step, every=STEPS, angles=motion.angles)
             least[k] = min(least[k], run.seconds / run.steps)
     return least

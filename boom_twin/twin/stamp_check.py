@@ -153,7 +153,7 @@ class TimeStep(Enum):
     NEITHER = "neither"
 
 
-def surprise(strokes: Array, expected: Array) -> float:
+def largest_difference(strokes: Array, expected: Array) -> float:
     """Largest difference of strokes, m; those that are missing do not count, and none at all is 0."""
     return float(np.fmax.reduce(np.abs(strokes - expected), initial=0.0))
 
@@ -165,12 +165,12 @@ def closeness(usual: float, settings: Settings) -> float:
 
 def is_close(strokes: Array, expected: Array, usual: float, settings: Settings) -> bool:
     """Whether strokes (m) are where they are expected."""
-    return surprise(strokes, expected) <= closeness(usual, settings)
+    return largest_difference(strokes, expected) <= closeness(usual, settings)
 
 
-def goes_on(boom: BoomPredictor, before: Array, strokes: Array, span: float, usual: float, settings: Settings) -> bool:
+def is_continuous(boom: BoomPredictor, before: Array, strokes: Array, span: float, usual: float, settings: Settings) -> bool:
     """Whether strokes (m) are where those of the newest sample, `before`, would be `span` s later."""
-    return surprise(strokes, nearest(boom, before, strokes, span)) <= closeness(usual, settings)
+    return largest_difference(strokes, nearest(boom, before, strokes, span)) <= closeness(usual, settings)
 
 
 def nearest(boom: BoomPredictor, before: Array, strokes: Array, span: float) -> Array:
@@ -211,14 +211,14 @@ def explain(
     """
     first, later = strokes
     after = ((first, usual), (later, usual + apart))
-    miss = max(surprise(y, nearest(boom, before, y, time)) for y, time in after)
+    miss = max(largest_difference(y, nearest(boom, before, y, time)) for y, time in after)
     fits = miss <= closeness(usual, settings)
     if not 0.0 < span <= settings.restart_gap:
         return TimeStep.CLOCK if fits else TimeStep.NEITHER
     if fits and RATIO * miss < boom.least_way(min(max(span - usual, 0.0), LONGEST), SURE):
         return TimeStep.CLOCK
     reach = FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span
-    if surprise(first, boom.extrapolated(0.0)) <= reach:
+    if largest_difference(first, boom.extrapolated(0.0)) <= reach:
         return TimeStep.EITHER if fits else TimeStep.PAUSE
     return TimeStep.NEITHER
 

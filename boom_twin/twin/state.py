@@ -104,7 +104,7 @@ class Limits(NamedTuple):
     channels: Integers
 
 
-class Found(NamedTuple):
+class UpdateOutput(NamedTuple):
     """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 
     rows : results and estimates, see `boom_twin.kernels.result_row`. measured : strokes less their zeros, m. raw : as measured.
@@ -156,10 +156,10 @@ def new_state(joints: int, channels: Integers) -> TwinState:
     )  # fmt: skip
 
 
-def new_found(samples: int, joints: int, row: int, moments: int, channels: Integers) -> Found:
+def new_output(samples: int, joints: int, row: int, moments: int, channels: Integers) -> UpdateOutput:
     """Room for what so many samples can cause."""
     width, residuals = int(channels.max()), samples + WAITING
-    return Found(
+    return UpdateOutput(
         counts=np.zeros(2, np.int64), at=np.zeros(samples, np.int64), stamps=np.zeros(samples, np.int64),
         rows=np.zeros((samples, row)), moments=np.zeros((samples, moments)), measured=np.zeros((samples, joints)),
         passes=np.zeros(samples, np.int64), residual_at=np.zeros(residuals, np.int64),

@@ -17,7 +17,7 @@ from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem, Compared, Followed
+from ..health.inference.block_problem import BlockProblem, MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.result_row import PIN
 from ..kernels.tables import SENTENCES
@@ -29,7 +29,7 @@ from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .blocks import CODES, STREAMS, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
 from .expected_readings import Deviations
 from .sample_check import SHORTEST, SampleCheck
-from .stamp_check import LASTING, StampCheck, TimeStep, explain, goes_on, is_close, jerk_densities, surprise
+from .stamp_check import LASTING, StampCheck, TimeStep, explain, is_close, is_continuous, jerk_densities, largest_difference
 from .state import (
     BEGINS_SLOT,
     EPOCH,
@@ -44,7 +44,7 @@ from .state import (
     Limits,
     TwinState,
     keep_waiting,
-    new_found,
+    new_output,
     new_state,
 )  # fmt: skip
 from .stroke_check import FAR, StrokeCheck
@@ -245,8 +245,8 @@ class Twin:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
         self._limits, compiled = self._limited(SHARE * scene.reach), self._boom.compiled
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, self._counts.max()), np.nan))
-        self._found = new_found(CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
-        self._news = _News()
+        self._found = new_output(CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
+        self._news = _UpdateExtras()
 
     def _limited(self, valid: float) -> Limits:
         """What the compiled update judges by, under the present settings."""
@@ -424,7 +424,7 @@ class Twin:
     def _forget_found(self) -> None:
         """Before the next call of the compiled update."""
         self._found.counts[:] = 0
-        self._news = _News()
+        self._news = _UpdateExtras()
 
     def _advance_strokes(self, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
@@ -466,7 +466,7 @@ class Twin:
         if new.stop > new.start:
             rows = found.rows[new].copy()
             acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
-            followed = Followed(
+            followed = PredictionRows(
                 found.stamps[new].copy(), found.measured[new].copy(), rows[:, at.strokes], rows[:, at.joints], acceleration
             )
             self.judge.predicted(followed)
@@ -475,7 +475,7 @@ class Twin:
             for code in sorted(set(streams.tolist())):
                 own, width = np.flatnonzero(streams == code) + last.start, int(self._counts[code])
                 self.judge.measured(
-                    STREAMS[code], Compared(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
+                    STREAMS[code], MeasuredRows(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
                 )
         news.told = new.stop, last.stop
 
@@ -550,7 +550,7 @@ class Twin:
         if 0 <= span < SHORTEST:
             same = is_close(values, run.strokes, 0.0, self.settings)
             return self._refuse(sample, "duplicate" if same else "second source")
-        if line.is_soon(sample.stamp) and goes_on(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
+        if line.is_soon(sample.stamp) and is_continuous(self._boom, run.strokes, values, span * NANO, 0.0, self.settings):
             return self._follow(sample, values, complete, [])
         then = run.strokes_at(sample.stamp)
         back = (run.newest - sample.stamp) * NANO
@@ -573,7 +573,7 @@ class Twin:
             return False
         last = line.held[-1][0]
         way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
-        return bool(surprise(sample.values, last.values) > way)
+        return bool(largest_difference(sample.values, last.values) > way)
 
     def _is_late(self, run: _Run, stamp: int, values: Array) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""
@@ -743,7 +743,7 @@ class Twin:
 
 
 @dataclass
-class _News:
+class _UpdateExtras:
     """What one call of the compiled update gives beside numbers.
 
     outlines by row of a prediction, health by row of a sample, deflected: rows of samples; told: rows of predictions and of

@@ -101,7 +101,7 @@ def update(t, anchor, live, work, track, bending, out, limits, state, streams, s
                 return REFRESH, row
         resumed = False
         remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, stamp, row, found)
-        settle(limits, state, row, found)
+        flush_waiting(limits, state, row, found)
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1
@@ -225,7 +225,7 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
             forget_waiting(state.waiting, 1)
             state.clock[UNMATCHED] += 1
         wait(limits, state, stream, stamp, values)
-    elif not give(limits, state, stream, stamp, values, row, found):
+    elif not write_residual(limits, state, stream, stamp, values, row, found):
         return False
     if not trusted:
         note_stamp(state, stream, stamp)
@@ -269,11 +269,11 @@ def move_row(ring, old, new):
 
 
 @inner
-def settle(limits, state, row, found):
+def flush_waiting(limits, state, row, found):
     """Residuals of all samples that waited for the newest stroke."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
-        if not give(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
+        if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
             state.clock[UNMATCHED] += 1
         done += 1
     if done > 0:
@@ -289,7 +289,7 @@ def forget_waiting(ring, count):
 
 
 @inner
-def give(limits, state, stream, stamp, values, row, found):
+def write_residual(limits, state, stream, stamp, values, row, found):
     """Residuals of one sample against what was expected at its stamp; False if nothing was."""
     after, share = matched(state.past, stamp)
     if after < 0:

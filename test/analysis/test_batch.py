@@ -8,7 +8,7 @@ from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin.analysis.batch import Batch
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
@@ -39,7 +39,7 @@ def test_each_boom_is_stepped_as_it_is_alone(cores):
     rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=3)
     assert rows.shape == (5, STEPS // 3, 17) and not batch.failures()
     for i, scene in enumerate(scenes):
-        alone = march(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
+        alone = integrate_with(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
         assert np.array_equal(rows[i][:, :4], alone.joints[1:])
         assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
         assert np.array_equal(first[i][8:10], alone.tip[0])
@@ -55,7 +55,7 @@ def test_booms_on_worn_pins_are_stepped_as_each_is_alone():
     rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=3)
     assert rows.shape == (3, STEPS // 3, 17 + 4 * 5) and not batch.failures()
     for i, scene in enumerate(scenes):
-        alone = march(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
+        alone = integrate_with(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
         assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
         assert np.array_equal(rows[i][:, 17:].reshape(-1, 5, 4), alone.pins[1:])
 

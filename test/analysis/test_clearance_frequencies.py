@@ -9,7 +9,7 @@ from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 
 from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.reference.worn_pin import geometry
@@ -60,7 +60,7 @@ def test_a_boom_on_a_worn_pin_swings_at_its_natural_frequency(index, treatment):
         shape, rate = x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * x**2 * (1.0 - x) ** 2 / 0.02
         return first + chosen * shape, chosen * rate
 
-    found = march(scene, drive, 4.0, 1e-3)
+    found = integrate_with(scene, drive, 4.0, 1e-3)
     late, times = found.tip[100:, 1], found.times[100:]
     late = late - late[900:].mean()
     up = np.flatnonzero((late[:-1] < 0.0) & (late[1:] >= 0.0))

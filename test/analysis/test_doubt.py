@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boom_twin.analysis.methods import Method, march
+from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.scene import load_scene
 from boom_twin.validation.study.stability.setups import cylinders, dead_stop, smooth
@@ -17,7 +17,7 @@ SCENE = load_scene()
 
 def marched(step, duration=4.0, method=None, scene=SCENE, every=1):
     move = motion_of(scene)
-    return march(scene, move, duration, step, every, method, angles=move.angles)
+    return integrate_with(scene, move, duration, step, every, method, angles=move.angles)
 
 
 def test_the_default_step_raises_no_doubt():
@@ -29,8 +29,8 @@ def test_the_default_step_raises_no_doubt():
 def test_the_estimate_is_near_the_error(step):
     """The doubt names a share of the tip's path; the true one is within a factor of three."""
     own = smooth(SCENE, None, 1.0, 0.4, 2.0, step)
-    coarse = march(SCENE, own.drive, 2.0, step, 1, angles=own.angles)
-    fine = march(SCENE, own.drive, 2.0, step / 20, 20, angles=own.angles)
+    coarse = integrate_with(SCENE, own.drive, 2.0, step, 1, angles=own.angles)
+    fine = integrate_with(SCENE, own.drive, 2.0, step / 20, 20, angles=own.angles)
     path = np.linalg.norm(fine.tip - fine.tip[0], axis=1).max()
     error = np.linalg.norm(coarse.tip - fine.tip, axis=1).max() / path
     assert coarse.doubt.startswith("the step is coarse")
@@ -40,12 +40,12 @@ def test_the_estimate_is_near_the_error(step):
 
 def test_ringing_is_doubted():
     stop = dead_stop(cylinders(SCENE, None))
-    found = march(stop.scene, stop.drive, 1.0, stop.step, 1, Method(parameter=1.0), angles=stop.angles)
-    calm = march(stop.scene, stop.drive, 1.0, stop.step, 1, angles=stop.angles)
+    found = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, Method(parameter=1.0), angles=stop.angles)
+    calm = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, angles=stop.angles)
     assert "change sign from step to step" in found.doubt and calm.doubt == ""
 
 
 def test_a_boom_at_rest_raises_no_doubt():
     move = motion_of(SCENE)
     still = replace(move, travel=0.0 * move.travel)
-    assert march(SCENE, still, 2.0, 2e-2, angles=move.angles).doubt == ""
+    assert integrate_with(SCENE, still, 2.0, 2e-2, angles=move.angles).doubt == ""

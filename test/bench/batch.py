@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from boom_twin.analysis.batch import Batch
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import Plan
 from boom_twin.scene import Scene, load_scene
@@ -52,7 +52,7 @@ def main() -> None:
     def drive(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return start + np.outer(times**3, [0.05, 0.0, 0.03, 0.0]), np.outer(3 * times**2, [0.05, 0.0, 0.03, 0.0])
 
-    alone = min(march(scene, drive, STEPS * STEP, STEP, angles=angles).seconds for _ in range(31)) / STEPS
+    alone = min(integrate_with(scene, drive, STEPS * STEP, STEP, angles=angles).seconds for _ in range(31)) / STEPS
     print("| what | us for a step of one twin |\n|---|---|")
     print(f"| a single twin, {STEPS} steps in a call | {1e6 * alone:.2f} |")
     booms = plans(scene)

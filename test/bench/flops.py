@@ -140,7 +140,7 @@ def measured(counts: Counter[str]) -> None:
     import numpy as np
 
     from boom_twin import load_scene
-    from boom_twin.analysis.methods import march
+    from boom_twin.analysis.methods import integrate_with
     from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
     scene = load_scene()
@@ -149,7 +149,7 @@ def measured(counts: Counter[str]) -> None:
     def drive(times):
         return strokes + 0.05 * np.outer(times**3, np.ones(4)), 0.15 * np.outer(times**2, np.ones(4))
 
-    found = march(scene, drive, 0.4, 1e-3, angles=posture_angles(scene, "arch"), repeats=31)
+    found = integrate_with(scene, drive, 0.4, 1e-3, angles=posture_angles(scene, "arch"), repeats=31)
     step, work = found.seconds / found.steps, sum(counts.values())
     scalar, wide = machine_rate()
     print("| what | figure |\n|---|---|")

@@ -30,7 +30,7 @@ def memory(entry=None, force=0.0):
 
 def bearing(row, kept, x, y, vx, vy, turning=0.0, rate=0.0, axis=(1.0, 0.0)):
     """`contact.bearing` with the velocity at the start of the step equal to that at its end."""
-    return contact.bearing(row, kept, contact.Journal(x, y, vx, vy, vx, vy, turning, *axis), rate)
+    return contact.pin_force(row, kept, contact.Journal(x, y, vx, vy, vx, vy, turning, *axis), rate)
 
 
 class Journal:

@@ -66,7 +66,7 @@ class Ours:
         memory[contact.CLOSED], memory[contact.APPROACH] = entry is not None, entry or 0.0
         velocity = (rate.real, rate.imag)
         journal = contact.Journal(offset.real, offset.imag, *velocity, *velocity, 0.0, 1.0, 0.0)
-        found = contact.bearing(self.row, memory, journal, 0.0)
+        found = contact.pin_force(self.row, memory, journal, 0.0)
         return -complex(found.x, found.y)
 
 

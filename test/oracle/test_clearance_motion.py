@@ -9,7 +9,7 @@ import pytest
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, with_pins
 
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -38,7 +38,7 @@ def both(count, step, treatment="contact", clearance=1e-4, end=END, rows=4e-3):
         return strokes, rates
 
     every = round(rows / step)
-    moved = march(scene, drive, end, step, every, angles=np.diff(headings, prepend=0.0))
+    moved = integrate_with(scene, drive, end, step, every, angles=np.diff(headings, prepend=0.0))
     row = compile_scene(scene).tables.clearances[0]
     assert moved.status == "ok"
     return moved, oracle(count, float(row.stiffness), float(row.gap), tuple(np.round(moved.times, 9).tolist()))

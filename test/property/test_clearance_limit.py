@@ -8,7 +8,7 @@ from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
 from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW
 
@@ -33,7 +33,7 @@ def moved(scene, rise=RISE):
         shape, rate = x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * x**2 * (1.0 - x) ** 2 / rise
         return first + TRAVEL * shape, TRAVEL * rate
 
-    return march(scene, drive, rise + 0.1, STEP, EVERY)
+    return integrate_with(scene, drive, rise + 0.1, STEP, EVERY)
 
 
 def distance(one, other):

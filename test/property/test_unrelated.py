@@ -146,7 +146,7 @@ def stepped(motion, scene, plan):
     with pytest.MonkeyPatch.context() as patch:
         if plan is not None:
             patch.setattr(stepping, "compile_scene", lambda *_: plan)
-        run = stepping.march(scene, motion, STEPS * STEP, STEP, every=STEPS, angles=motion.angles)
+        run = stepping.integrate_with(scene, motion, STEPS * STEP, STEP, every=STEPS, angles=motion.angles)
     assert run.status == "ok"
     return run
 

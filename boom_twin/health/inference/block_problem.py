@@ -23,7 +23,7 @@ BLOCK = 100_000_000  # ns
 GRACE = 100_000_000  # ns that a block waits for late samples
 
 
-class Followed(NamedTuple):
+class PredictionRows(NamedTuple):
     """Predictions with the strokes that they followed.
 
     Attributes
@@ -45,7 +45,7 @@ class Followed(NamedTuple):
     accelerations: Array
 
 
-class Compared(NamedTuple):
+class MeasuredRows(NamedTuple):
     """Measured samples of one stream.
 
     Attributes
@@ -61,7 +61,7 @@ class Compared(NamedTuple):
     left: Array
 
 
-Rows = TypeVar("Rows", Followed, Compared)
+Rows = TypeVar("Rows", PredictionRows, MeasuredRows)
 
 
 class Block:
@@ -75,23 +75,23 @@ class Block:
 
     def __init__(self, number: int) -> None:
         self.number = number
-        self.followed: list[Followed] = []
-        self.compared: dict[Stream, list[Compared]] = {}
+        self.followed: list[PredictionRows] = []
+        self.compared: dict[Stream, list[MeasuredRows]] = {}
 
     @property
     def end(self) -> int:
         """Stamp (ns) at which it ends."""
         return (self.number + 1) * BLOCK
 
-    def predictions(self) -> Followed:
+    def predictions(self) -> PredictionRows:
         """All of them; there is at least one."""
         return joined(self.followed)
 
-    def readings(self, stream: Stream, channels: int) -> Compared:
+    def readings(self, stream: Stream, channels: int) -> MeasuredRows:
         """All samples of a stream with so many channels."""
         rows = self.compared.get(stream)
         if rows is None:
-            return Compared(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
+            return MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
         return joined(rows)
 
 
@@ -120,13 +120,13 @@ class BlockBuilder:
         self._open: deque[Block] = deque()
         self._closed = -1
 
-    def predicted(self, followed: Followed) -> None:
+    def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
         for number, rows in by_block(followed):
             if (block := self._at(number)) is not None:
                 block.followed.append(rows)
 
-    def measured(self, stream: Stream, compared: Compared) -> None:
+    def measured(self, stream: Stream, compared: MeasuredRows) -> None:
         """Samples of a stream with their residuals, at least one."""
         for number, rows in by_block(compared):
             if (block := self._at(number)) is not None:

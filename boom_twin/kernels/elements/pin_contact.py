@@ -60,7 +60,7 @@ class Journal(NamedTuple):
     axis_y: float
 
 
-class Hold(NamedTuple):
+class PinForce(NamedTuple):
     """What holds a journal back, and its turning.
 
     x, y : force, N. xx, xy, yy : its tangent by the offset, N/m.
@@ -78,7 +78,7 @@ class Hold(NamedTuple):
     torque_turn: float
 
 
-# Columns of `Work.hold`, a `Hold` for every pin.
+# Columns of `Work.hold`, a `PinForce` for every pin.
 HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, TORQUE, TORQUE_X, TORQUE_Y, TORQUE_TURN, HOLD_COLUMNS = range(10)
 
 CLEARANCE = np.dtype(
@@ -194,15 +194,15 @@ def approach(memory, nx, ny, vx, vy):
 
 
 @inner
-def bearing(row, memory, journal, rate):
-    """The `Hold` of the pin `row` on a `Journal`; rate : C of the integrator, dv/dx."""
+def pin_force(row, memory, journal, rate):
+    """The `PinForce` of the pin `row` on a `Journal`; rate : C of the integrator, dv/dx."""
     x, y, vx, vy = journal.x, journal.y, journal.vx, journal.vy
     if memory[SPRING] > 0.0:
         k, c, ax, ay = memory[SPRING], memory[DAMPER], journal.axis_x, journal.axis_y
         fx = k * (x - ax * memory[SEAT_X] + ay * memory[SEAT_Y]) + c * vx
         fy = k * (y - ay * memory[SEAT_X] - ax * memory[SEAT_Y]) + c * vy
         stiff = k + rate * c
-        return Hold(x=fx, y=fy, xx=stiff, xy=0.0, yy=stiff, torque=0.0, torque_x=0.0, torque_y=0.0, torque_turn=0.0)
+        return PinForce(x=fx, y=fy, xx=stiff, xy=0.0, yy=stiff, torque=0.0, torque_x=0.0, torque_y=0.0, torque_turn=0.0)
     nx, ny, r, d, slope = penetration(row, x, y)
     speed = approach(memory, nx, ny, journal.before_x, journal.before_y)
     elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
@@ -223,7 +223,7 @@ def bearing(row, memory, journal, rate):
     kxx = radial * nx * nx + along * ny * ny + rest
     kyy = radial * ny * ny + along * nx * nx + rest
     kxy = (radial - along) * nx * ny
-    return Hold(
+    return PinForce(
         x=force * nx - drag * ny, y=force * ny + drag * nx, xx=kxx, xy=kxy, yy=kyy,
         torque=row.radius * drag, torque_x=-turn * ny, torque_y=turn * nx, torque_turn=row.radius * turn,
     )  # fmt: skip

@@ -36,8 +36,8 @@ from ..elements.pin_contact import (
     TORQUE_X,
     TORQUE_Y,
     Journal,
-    bearing,
     limited,
+    pin_force,
     remember,
 )
 from ..integrators import A, V
@@ -90,7 +90,7 @@ def load_pins(t, state, work, motion):
         journal = Journal(
             x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], turning=turning, axis_x=ax, axis_y=ay
         )
-        found = bearing(row, state.contacts[k], journal, motion.rate)
+        found = pin_force(row, state.contacts[k], journal, motion.rate)
         hold[HOLD_X], hold[HOLD_Y], hold[K_XX], hold[K_XY], hold[K_YY] = found.x, found.y, found.xx, found.xy, found.yy
         hold[TORQUE], hold[TORQUE_X], hold[TORQUE_Y] = found.torque, found.torque_x, found.torque_y
         hold[TORQUE_TURN] = found.torque_turn

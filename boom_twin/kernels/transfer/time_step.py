@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..elements.pin_contact import CLOSED, Journal, bearing
+from ..elements.pin_contact import CLOSED, Journal, pin_force
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
@@ -57,7 +57,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     while done < TICKS:
         if part < TICKS:
             now = prepare(scheme.family, scheme.parameter, scheme.reach * part / TICKS, work.finer)
-        lead(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
+        interpolate_drive(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
         start_step(now, history, work.hat, work.offset)
         predict(t, state, now.reach)
         motion, status, left = Motion(now.gain, now.rate, work.hat, work.offset), NOT_CONVERGED, passes
@@ -75,7 +75,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 shorten(t, state, work)
                 size = add_increments(t, state, work, longest)
                 place(t, state, work)
-            status = verdict(work, solved, size, tolerance, passes)
+            status = newton_status(work, solved, size, tolerance, passes)
             left -= 1
         total += passes - left
         error = coarseness(t, state, work, condensed, now)
@@ -116,7 +116,7 @@ def least_part(t, scheme):
 
 
 @inner
-def lead(state, work, drive, drive_rate, span, share):
+def interpolate_drive(state, work, drive, drive_rate, span, share):
     """Drive of a sub-step that ends at `share` of a step of `span` s: on the cubic from the last step's drive to this one's."""
     u = share
     for i in range(drive.shape[0]):
@@ -139,7 +139,7 @@ def predict(t, state, reach):
 
 
 @inner
-def verdict(work, solved, size, tolerance, passes):
+def newton_status(work, solved, size, tolerance, passes):
     """Status after a pass that ended with `solved` and an increment of `size` (rad): go on with NOT_CONVERGED."""
     if solved != OK:
         for i in range(3):
@@ -196,7 +196,7 @@ def observe_pins(t, state, out):
             turning = v[row.turn]
         ax, ay = axis_of(t, state, row)
         journal = Journal(x=x, y=y, vx=vx, vy=vy, before_x=vx, before_y=vy, turning=turning, axis_x=ax, axis_y=ay)
-        hold = bearing(row, memory, journal, 0.0)
+        hold = pin_force(row, memory, journal, 0.0)
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(hold.x, hold.y), memory[CLOSED]
 
 

@@ -13,7 +13,7 @@ from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
-from ...bag.joint_names import told_beyond
+from ...bag.joint_names import extra_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Status
 from ...diagnostics.sensor_status import sensors_of
@@ -230,7 +230,7 @@ class Diagnostics:
     def _other_booms(self) -> dict[Stream, str]:
         """The inputs that named cylinders or joints of another boom since the last look, in words."""
         found = {
-            stream: told_beyond(self._inputs[stream], names, stream, self._joints, self._scene)
+            stream: extra_names_message(self._inputs[stream], names, stream, self._joints, self._scene)
             for stream, names in self._other_boom_names.items()
         }
         self._other_boom_names.clear()

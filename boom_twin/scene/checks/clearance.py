@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from ..schema import ContactLaw, Joint
-from .findings import Draft, Finding, odd, wrong
+from .findings import Draft, Finding, fault, warning
 
 PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
 NEAR_ENOUGH = 0.02  # between the restitution that is asked for and the one that a law gives
@@ -23,18 +23,18 @@ def pins(draft: Draft) -> Iterator[Finding]:
         place = ("clearance", "pins", i)
         there = [name for k, joint in enumerate(draft.joints) if joint is not None for name in names_of(k, joint)]
         if pin.at not in there and None not in draft.joints:
-            yield wrong(draft, (*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
+            yield fault(draft, (*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
         if pin.at in seen:
             bound = f"clearance.pins[{seen[pin.at]}] is this pin already"
-            yield wrong(draft, (*place, "at"), pin.at, bound, "Give every pin once.")
+            yield fault(draft, (*place, "at"), pin.at, bound, "Give every pin once.")
         seen.setdefault(pin.at, i)
         share = pin.radial_clearance / pin.pin_radius
         if share >= 1.0:
             bound = f"it must be less than pin_radius = {pin.pin_radius:g} m"
-            yield wrong(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give it in metres.")
+            yield fault(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give it in metres.")
         elif share > WIDE:
             bound = f"it is more than a tenth of pin_radius = {pin.pin_radius:g} m, for which the contact law is not meant"
-            yield odd(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
+            yield warning(draft, (*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
 
 
 def _restitution(draft: Draft, law: ContactLaw) -> Iterator[Finding]:
@@ -42,7 +42,7 @@ def _restitution(draft: Draft, law: ContactLaw) -> Iterator[Finding]:
     if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_ENOUGH:
         bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
         remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
-        yield odd(draft, ("clearance", "contact", "restitution"), law.restitution, bound, remedy)
+        yield warning(draft, ("clearance", "contact", "restitution"), law.restitution, bound, remedy)
 
 
 def names_of(index: int, joint: Joint) -> list[str]:

@@ -53,12 +53,12 @@ class Finding:
     odd: bool
 
 
-def wrong(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
+def fault(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
     """The scene cannot be used."""
     return Finding(draft.document.fault(place, value, bound, remedy), odd=False)
 
 
-def odd(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
+def warning(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
     """The scene can be used, but this is probably not meant."""
     return Finding(draft.document.fault(place, value, bound, remedy), odd=True)
 

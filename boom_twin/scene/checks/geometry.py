@@ -13,7 +13,7 @@ from ...types import Array
 from ..kinematics import linkage_of
 from ..schema import Joint, Point, Section
 from ..yaml_reader import Place
-from .findings import Draft, Finding, odd, wrong
+from .findings import Draft, Finding, fault, warning
 from .values import NEEDED
 
 TOLERANCE = 1e-9
@@ -46,7 +46,7 @@ def _on_head(draft: Draft, i: int, joint: Joint, before: Section) -> Iterator[Fi
     if joint.D[0] < first - TOLERANCE:
         bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first:.6g} m from its outboard pivot"
         remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {before.length + joint.D[0]:.6g} m."
-        yield wrong(draft, ("joints", i, "D"), joint.D, bound, remedy)
+        yield fault(draft, ("joints", i, "D"), joint.D, bound, remedy)
 
 
 def _on_root(draft: Draft, i: int, joint: Joint, own: Section) -> Iterator[Finding]:
@@ -57,14 +57,14 @@ def _on_root(draft: Draft, i: int, joint: Joint, own: Section) -> Iterator[Findi
     if joint.E[0] > last + TOLERANCE:
         bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
         remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
-        yield wrong(draft, ("joints", i, "E"), joint.E, bound, remedy)
+        yield fault(draft, ("joints", i, "E"), joint.E, bound, remedy)
 
 
 def _c_nearby(draft: Draft, i: int, joint: Joint, before: Section) -> Iterator[Finding]:
     if joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
         bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
         remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
-        yield odd(draft, ("joints", i, "C"), joint.C, bound, remedy)
+        yield warning(draft, ("joints", i, "C"), joint.C, bound, remedy)
 
 
 def thin_parts(draft: Draft) -> Iterator[Finding]:
@@ -84,7 +84,7 @@ def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float
     for end in beam or ():
         if beam and TOLERANCE < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
             bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
-            yield odd(draft, place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
+            yield warning(draft, place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
 
 
 def centres(draft: Draft) -> Iterator[Finding]:
@@ -97,11 +97,11 @@ def centres(draft: Draft) -> Iterator[Finding]:
             if part is not None and _far(section.length, part.com):
                 bound = f"the centre lies far outside the section, which is {section.length:g} m long"
                 remedy = "It is measured from the inboard pivot, along the section."
-                yield odd(draft, ("sections", i, key, "com"), part.com, bound, remedy)
+                yield warning(draft, ("sections", i, key, "com"), part.com, bound, remedy)
         if section.rod_pin is not None and _far(section.length, section.rod_pin):
             bound = f"the pin lies far outside the section, which is {section.length:g} m long"
             remedy = "It is measured from the inboard pivot."
-            yield odd(draft, ("sections", i, "rod_pin"), section.rod_pin, bound, remedy)
+            yield warning(draft, ("sections", i, "rod_pin"), section.rod_pin, bound, remedy)
 
 
 def _far(length: float, point: tuple[float, float]) -> bool:
@@ -159,10 +159,10 @@ def _closing(draft: Draft, i: int, joint: Joint, degrees: Array, closed: Mask) -
     if not closed.any():
         bound = "the links lL and lR, between D and E, do not meet at any angle of it"
         remedy = "Check D, E, lL and lR, their signs and their units."
-        yield wrong(draft, place, joint.range_deg, bound, remedy)
+        yield fault(draft, place, joint.range_deg, bound, remedy)
     else:
         bound = f"the links lL and lR, between D and E, do not meet at {intervals(degrees, ~closed)}"
-        yield odd(draft, place, joint.range_deg, bound, f"They meet at {intervals(degrees, closed)}: narrow the range.")
+        yield warning(draft, place, joint.range_deg, bound, f"They meet at {intervals(degrees, closed)}: narrow the range.")
 
 
 def _reached(joint: Joint, lengths: Array) -> Mask:
@@ -180,16 +180,16 @@ def _strokes(draft: Draft, i: int, joint: Joint, degrees: Array, lengths: Array,
     if longest - shortest < 1e-6:
         bound = f"over it the cylinder stays {longest:.4g} m long, so it cannot turn the joint"
         remedy = "Check the pins: one of them lies on an axis of rotation."
-        yield wrong(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
+        yield fault(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
     elif not reached.any():
         remedy = "Give closed_length and max_stroke that cover this, or check the pins."
         place = ("joints", i, "cylinder", "closed_length")
-        yield wrong(draft, place, cylinder.closed_length, f"{need}, but {have}", remedy)
+        yield fault(draft, place, cylinder.closed_length, f"{need}, but {have}", remedy)
     elif beyond.any():
         bound = f"{need}, but {have}: stroke out of reach at {intervals(degrees, beyond)}"
         within = intervals(degrees, reached)
         remedy = f"Within reach at {within}: narrow range_deg, or mend closed_length and max_stroke."
-        yield odd(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
+        yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
 
 
 def _turning(draft: Draft, i: int, joint: Joint, degrees: Array, lengths: Array) -> Iterator[Finding]:
@@ -200,7 +200,7 @@ def _turning(draft: Draft, i: int, joint: Joint, degrees: Array, lengths: Array)
         angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
         bound = f"the stroke turns back at {angles} deg: one stroke then belongs to two angles"
         remedy = "Narrow the range to one side, or check the pins."
-        yield odd(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
+        yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, bound, remedy)
 
 
 def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
@@ -219,16 +219,16 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
     if not low - TOLERANCE <= degrees <= high + TOLERANCE:
         bound = f"{says}, outside its range_deg [{low:g}, {high:g}]"
         remedy = "Change the posture or the range; a joint angle is the difference of neighbouring section angles."
-        yield wrong(draft, place, value, bound, remedy)
+        yield fault(draft, place, value, bound, remedy)
     elif row is not None:
         most = joint.cylinder.max_stroke
         with np.errstate(invalid="ignore"):
             stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
         if math.isnan(stroke):
-            yield wrong(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
+            yield fault(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
         elif not -TOLERANCE <= stroke <= most + TOLERANCE:
             bound = f"{says}, a stroke of {stroke:.4g} m; cylinder {i + 1} has 0 to {most:g} m"
-            yield wrong(draft, place, value, bound, "Change the posture, closed_length or max_stroke.")
+            yield fault(draft, place, value, bound, "Change the posture, closed_length or max_stroke.")
 
 
 def intervals(degrees: Array, mask: Mask) -> str:

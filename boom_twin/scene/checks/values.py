@@ -12,7 +12,7 @@ from ...errors import ABSENT
 from ..glossary import MEANING
 from ..schema import Joint, Point, Section
 from ..yaml_reader import Place
-from .findings import Draft, Finding, odd, wrong
+from .findings import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
 BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
@@ -29,12 +29,12 @@ def counts(draft: Draft) -> Iterator[Finding]:
         return
     if draft.joints and len(draft.joints) != number:
         bound = f"there are {_several(number, 'section')}, and every section has one joint"
-        yield wrong(draft, ("joints",), len(draft.joints), bound, "Add or remove joints or sections.")
+        yield fault(draft, ("joints",), len(draft.joints), bound, "Add or remove joints or sections.")
     for name, angles in draft.postures.items():
         if len(angles) != number:
             bound = f"it has {_several(len(angles), 'angle')}, the boom has {_several(number, 'section')}"
             remedy = "Give one angle per section, degrees to the horizontal."
-            yield wrong(draft, ("postures", name), angles, bound, remedy)
+            yield fault(draft, ("postures", name), angles, bound, remedy)
 
 
 def sections(draft: Draft) -> Iterator[Finding]:
@@ -50,38 +50,38 @@ def _flexible(draft: Draft, i: int, section: Section, beam: Point) -> Iterator[F
     for key in BEAM_NEEDS:
         if getattr(section, key) is None:
             remedy = f"Give {key}, {MEANING[Section][key]}, or leave out `beam` for a rigid section."
-            yield wrong(draft, (*place, key), ABSENT, "a section with a beam needs it", remedy)
+            yield fault(draft, (*place, key), ABSENT, "a section with a beam needs it", remedy)
     x0, x1 = beam
     if not 0 <= x0 < x1 <= section.length:
         bound = f"[x0, x1] must have 0 <= x0 < x1 <= length = {section.length:g} m"
-        yield wrong(draft, (*place, "beam"), beam, bound, "Both are measured from the inboard pivot.")
+        yield fault(draft, (*place, "beam"), beam, bound, "Both are measured from the inboard pivot.")
 
 
 def _rigid(draft: Draft, i: int, section: Section) -> Iterator[Finding]:
     place = ("sections", i)
     if section.root is None:
         bound = "this section has no `beam`, so it is rigid, and `root` is all of it"
-        yield wrong(draft, (*place, "root"), ABSENT, bound, "Give root: {mass, com, inertia}, or a beam.")
+        yield fault(draft, (*place, "root"), ABSENT, bound, "Give root: {mass, com, inertia}, or a beam.")
     elif section.root.mass == 0:
         bound = "this rigid section weighs nothing"
-        yield odd(draft, (*place, "root", "mass"), 0.0, bound, "Give its mass in kg.")
+        yield warning(draft, (*place, "root", "mass"), 0.0, bound, "Give its mass in kg.")
     for key in BEAM_ONLY:
         value = getattr(section, key)
         if value is not None:
             shown = value.model_dump() if key == "head" else value
             bound = "this section has no `beam`, so it is rigid, all of it described by `root`"
             remedy = f"Remove `{key}`, or give beam: [x0, x1] if the section bends."
-            yield wrong(draft, (*place, key), shown, bound, remedy)
+            yield fault(draft, (*place, key), shown, bound, remedy)
 
 
 def _rod_pin(draft: Draft, i: int, section: Section) -> Iterator[Finding]:
     place = ("sections", i, "rod_pin")
     if i == 0 and section.rod_pin is None:
         bound = "cylinder 1 pushes on the first section and needs a pin there"
-        yield wrong(draft, place, ABSENT, bound, f"Give {MEANING[Section]['rod_pin']}.")
+        yield fault(draft, place, ABSENT, bound, f"Give {MEANING[Section]['rod_pin']}.")
     if i > 0 and section.rod_pin is not None:
         bound = "only the first section has a rod pin; the later cylinders push on links"
-        yield wrong(draft, place, section.rod_pin, bound, f"Remove it; R in joints[{i}] places the pin on a link.")
+        yield fault(draft, place, section.rod_pin, bound, f"Remove it; R in joints[{i}] places the pin on a link.")
 
 
 def modes(draft: Draft) -> Iterator[Finding]:
@@ -97,7 +97,7 @@ def modes(draft: Draft) -> Iterator[Finding]:
             "a part then bends to a circle only. With 1 in all sections of the default scene the deflection at rest is up to "
             "1.1 % off, frequencies 1 to 6 up to 9.9 %, and in its reference move the tip 7 mm and its acceleration 21 %"
         )
-        yield odd(draft, place, 1, bound, "Take 2 or 3, or `boom_twin check --need` to see what can be left out.")
+        yield warning(draft, place, 1, bound, "Take 2 or 3, or `boom_twin check --need` to see what can be left out.")
 
 
 def joints(draft: Draft) -> Iterator[Finding]:
@@ -110,17 +110,17 @@ def joints(draft: Draft) -> Iterator[Finding]:
             if joint.cylinder.d is not None and joint.cylinder.k is None:
                 bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
                 remedy = "Give k, stiffness of the oil spring in N/m, or remove d."
-                yield wrong(draft, ("joints", i, "cylinder", "d"), joint.cylinder.d, bound, remedy)
+                yield fault(draft, ("joints", i, "cylinder", "d"), joint.cylinder.d, bound, remedy)
 
 
 def _kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     place = ("joints", i, "kind")
     if i == 0 and joint.kind != "A":
         bound = "joint 1 turns the boom on its base and must be of kind A"
-        yield wrong(draft, place, joint.kind, bound, "Put a joint of kind A first.")
+        yield fault(draft, place, joint.kind, bound, "Put a joint of kind A first.")
     if i > 0 and joint.kind == "A":
         bound = "kind A stands on the base, so only joint 1 can be of it"
-        yield wrong(draft, place, joint.kind, bound, "Choose B1, B2 or B3.")
+        yield fault(draft, place, joint.kind, bound, "Choose B1, B2 or B3.")
 
 
 def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
@@ -129,20 +129,20 @@ def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     for key in NEEDED[joint.kind]:
         if getattr(joint, key) is None:
             remedy = f"Give {key}, {MEANING[Joint][key]}."
-            yield wrong(draft, (*place, key), ABSENT, f"a joint of kind {joint.kind} needs it", remedy)
+            yield fault(draft, (*place, key), ABSENT, f"a joint of kind {joint.kind} needs it", remedy)
     for key in refused:
         value = getattr(joint, key)
         if value is not None:
             why = "has no links" if joint.kind == "A" else "has its rod pin where the links meet"
             bound = f"a joint of kind {joint.kind} {why}"
-            yield wrong(draft, (*place, key), value, bound, f"Remove `{key}`, or choose another kind.")
+            yield fault(draft, (*place, key), value, bound, f"Remove `{key}`, or choose another kind.")
 
 
 def _range(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     low, high = joint.range_deg
     if not -360 <= low < high <= 360:
         bound = "[low, high] must have -360 <= low < high <= 360 degrees"
-        yield wrong(
+        yield fault(
             draft, ("joints", i, "range_deg"), joint.range_deg, bound, "Give the lower angle first, both within one turn."
         )
 
@@ -196,18 +196,18 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         if value < 1e6:
             factor = ("GPa", 1e9) if value < 1e3 else ("MPa", 1e6)
             remedy = f"Give Pa: {value:g} {factor[0]} are {value * factor[1]:g}."
-            yield odd(draft, place, value, "less than 1e6 Pa: GPa or MPa?", remedy)
+            yield warning(draft, place, value, "less than 1e6 Pa: GPa or MPa?", remedy)
     elif key == "rho" and value < 50:
-        yield odd(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
+        yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
     elif key == "k" and value < 1e4:
-        yield odd(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
+        yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
-        yield odd(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
+        yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
     elif key in MASSES and value > 1e5:
-        yield odd(draft, place, value, "more than 1e5 kg: grams?", f"Give kg: {value:g} g are {value / 1000:g}.")
+        yield warning(draft, place, value, "more than 1e5 kg: grams?", f"Give kg: {value:g} g are {value / 1000:g}.")
     elif key in LENGTHS and max(map(abs, value if isinstance(value, tuple) else (value,))) > 200:
-        yield odd(draft, place, value, "more than 200 m: mm?", "Give lengths in m.")
+        yield warning(draft, place, value, "more than 200 m: mm?", "Give lengths in m.")
     else:
         yield from _upper(draft, place, value)
 
@@ -215,19 +215,19 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
 def _upper(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
     limit, looks, remedy = SUSPECTS.get(str(place[-1]), (math.inf, "", ""))
     if isinstance(value, int | float) and abs(value) > limit:
-        yield odd(draft, place, value, looks, remedy)
+        yield warning(draft, place, value, looks, remedy)
 
 
 def _gravity(draft: Draft) -> Iterator[Finding]:
     if draft.gravity is not None:
         if not 9.7 < math.hypot(*draft.gravity) < 9.9:
             bound = "its size is not that of the earth's gravity, about 9.81 m/s^2"
-            yield odd(draft, ("gravity",), draft.gravity, bound, "Usual is [0.0, -9.81].")
+            yield warning(draft, ("gravity",), draft.gravity, bound, "Usual is [0.0, -9.81].")
         elif draft.gravity[1] > 0:
-            yield odd(draft, ("gravity",), draft.gravity, "it points upwards", "Usual is [0.0, -9.81].")
+            yield warning(draft, ("gravity",), draft.gravity, "it points upwards", "Usual is [0.0, -9.81].")
 
 
 def _postures(draft: Draft) -> Iterator[Finding]:
     for name, angles in draft.postures.items():
         if angles and max(map(abs, angles)) < 6.3 and any(angle != round(angle) for angle in angles):
-            yield odd(draft, ("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")
+            yield warning(draft, ("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")

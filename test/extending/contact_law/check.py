@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import BoomTwinError
-from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, Journal, bearing
+from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, Journal, pin_force
 from boom_twin.scene import load_scene
 from boom_twin.scene.glossary import MEANING
 from boom_twin.scene.load import default_text
@@ -37,7 +37,7 @@ memory[CLOSED], memory[APPROACH] = 1.0, SPEED
 
 def force(x, v):
     """Of the pin, N, outward along x (m) at v (m/s)."""
-    return bearing(row, memory, Journal(x, 0.0, v, 0.0, v, 0.0, 0.0, 1.0, 0.0), 0.0).x
+    return pin_force(row, memory, Journal(x, 0.0, v, 0.0, v, 0.0, 0.0, 1.0, 0.0), 0.0).x
 
 
 depth = 5e-5

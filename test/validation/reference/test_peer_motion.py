@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.scene import load_scene
@@ -37,7 +37,7 @@ def columns(motion):
 def expected(scene):
     """The transfer-matrix boom with 6 modes."""
     motion = motion_of(scene)
-    return march(scene.model_copy(update={"modes": 6}), motion, DURATION, 5e-4, 20, angles=motion.angles)
+    return integrate_with(scene.model_copy(update={"modes": 6}), motion, DURATION, 5e-4, 20, angles=motion.angles)
 
 
 def followed(scene, fineness, tolerance=1e-5, solver="Radau"):

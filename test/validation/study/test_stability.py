@@ -13,7 +13,7 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
 from boom_twin.validation.study.long_booms import long_boom
 from boom_twin.validation.study.stability import report as stability
-from boom_twin.validation.study.stability.cases import Case, cases, days
+from boom_twin.validation.study.stability.cases import Case, cases, long_holds
 from boom_twin.validation.study.stability.exact_step import one_step
 from boom_twin.validation.study.stability.roundoff import Loss, TurnUp, limit_of
 from boom_twin.validation.study.stability.runner import METHODS, one, run
@@ -49,13 +49,13 @@ def test_the_ends_are_within_the_cylinders(longest):
 
 
 def test_names_of_cases_are_unique():
-    found = [*cases(load_scene()), *days(load_scene())]
+    found = [*cases(load_scene()), *long_holds(load_scene())]
     assert len({(case.group, case.name) for case in found}) == len(found)
 
 
 @pytest.mark.slow  # those of the quick cases are made below
 def test_all_setups_can_be_made():
-    for case in [*cases(load_scene()), *days(load_scene())]:
+    for case in [*cases(load_scene()), *long_holds(load_scene())]:
         setup = case.make()
         steps = setup.duration / (setup.step * setup.every)
         assert abs(steps - round(steps)) < 1e-6 and 0.0 < setup.still < setup.duration

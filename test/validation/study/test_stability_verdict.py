@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.methods import March
+from boom_twin.analysis.methods import MethodRun
 from boom_twin.validation.study.stability.verdict import (
     BOUNDS,
     Facts,
@@ -75,7 +75,7 @@ def made_up(step=1e-2, duration=4.0, growing=0.0, ring=0.0, shift=0.0):
     acceleration = np.stack([-((2 * np.pi) ** 2) * wave + signs, 0.0 * wave], axis=1)
     forces = np.full((len(times), 2), 1e4)
     no_pins = np.zeros((len(times), 0, 4))
-    return March(times, tip, acceleration, forces * 0.0, forces, no_pins, 1.0, len(times) - 1, 1.5, "ok")
+    return MethodRun(times, tip, acceleration, forces * 0.0, forces, no_pins, 1.0, len(times) - 1, 1.5, "ok")
 
 
 def test_the_same_motion_has_no_error():

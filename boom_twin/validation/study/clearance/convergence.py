@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....analysis.methods import March, march
-from ....analysis.motions import Halt, halt
+from ....analysis.methods import MethodRun, integrate_with
+from ....analysis.motions import StopMotion, halt
 from ....scene.schema import Cylinder, Joint, Scene
 from ....types import Array
 from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
@@ -118,16 +118,16 @@ def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Conve
     return Convergence(tuple(lines), errors([own], independent)[0], span)
 
 
-def _stopped(scene: Scene, posture: str | None, only: int | None) -> Halt:
+def _stopped(scene: Scene, posture: str | None, only: int | None) -> StopMotion:
     drive = halt(scene, posture, BRAKE, only)
-    return Halt(drive.angles, drive.first, drive.speed, BRAKE, RAMP, STOP)
+    return StopMotion(drive.angles, drive.first, drive.speed, BRAKE, RAMP, STOP)
 
 
 def _own(
-    case: str, scene: Scene, drive: Halt, span: float, steps: tuple[float, ...], finest: float
+    case: str, scene: Scene, drive: StopMotion, span: float, steps: tuple[float, ...], finest: float
 ) -> tuple[ErrorCurve, MotionRows, list[MotionRows]]:
     runs = [
-        march(scene, drive, span, step, round(ROW / step), angles=drive.angles, repeats=3 if step >= 1e-4 else 1)
+        integrate_with(scene, drive, span, step, round(ROW / step), angles=drive.angles, repeats=3 if step >= 1e-4 else 1)
         for step in (*steps, finest)
     ]
     tracks = [_track(run) for run in runs]
@@ -135,7 +135,7 @@ def _own(
     return ErrorCurve(case, "boom_twin", "own", steps, found, tuple(run.seconds for run in runs[:-1])), tracks[-1], tracks[:-1]
 
 
-def _track(run: March) -> MotionRows:
+def _track(run: MethodRun) -> MotionRows:
     return MotionRows(run.tip, run.tip_acceleration, run.pins[:, :, 2])
 
 
@@ -175,7 +175,7 @@ def _hard(joint: Joint) -> Joint:
     return joint.model_copy(update={"cylinder": cylinder})
 
 
-def peer(scene: Scene, index: int, drive: Halt, span: float, tolerance: float) -> tuple[MotionRows, float]:
+def peer(scene: Scene, index: int, drive: StopMotion, span: float, tolerance: float) -> tuple[MotionRows, float]:
     """The motion by the independent model, and its run time (s)."""
     headings, document = np.cumsum(drive.angles), scene.model_dump(exclude_none=True)
     boom: PinnedBoom = freed(document, headings.tolist(), index, _contact(scene))

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.methods import march
+from ....analysis.methods import integrate_with
 from ....compiler.compile import compile_scene
 from ....errors import UsageError
 from ....plots.history import Orbits
 from ....plots.posture import orbits_picture
-from ....plots.stability import Sinking, Trace, sinking_picture, swing_picture
+from ....plots.stability import RestOffsetCurve, Trace, sinking_picture, swing_picture
 from ....plots.study import Curve, Panel, work_precision_picture
 from ....scene.schema import IDEAL_BELOW, Scene
 from ....system.atomic_files import write_atomic
@@ -37,9 +37,9 @@ from .rest_stop_cost import (
     Shift,
     Swing,
     costs,
+    hard_stop,
     shifts,
     swings,
-    violent,
 )
 from .scenes import pins_of, treated, with_play
 
@@ -201,7 +201,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     write_atomic(paths[1], text)
     traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]
     swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
-    sinking = [Sinking(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
+    sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
     sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
     work_precision_picture(paths[4], "Motions with play: error against run time", NOTE, panels(found.convergence))
     _orbits(paths[5], scene, posture)
@@ -237,8 +237,8 @@ def _curve(found: Convergence, line: ErrorCurve, measure: int) -> Curve:
 
 def _orbits(path: Path, scene: Scene, posture: str | None) -> None:
     """Of the violent stop that the costs are measured in."""
-    contact, drive = treated(scene, "contact"), violent(scene, posture)
-    moved, plan = march(contact, drive, VIOLENT, STEP, angles=drive.angles), compile_scene(contact)
+    contact, drive = treated(scene, "contact"), hard_stop(scene, posture)
+    moved, plan = integrate_with(contact, drive, VIOLENT, STEP, angles=drive.angles), compile_scene(contact)
     lost = np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0, axis=0)
     orbits = Orbits(moved.times, plan.pins, plan.tables.clearances.gap, moved.pins, lost)
     orbits_picture(path, "Journals in their bushes: a violent start and stop", orbits, NOTE)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....analysis.equilibrium import rest_at, statics
-from ....analysis.methods import March, march
-from ....analysis.motions import Halt, halt, motion_of
+from ....analysis.methods import MethodRun, integrate_with
+from ....analysis.motions import StopMotion, halt, motion_of
 from ....compiler.plan import first_row, taken_apart
 from ....scene.kinematics import posture_angles, strokes_of_posture
 from ....scene.schema import IDEAL_BELOW, Scene
@@ -150,19 +150,19 @@ def swings(scene: Scene, postures: tuple[str, ...], hold: float = HOLD) -> list[
         scenes = (ideal(scene), treated(scene, "contact"), treated(scene, "spring-damper"))
         reference = _rest_of(scenes[0], drive)
         for model, one in zip(MODELS, scenes, strict=True):
-            moved = march(one, drive, drive.still + hold, STEP, angles=drive.angles)
+            moved = integrate_with(one, drive, drive.still + hold, STEP, angles=drive.angles)
             # a linearised pin belongs to the rest at the start; at the end contact says where it lies
             rest = _rest_of(scenes[1] if model != "ideal" else one, drive)
             found.append(_swing(posture, model, moved, drive, rest - reference, reference))
     return found
 
 
-def _rest_of(scene: Scene, drive: Halt) -> float:
+def _rest_of(scene: Scene, drive: StopMotion) -> float:
     """Height (m) of the tip at rest where the drives have stopped."""
     return float(statics(scene, strokes=drive.last, modes=0).tip[1])
 
 
-def _swing(posture: str, model: str, moved: March, drive: Halt, rest: float, reference: float) -> Swing:
+def _swing(posture: str, model: str, moved: MethodRun, drive: StopMotion, rest: float, reference: float) -> Swing:
     times, height, acceleration = moved.times - drive.still, moved.tip[:, 1] - reference, moved.tip_acceleration[:, 1]
     after = times >= -1e-9
     off = height[after] - (rest if model != "spring-damper" else float(np.mean(height[after])))
@@ -215,7 +215,7 @@ def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
     return [Cost(count, name, *times) for (count, name, _), times in rows]
 
 
-def violent(scene: Scene, posture: str | None) -> Halt:
+def hard_stop(scene: Scene, posture: str | None) -> StopMotion:
     """To full speed and to a stop as no operator would."""
     return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
 
@@ -232,5 +232,5 @@ def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
 def _seconds(scene: Scene, posture: str | None, gentle: float) -> list[float]:
     """Run times (s) of both motions."""
     move = motion_of(scene, posture)
-    runs = ((move, gentle), (violent(scene, posture), VIOLENT))
-    return [march(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]
+    runs = ((move, gentle), (hard_stop(scene, posture), VIOLENT))
+    return [integrate_with(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]

@@ -72,7 +72,7 @@ def matches(rows: Sequence[Row], kind: type = Peer) -> list[Match]:
 
 
 @dataclass(frozen=True)
-class Duel:
+class PairedTiming:
     """The default against a case of Exudyn at its step, run in turn: CPU seconds per simulated second of all runs."""
 
     case: Peer

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.methods import march
+from ....analysis.methods import integrate_with
 from ....analysis.motions import Motion
 from ....errors import BoomTwinError
 from ....scene.schema import Scene
@@ -111,7 +111,7 @@ def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
     coarse, fine = OWN_STEP if not quick else (1e-3, 5e-4)
     paths = []
     for modes, step in ((OWN_MODES[1], fine), (OWN_MODES[0], fine), (OWN_MODES[1], coarse)):
-        found = march(with_modes(scene, modes), motion, motion.duration, step, every(step), angles=motion.angles)
+        found = integrate_with(with_modes(scene, modes), motion, motion.duration, step, every(step), angles=motion.angles)
         paths.append(Path(found.tip, found.tip_acceleration))
     shape, time = paths[1].away(paths[0]), paths[2].away(paths[0])
     what = f"boom_twin, {OWN_MODES[1]} modes, step {1e3 * fine:g} ms"

@@ -20,7 +20,7 @@ from .default_choice import paragraph
 from .panels import main_panels, method_panels
 from .pareto_tables import (
     EQUAL,
-    Duel,
+    PairedTiming,
     acceleration,
     cheapest_table,
     equal_error_table,
@@ -50,7 +50,7 @@ EXUDYN_BOOM = (
 )
 
 
-def report(problem: Problem, rows: Sequence[Row], duel: Duel | None) -> str:
+def report(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> str:
     """The whole report in Markdown."""
     parts = [
         "# Error against run time", provenance(), _setting(problem), "![Error against run time](error.png)",
@@ -89,7 +89,7 @@ def _setting(problem: Problem) -> str:
     )
 
 
-def _equal(problem: Problem, rows: Sequence[Row], duel: Duel | None) -> str:
+def _equal(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> str:
     """Tables against the other programs, and how these were run."""
     parts = [equal_error_table(matches(rows), "Exudyn")] if problem.exudyn else [problem.missing + "\n"]
     parts.append(equal_error_table(matches(rows, Stiff), "SciPy"))
@@ -160,16 +160,16 @@ def _rows(problem: Problem, quick: bool) -> list[Row]:
         return Runner(problem).rows(cases, rounds, bar.update)
 
 
-def _duel(problem: Problem, rows: list[Row], turns: int) -> Duel | None:
+def _duel(problem: Problem, rows: list[Row], turns: int) -> PairedTiming | None:
     """The default against Exudyn's fastest at the same step that is exact enough, in turn."""
     best = fastest_at_step(rows, SAME_STEP) or fastest_at_step(rows, SAME_STEP, EQUAL[-1])
     if best is None or not isinstance(best.case, Peer):
         return None
     own, peer = in_turn(problem, Own(SAME_STEP), best.case, turns)
-    return Duel(best.case, tuple(own), tuple(peer))
+    return PairedTiming(best.case, tuple(own), tuple(peer))
 
 
-def _content(problem: Problem, rows: list[Row], duel: Duel | None) -> dict[str, Any]:
+def _content(problem: Problem, rows: list[Row], duel: PairedTiming | None) -> dict[str, Any]:
     fronts = {"tip": {id(row) for row in front(rows, tip)}, "acceleration": {id(row) for row in front(rows, acceleration)}}
     return {
         "machine": machine(),

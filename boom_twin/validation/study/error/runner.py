@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.methods import march
+from ....analysis.methods import integrate_with
 from ....types import Array
 from ...reference.segments.stiff_solver import follow
 from .cases import Case, Own, Peer, Stiff
@@ -122,7 +122,7 @@ class Runner:
 
     def _own(self, case: Own) -> Timed:
         motion = self.problem.motion
-        found = march(
+        found = integrate_with(
             case.scene(self.problem.scene), motion, motion.duration, case.step, every(case.step), case.method, case.basis,
             motion.angles, REPEATS,
         )  # fmt: skip

@@ -173,7 +173,7 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
         yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODES[-1])
 
 
-def days(scene: Scene) -> tuple[Case, ...]:
+def long_holds(scene: Scene) -> tuple[Case, ...]:
     """Holds of 24 simulated hours."""
     booms: tuple[tuple[str, Scene, Truth], ...] = (
         ("24 h", scene, "equilibrium"),

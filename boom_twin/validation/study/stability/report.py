@@ -16,7 +16,7 @@ from ....scene.kinematics import posture_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
 from ..report import machine, provenance, table, write_json
-from .cases import Case, cases, days
+from .cases import Case, cases, long_holds
 from .exact_step import digits
 from .roundoff import TARGET, TURN_UP_STEPS, Limit, Loss, TurnUp, limit_of, losses, turn_up
 from .runner import METHODS, CaseResult, Cell, run
@@ -192,7 +192,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     scene = scene if posture is None else _only(scene, posture)
     chosen = [case for case in cases(scene) if case.quick or not quick]
     rows = run(chosen, METHODS, _progress)
-    long_rows = run(days(scene) if soak else (), {"default": METHODS["default"]}, _progress)
+    long_rows = run(long_holds(scene) if soak else (), {"default": METHODS["default"]}, _progress)
     limits = {f"{case.group}: {case.name}": limit_of(case.make()) for case in chosen if _stuck(rows, case)}
     _progress("round-off in one step")
     lost = losses(scene, quick)

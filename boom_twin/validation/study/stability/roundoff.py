@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....analysis.equilibrium import rest_at
-from ....analysis.methods import Method, march
+from ....analysis.methods import Method, integrate_with
 from ....analysis.modal import natural_modes
 from ....analysis.motions import motion_of
 from ....analysis.simulate import RHO
@@ -135,7 +135,7 @@ def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS, method: Meth
 def _rows(scene: Scene, step: float, method: Method | None) -> tuple[Array, Array]:
     """Tip and its acceleration, both (ROWS + 1, 2), m and m/s^2."""
     own = smooth(scene, None, SHARE, RISE, SPAN, step)
-    found = march(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), method, angles=own.angles)
+    found = integrate_with(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), method, angles=own.angles)
     return found.tip, found.tip_acceleration
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....analysis.equilibrium import rest_at
-from ....analysis.methods import March, Method, march
+from ....analysis.methods import Method, MethodRun, integrate_with
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....types import Array
@@ -77,14 +77,14 @@ def _cell(facts: Facts) -> Cell:
     return Cell(facts, verdict(facts))
 
 
-def _facts(case: Case, setup: Setup, method: Method, judge: Callable[[March], Facts]) -> Facts:
+def _facts(case: Case, setup: Setup, method: Method, judge: Callable[[MethodRun], Facts]) -> Facts:
     try:
         return judge(_marched(setup, method))
     except SolverError as error:
         return Facts(str(error), solvable=case.truth != "none")
 
 
-def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
+def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]:
     """How a motion of the case is judged, and that in words.
 
     Raises
@@ -104,35 +104,35 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[March], Facts], str]:
     return lambda found: _ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
 
-def _none(found: March) -> Facts:
+def _none(found: MethodRun) -> Facts:
     return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
 
 
-def _against(found: March, right: March, stride: int, setup: Setup) -> Facts:
+def _against(found: MethodRun, right: MethodRun, stride: int, setup: Setup) -> Facts:
     return _ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump)
 
 
-def _ended(found: March) -> Facts | None:
+def _ended(found: MethodRun) -> Facts | None:
     """Facts of a motion that did not reach its end; None if it did."""
     return None if found.status == "ok" else Facts(found.status, passes=found.passes)
 
 
-def _marched(setup: Setup, method: Method) -> March:
-    return march(setup.scene, setup.drive, setup.duration, setup.step, setup.every, method, angles=setup.angles)
+def _marched(setup: Setup, method: Method) -> MethodRun:
+    return integrate_with(setup.scene, setup.drive, setup.duration, setup.step, setup.every, method, angles=setup.angles)
 
 
 def _fine(setup: Setup) -> float:
     return max(setup.step / FINER, FINEST)
 
 
-def _right(setup: Setup) -> tuple[March, int]:
+def _right(setup: Setup) -> tuple[MethodRun, int]:
     """What is right, and how many rows of the case's motion there are to one of its."""
     step = _fine(setup)
     every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
-    return march(setup.scene, setup.drive, setup.duration, step, every, RIGHT, angles=setup.angles), stride
+    return integrate_with(setup.scene, setup.drive, setup.duration, step, every, RIGHT, angles=setup.angles), stride
 
 
-def _thinned(motion: March, stride: int) -> March:
+def _thinned(motion: MethodRun, stride: int) -> MethodRun:
     """Every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.methods import March
+from ....analysis.methods import MethodRun
 from ....types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
@@ -120,7 +120,7 @@ WRONG = 0.05  # of the largest cylinder force, above which an impulse still ring
 SHORTEST_PATH = 1e-9  # m
 
 
-def against_motion(found: March, right: March, still: float, jump: float = math.nan) -> Facts:
+def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float = math.nan) -> Facts:
     """Compare with a motion at the same rows; the drives hold from `still` (s) on.
 
     Accelerations and forces are not compared right after a `jump` (s) of speed, where they are impulses.
@@ -144,7 +144,7 @@ def against_motion(found: March, right: March, still: float, jump: float = math.
     )
 
 
-def _lasting(found: March, right: March, jump: float, smooth: Mask) -> float:
+def _lasting(found: MethodRun, right: MethodRun, jump: float, smooth: Mask) -> float:
     """Rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
@@ -153,7 +153,7 @@ def _lasting(found: March, right: March, jump: float, smooth: Mask) -> float:
     return float((right.times[beyond].max() - jump) / right.times[1]) if beyond.any() else 0.0
 
 
-def against_rest(found: March, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
+def against_rest(found: MethodRun, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
     """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself.
 
     `every` steps lie between rows; ringing is seen only where there is a row for each.
@@ -173,7 +173,7 @@ def against_rest(found: March, equilibrium: Array | None, still: float, every: i
     )
 
 
-def growth(motion: March, still: float) -> float:
+def growth(motion: MethodRun, still: float) -> float:
     """Vibration of the tip's acceleration in the last quarter of the hold over that in the first; 1 where it is still."""
     late = np.flatnonzero(motion.times > still)
     quarter = max(len(late) // 4, 1)
@@ -188,7 +188,7 @@ def alternating(values: Array) -> Array:
     return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
-def _rings(found: March, right: March | None, late: Mask) -> tuple[float, float]:
+def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float, float]:
     """Ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of what is right."""
     shares = []
     for name in ("tip_acceleration", "cylinder_forces"):
@@ -211,7 +211,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(values**2, axis=-1)))) if np.isfinite(values).all() else math.inf
 
 
-def _path(motion: March) -> float:
+def _path(motion: MethodRun) -> float:
     """How far the tip gets from where it starts, m."""
     return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
 
