@@ -1,1 +1,1 @@
-"""From strokes to a prediction: smoother, look-ahead, sensor model."""
+"""From strokes to a prediction: stroke filter, look-ahead, sensor model."""

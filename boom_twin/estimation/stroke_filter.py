@@ -9,6 +9,9 @@ covariance C of that estimate's error with the newest one's:
 
 Node 0 is the newest, with C_0 = P. (Rauch-Tung-Striebel smoothing in its fixed-lag form; Anderson and Moore, Optimal
 Filtering, 1979, ch. 7.)
+
+What noise it passes on is written again, in the frequency domain, in `boom_twin.analysis.modal.stroke_noise` and in
+`boom_twin.calibration.sessions`: change them together.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Alarms over their lives, from the `Health` that tells of them again and again; and as named values."""
+"""Collect alarms from repeated `Health` reports, each once from its beginning to its end; alarms as named values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The baseline: what a boom's model and sensors are off by while all is well, as learnt from healthy sessions, or assumed."""
+"""Baseline of a healthy rig: bias and spread of parameters, sensors and model error, learnt from its sessions or assumed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Detection: whether innovations that should be white and of unit variance are.
+"""Detect deviations: test whether innovations are white and of unit variance.
 
 Per channel a two-sided CUSUM (Page 1954) for a lasting deviation, and the sum of squares over a window for a larger spread.
 Thresholds follow from the rate of false alarms that is stated: that of the CUSUM by Siegmund's approximation of its run length,

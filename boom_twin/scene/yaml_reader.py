@@ -3,8 +3,9 @@
 The text is composed to nodes and the nodes are turned into values here, so that no tag of the text can make an object:
 mappings become dict, sequences become tuple, scalars become float, int, bool, str or None.
 
-Both lines are comments, so that the file stays plain YAML, and blocks can still be written behind it. A file that says in
-its head that it has the mark is refused without it; one that says nothing can be used, with a warning.
+A line ``# end of scene`` shows that a file was not cut off, and a line in its head (`PROMISE`) says that it has one. Both are
+comments, so that the file stays plain YAML. A file that promises the mark is refused without it; one that says nothing can be
+used, with a warning.
 """
 
 from __future__ import annotations

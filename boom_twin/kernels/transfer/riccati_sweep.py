@@ -1,4 +1,4 @@
-"""The two sweeps of one Newton pass: forces in, tip to base; increments out, base to tip."""
+"""Riccati form of the transfer-matrix method, the two sweeps of one Newton pass: forces in, tip to base; increments out."""
 
 from __future__ import annotations
 

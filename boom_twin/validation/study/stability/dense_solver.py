@@ -1,4 +1,4 @@
-"""Dense solver of one time step of a weightless boom: the witness of what the sweeps round away.
+"""Dense solver of one time step of a weightless boom: the reference for the round-off of the sweeps.
 
 Kinematics are written here from the tables of a plan alone, increment by increment, in extended precision; nothing is
 condensed. With all forces zero there is no geometric stiffness, so that
