@@ -1,4 +1,4 @@
-"""Draw the pictures of replays, booms and studies from arrays. Only this package imports a plotting library, and only to draw."""
+"""Draw the pictures of replays, booms and studies from arrays. Only this package imports a plotting library, to draw."""
 
 from __future__ import annotations
 
