@@ -245,8 +245,8 @@ class Twin:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
         self._limits, compiled = self._limited(SHARE * scene.reach), self._boom.compiled
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, self._counts.max()), np.nan))
-        self._found = new_output(CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
-        self._news = _UpdateExtras()
+        self._found = new_output(2 * CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
+        self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
 
     def _limited(self, valid: float) -> Limits:
         """What the compiled update judges by, under the present settings."""
@@ -302,8 +302,7 @@ class Twin:
         self._state.past.bounds[:] = 0
         self._zeros.forget_past()
         self._recent.clear()
-        if self.judge is not None:
-            self.judge.begin()
+        self._begin_health()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -390,7 +389,7 @@ class Twin:
 
     def _look_at(self, sample: Sample) -> Report:
         """Take a sample that may be out of the ordinary."""
-        self._forget_found()
+        self._make_room()
         complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
@@ -409,22 +408,24 @@ class Twin:
         What they caused is in `_found` and `_news`. One sample that is `trusted` was looked at before.
         """
         found = self._found
-        self._forget_found()
+        self._make_room()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
             args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
             reason, row = (DONE, 1) if measure(self._limits, self._state, *args, trusted, found) else (ODD, 0)
         else:
             reason, row = self._advance_strokes(block, trusted)
-        self._tell_health()
         if unmatched := int(self._state.clock[UNMATCHED]):
             self.counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
         return reason, row
 
-    def _forget_found(self) -> None:
-        """Before the next call of the compiled update."""
-        self._found.counts[:] = 0
-        self._news = _UpdateExtras()
+    def _make_room(self) -> None:
+        """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
+        self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
+        if max(self._begin) > CAPACITY:
+            self._tell_health()
+            self._found.counts[:] = 0
+            self._begin = self._told = 0, 0
 
     def _advance_strokes(self, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
@@ -444,7 +445,10 @@ class Twin:
 
     def _look_around(self, run: _Run, row: int) -> None:
         """What a prediction that begins a slot, or left the model's validity, has beside its numbers."""
-        clock, at, news = self._state.clock, int(self._found.counts[0]) - 1, self._news
+        clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
+        if self._news is NO_EXTRAS:
+            self._news = _UpdateExtras()
+        news = self._news
         if clock[IS_DEFLECTED]:
             news.deflected.add(row)
             self.counts["deflected"] += 1
@@ -459,10 +463,10 @@ class Twin:
 
     def _tell_health(self) -> None:
         """Give the health monitor what has come since it was told last."""
-        found, news, at = self._found, self._news, self._boom.places
+        found, at = self._found, self._boom.places
         if self.judge is None:
             return
-        new, last = slice(news.told[0], int(found.counts[0])), slice(news.told[1], int(found.counts[1]))
+        new, last = (slice(told, count) for told, count in zip(self._told, found.counts.tolist(), strict=True))
         if new.stop > new.start:
             rows = found.rows[new].copy()
             acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
@@ -477,10 +481,10 @@ class Twin:
                 self.judge.measured(
                     STREAMS[code], MeasuredRows(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
                 )
-        news.told = new.stop, last.stop
+        self._told = new.stop, last.stop
 
     def _residuals(self) -> ResidualBlock:
-        found, own = self._found, slice(0, int(self._found.counts[1]))
+        found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
         return ResidualBlock(
             at=found.residual_at[own].copy(),
             streams=found.residual_streams[own].copy(),
@@ -490,7 +494,7 @@ class Twin:
         )
 
     def _predictions(self) -> PredictionBlock:
-        found, own, at = self._found, slice(0, int(self._found.counts[0])), self._boom.places
+        found, own, at = self._found, slice(self._begin[0], int(self._found.counts[0])), self._boom.places
         rows = found.rows[own].copy()
         tip = rows[:, at.tip].reshape(-1, 3, 3)
         return PredictionBlock(
@@ -521,18 +525,18 @@ class Twin:
 
     def _report(self, stamp: int, events: list[str]) -> Report:
         """What the compiled update found of one sample, of which `events` are to be told too."""
-        found, news, n = self._found, self._news, int(self._found.counts[0])
+        found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         residuals = []
-        for row in range(int(found.counts[1])):
+        for row in range(self._begin[1], known):
             stream = STREAMS[found.residual_streams[row]]
             names = self._channels[stream]
             values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
             residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
-        if not n:
+        if predicted == self._begin[0]:
             return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
         prediction = self._boom.prediction(stamp, news.outlines.get(0))
         told = (*events, "deflected") if news.deflected else tuple(events)
-        passes = int(found.passes[0])
+        passes = int(found.passes[predicted - 1])
         return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))
 
     # -- strokes ----------------------------------------------------------------------------------------------------
@@ -642,6 +646,11 @@ class Twin:
         self._recent.clear()
         if shift < 0:
             keep_waiting(self._state, NONE, before)
+        self._begin_health()
+
+    def _begin_health(self) -> None:
+        """What was found up to now is of no concern to the health monitor any more."""
+        self._told = tuple(self._found.counts.tolist())
         if self.judge is not None:
             self.judge.begin()
 
@@ -746,14 +755,15 @@ class Twin:
 class _UpdateExtras:
     """What one call of the compiled update gives beside numbers.
 
-    outlines by row of a prediction, health by row of a sample, deflected: rows of samples; told: rows of predictions and of
-    residuals that the health monitor knows.
+    outlines by row of a prediction, health by row of a sample, deflected: rows of samples.
     """
 
     outlines: dict[int, Outline] = field(default_factory=dict)
     health: dict[int, Health] = field(default_factory=dict)
     deflected: set[int] = field(default_factory=set)
-    told: tuple[int, int] = (0, 0)
+
+
+NO_EXTRAS = _UpdateExtras()
 
 
 def _are_readings(values: list[float]) -> bool:
