@@ -388,7 +388,7 @@ class Report:
     residuals : tuple of Residuals
         All that became known by this sample, in order of their stamps.
     events : tuple of str
-        What was out of the ordinary, by the names in `boom_twin.twin.twin.EVENTS`.
+        What was out of the ordinary, by the names in `boom_twin.twin.events.EVENTS`.
     status : str
         ``ok``, or one sentence on a failure of the model.
     change : Change or None

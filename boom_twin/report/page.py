@@ -16,7 +16,7 @@ from ..plots import AlarmSpan, History
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
-from ..twin.twin import EVENTS
+from ..twin.events import EVENTS
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Stream
 from .html import heading, image, page, paragraph, table
 from .quantities import BOX, Load, loads

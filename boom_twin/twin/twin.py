@@ -5,128 +5,39 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..analysis.equilibrium import SHARE
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
-from ..estimation.look_ahead import Tuning
-from ..estimation.sensor_model import Mounting
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem, MeasuredRows, PredictionRows
+from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
-from ..kernels.result_row import PIN
 from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import LIMIT, NANO, SECOND, Array, Change, Health, Mount, Outline, Report, Residuals, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, Array, Change, Mount, Report, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .blocks import CODES, STREAMS, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .block_update import CAPACITY, BlockUpdate, limits_of
+from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
 from .expected_readings import Deviations
+from .run import Run
 from .sample_check import SHORTEST, SampleCheck
-from .stamp_check import LASTING, StampCheck, TimeStep, explain, is_close, is_continuous, jerk_densities, largest_difference
-from .state import (
-    BEGINS_SLOT,
-    EPOCH,
-    IN_SLOT,
-    IS_DEFLECTED,
-    NEWEST,
-    NONE,
-    STATUS,
-    STROKES,
-    UNMATCHED,
-    USUAL_STEP,
-    Limits,
-    TwinState,
-    keep_waiting,
-    new_output,
-    new_state,
-)  # fmt: skip
-from .stroke_check import FAR, StrokeCheck
-from .update import AFTER_PAUSE, DONE, FAILED, LOOK, ODD, REFRESH, matched, measure, update
-
-EVENTS = {
-    "late": "stamp not after the newest one of its stream; sample left out",
-    "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
-    "partial": "some values missing, not finite or absurd; the others were used",
-    "empty": "no usable value; sample left out",
-    "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
-    "gap": "longer pause between strokes, bridged",
-    "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
-    "leap": "stamp far from where its stream was; left out unless the next sample follows it",
-    "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
-    "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
-    "second source": "samples of another source among those that are followed; left out",
-    "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
-    "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
-    "held": "a stroke missing for long; taken to stay where it was",
-    "model": "the model failed; it starts again with the next full sample",
-    "reset": "asked for; the model started again from rest",
-    "load": "payload or line fill changed; the model started again from rest",
-    "limits": "other settings changed while the twin ran",
-    "zero": "the zero of a sensor was set anew",
-    "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
-    "unmatched": "no prediction at the stamp of this sample; no residual",
-}
-
-TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
-"""Events that `Report.change` goes with."""
-
-CAPACITY = 4096  # samples that one call of the compiled update takes at most
-
-
-class _Run:
-    """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
-
-    def __init__(self, state: TwinState, deviations: Deviations, stamp: int, is_again: bool) -> None:
-        self.deviations, self.is_again, self._state = deviations, is_again, state
-        self.plausible = StrokeCheck(state.clock)
-        self.is_predicted = False
-        state.clock[EPOCH] = state.clock[NEWEST] = stamp
-        state.clock[IN_SLOT] = -1
-        state.pace[:] = 0.0, 0.0, -math.inf
-        state.past.bounds[:] = 0
-
-    @property
-    def epoch(self) -> int:
-        """Stamp (ns) of the start."""
-        return int(self._state.clock[EPOCH])
-
-    @property
-    def newest(self) -> int:
-        """Stamp (ns) of the newest strokes that were followed."""
-        return int(self._state.clock[NEWEST])
-
-    @property
-    def interval(self) -> float:
-        """Running mean of the time between strokes, s."""
-        return float(self._state.pace[USUAL_STEP])
-
-    @property
-    def strokes(self) -> Array:
-        """The newest ones less their zeros, m, shape (n,); NaN where missing."""
-        return self._state.strokes
-
-    def strokes_at(self, stamp: int) -> Array | None:
-        """As measured at `stamp` (ns), linear between samples, m, shape (n,); None where that is not remembered."""
-        past = self._state.past
-        row, share = matched(past, stamp)
-        if row < 0:
-            return None
-        old = past.strokes[row - 1]
-        return np.asarray(past.strokes[row] if share == 1.0 else old + share * (past.strokes[row] - old))
-
-    def rebase(self, shift: int) -> None:
-        """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
-        self._state.clock[EPOCH] += shift
-        self._state.clock[NEWEST] += shift
-        self.deviations.rebase(shift)
-        self._state.past.bounds[:] = 0
+from .stamp_check import (
+    LASTING,
+    StampCheck,
+    TimeStep,
+    explain,
+    is_close,
+    is_continuous,
+    jerk_densities,
+    largest_difference,
+)
+from .state import NEWEST, NONE, STATUS, keep_waiting, new_state
+from .update import DONE, FAILED
 
 
 class Twin:
@@ -151,7 +62,7 @@ class Twin:
     mounts : tuple of Mount or None
         As given, one for every joint.
     counts : Counter
-        How often each of `EVENTS` happened.
+        How often each of `boom_twin.twin.events.EVENTS` happened.
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
@@ -177,15 +88,12 @@ class Twin:
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
-        self._counts = np.array([len(names) for names in self._channels.values()])
-        self._state = new_state(len(scene.joints), self._counts)
+        self._widths = [len(names) for names in self._channels.values()]
+        self._state = new_state(len(scene.joints), np.array(self._widths))
         self._state.clock[NEWEST] = NONE
-        self._beyond = FAR * self.settings.stroke_variance**0.5
-        self._shortest = np.full(len(scene.joints), -self._beyond)
-        self._longest = np.array([joint.cylinder.max_stroke for joint in scene.joints]) + self._beyond
         self._build()
         self._edge = SampleCheck(self._channels)
-        self._run: _Run | None = None
+        self._run: Run | None = None
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._lines = self._new_lines()
@@ -243,37 +151,11 @@ class Twin:
         self.judge = None
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        self._limits, compiled = self._limited(SHARE * scene.reach), self._boom.compiled
-        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, self._counts.max()), np.nan))
-        self._found = new_output(2 * CAPACITY, self.plan.joints, len(compiled.row), len(compiled.bending), self._counts)
-        self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
-
-    def _limited(self, valid: float) -> Limits:
-        """What the compiled update judges by, under the present settings."""
-        settings, counts = self.settings, self._counts
-        mounting = Mounting(self.plan, self.scene.base.inclination, self.mounts)
-        tuning = Tuning(
-            settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
+        limits = limits_of(scene, self._boom.plan, self.settings, self.mounts)
+        self._compiled = BlockUpdate(
+            self._boom, limits, self._state, self._channels, self.settings.step, self.judge, self.counts
         )
-        return Limits(
-            tuning=tuning,
-            patient=tuning._replace(lag=max(AFTER_PAUSE, settings.lag)),
-            gap=round(settings.gap * SECOND),
-            leap=settings.leap / NANO,
-            far=self._beyond,
-            rate=settings.stroke_rate,
-            shortest=self._shortest,
-            longest=self._longest,
-            valid=valid,
-            angle_variance=settings.angle_variance,
-            gravity=np.array(self.plan.tables.gravity),
-            inclination=self.scene.base.inclination,
-            is_mounted=mounting.has_any,
-            absolute=mounting.absolute,
-            frames=mounting.frames,
-            first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
-            channels=counts,
-        )
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
 
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -282,7 +164,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._limits = self._limited(self._limits.valid)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.mounts)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -302,7 +184,7 @@ class Twin:
         self._state.past.bounds[:] = 0
         self._zeros.forget_past()
         self._recent.clear()
-        self._begin_health()
+        self._compiled.begin_health()
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
@@ -337,9 +219,9 @@ class Twin:
         if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
             return self._look_at(sample)
         self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._advance(self._one)
+        reason, _ = self._compiled.advance(self._run, self._one)
         if reason == DONE:
-            return self._report(sample.stamp, [])
+            return self._compiled.report(sample.stamp, [])
         return self._fail(sample, []) if reason == FAILED else self._look_at(sample)
 
     def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
@@ -361,14 +243,14 @@ class Twin:
             As `update` does; the samples before have been taken.
         """
         found: list[ReportBlock | Report] = []
-        row, size, channels = 0, len(block.stamps), self._counts.tolist()
+        row, size, channels = 0, len(block.stamps), self._widths
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:
                 end = row + CAPACITY
                 part = SampleBlock(block.streams[row:end], block.stamps[row:end], block.values[row:end])
-                reason, done = self._advance(part)
+                reason, done = self._compiled.advance(self._run, part)
                 if done:
-                    found += self._reports(part.stamps[:done])
+                    found += self._compiled.reports(part.stamps[:done])
                 row += done
                 if reason == DONE:
                     continue
@@ -389,7 +271,7 @@ class Twin:
 
     def _look_at(self, sample: Sample) -> Report:
         """Take a sample that may be out of the ordinary."""
-        self._make_room()
+        self._compiled.make_room()
         complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
@@ -401,143 +283,6 @@ class Twin:
         return self._take_measured(sample, complete)
 
     # -- the compiled update ----------------------------------------------------------------------------------------
-
-    def _advance(self, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take samples of a block as long as they are ordinary; why that ended, and how many they were.
-
-        What they caused is in `_found` and `_news`. One sample that is `trusted` was looked at before.
-        """
-        found = self._found
-        self._make_room()
-        if len(block.stamps) == 1 and block.streams[0] != STROKES:
-            args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            reason, row = (DONE, 1) if measure(self._limits, self._state, *args, trusted, found) else (ODD, 0)
-        else:
-            reason, row = self._advance_strokes(block, trusted)
-        if unmatched := int(self._state.clock[UNMATCHED]):
-            self.counts["unmatched"] += unmatched
-            self._state.clock[UNMATCHED] = 0
-        return reason, row
-
-    def _make_room(self) -> None:
-        """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
-        self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
-        if max(self._begin) > CAPACITY:
-            self._tell_health()
-            self._found.counts[:] = 0
-            self._begin = self._told = 0, 0
-
-    def _advance_strokes(self, block: SampleBlock, trusted: bool) -> tuple[int, int]:
-        run, row, is_resumed, size = self._run, 0, False, len(block.stamps)
-        assert run is not None
-        while True:
-            reason, row = update(*self._boom.compiled, self._limits, self._state, *block, row, is_resumed, trusted, self._found)
-            if is_resumed := reason == REFRESH:
-                interval = run.interval or self.settings.step
-                run.deviations.refresh(self._boom.prediction(run.newest), interval, self._boom.live, self._boom.angles)
-            elif reason != LOOK:
-                return reason, row
-            else:
-                self._look_around(run, row)
-                row += 1
-                if row == size:
-                    return DONE, row
-
-    def _look_around(self, run: _Run, row: int) -> None:
-        """What a prediction that begins a slot, or left the model's validity, has beside its numbers."""
-        clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
-        if self._news is NO_EXTRAS:
-            self._news = _UpdateExtras()
-        news = self._news
-        if clock[IS_DEFLECTED]:
-            news.deflected.add(row)
-            self.counts["deflected"] += 1
-        if not clock[BEGINS_SLOT]:
-            return
-        news.outlines[at] = self._boom.outline()
-        if self.judge is not None:
-            self._tell_health()
-            health = self.judge.judge(run.newest, self._boom.variances, run.deviations.noise, run.deviations.tip)
-            if health is not None:
-                news.health[row] = health
-
-    def _tell_health(self) -> None:
-        """Give the health monitor what has come since it was told last."""
-        found, at = self._found, self._boom.places
-        if self.judge is None:
-            return
-        new, last = (slice(told, count) for told, count in zip(self._told, found.counts.tolist(), strict=True))
-        if new.stop > new.start:
-            rows = found.rows[new].copy()
-            acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
-            followed = PredictionRows(
-                found.stamps[new].copy(), found.measured[new].copy(), rows[:, at.strokes], rows[:, at.joints], acceleration
-            )
-            self.judge.predicted(followed)
-        if last.stop > last.start:
-            streams = found.residual_streams[last]
-            for code in sorted(set(streams.tolist())):
-                own, width = np.flatnonzero(streams == code) + last.start, int(self._counts[code])
-                self.judge.measured(
-                    STREAMS[code], MeasuredRows(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
-                )
-        self._told = new.stop, last.stop
-
-    def _residuals(self) -> ResidualBlock:
-        found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
-        return ResidualBlock(
-            at=found.residual_at[own].copy(),
-            streams=found.residual_streams[own].copy(),
-            stamps=found.residual_stamps[own].copy(),
-            values=found.values[own].copy(),
-            sigmas=found.sigmas[own].copy(),
-        )
-
-    def _predictions(self) -> PredictionBlock:
-        found, own, at = self._found, slice(self._begin[0], int(self._found.counts[0])), self._boom.places
-        rows = found.rows[own].copy()
-        tip = rows[:, at.tip].reshape(-1, 3, 3)
-        return PredictionBlock(
-            at=found.at[own].copy(),
-            stamps=found.stamps[own].copy(),
-            tip_position=tip[:, 0, :2],
-            tip_displacement=tip[:, 0, :2] - rows[:, at.rigid_tip],
-            tip_velocity=tip[:, 1, :2],
-            tip_acceleration=tip[:, 2, :2],
-            tip_angle=tip[:, 0, 2],
-            tip_angular_velocity=tip[:, 1, 2],
-            tip_angular_acceleration=tip[:, 2, 2],
-            joints=rows[:, at.joints],
-            strokes=rows[:, at.strokes],
-            cylinder_forces=rows[:, at.cylinder_forces],
-            clearances=rows[:, at.pins].reshape(len(rows), len(self.plan.pins), PIN),
-            moments=found.moments[own].copy(),
-            outlines=self._news.outlines,
-        )
-
-    def _reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
-        """What the compiled update found of samples with these stamps (ns)."""
-        block = ReportBlock(stamps, self._predictions(), self._residuals(), self._news.health)
-        if not self._news.deflected:
-            return [block]
-        reports = enumerate(block.reports(self.plan.joints))
-        return [replace(each, events=("deflected",)) if row in self._news.deflected else each for row, each in reports]
-
-    def _report(self, stamp: int, events: list[str]) -> Report:
-        """What the compiled update found of one sample, of which `events` are to be told too."""
-        found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
-        residuals = []
-        for row in range(self._begin[1], known):
-            stream = STREAMS[found.residual_streams[row]]
-            names = self._channels[stream]
-            values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
-            residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
-        if predicted == self._begin[0]:
-            return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
-        prediction = self._boom.prediction(stamp, news.outlines.get(0))
-        told = (*events, "deflected") if news.deflected else tuple(events)
-        passes = int(found.passes[predicted - 1])
-        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))
 
     # -- strokes ----------------------------------------------------------------------------------------------------
 
@@ -576,24 +321,24 @@ class Twin:
         if not line.held:
             return False
         last = line.held[-1][0]
-        way = self._beyond + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
+        way = self._compiled.limits.far + self.settings.stroke_rate * abs(sample.stamp - last.stamp) * NANO
         return bool(largest_difference(sample.values, last.values) > way)
 
-    def _is_late(self, run: _Run, stamp: int, values: Array) -> bool:
+    def _is_late(self, run: Run, stamp: int, values: Array) -> bool:
         """Whether it is back by little, and its strokes are those of its stamp."""
         if not -self.settings.jump_back <= (stamp - run.newest) * NANO < 0.0:
             return False
         then = run.strokes_at(stamp)
         return then is None or is_close(values, then, run.interval, self.settings)
 
-    def _explain(self, run: _Run, line: StampCheck) -> TimeStep:
+    def _explain(self, run: Run, line: StampCheck) -> TimeStep:
         """Why the stamps of what is held are not those that were to come."""
         (first, _), (later, _) = line.held[:2]
         values = self._zeroed(first), self._zeroed(later)
         span, apart = (first.stamp - run.newest) * NANO, (later.stamp - first.stamp) * NANO
         return explain(self._boom, run.strokes, values, span, apart, line.usual * NANO or apart, self.settings)
 
-    def _step_in_time(self, run: _Run, line: StampCheck, why: TimeStep) -> Report:
+    def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> Report:
         """Follow the samples that were held, now that the newest confirms them."""
         held, usual = self._released(line), round(line.usual)
         span = held[0].stamp - run.newest
@@ -615,7 +360,7 @@ class Twin:
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
-    def _doubt_pause(self, run: _Run, first: Sample, why: TimeStep) -> None:
+    def _doubt_pause(self, run: Run, first: Sample, why: TimeStep) -> None:
         """State what the model cannot know after a pause that ended with the sample `first`."""
         span = (first.stamp - run.newest) * NANO
         run.deviations.add_pause(first.stamp, span, jerk_densities(self._boom, self._zeroed(first), span, self.settings))
@@ -636,7 +381,7 @@ class Twin:
             del self.counts[event]
         return [sample for sample, _ in held]
 
-    def _rebase(self, run: _Run, shift: int) -> None:
+    def _rebase(self, run: Run, shift: int) -> None:
         """Stamps are later by `shift` (ns) from now on, and the model goes on."""
         before = run.newest
         run.rebase(shift)
@@ -646,13 +391,7 @@ class Twin:
         self._recent.clear()
         if shift < 0:
             keep_waiting(self._state, NONE, before)
-        self._begin_health()
-
-    def _begin_health(self) -> None:
-        """What was found up to now is of no concern to the health monitor any more."""
-        self._told = tuple(self._found.counts.tolist())
-        if self.judge is not None:
-            self.judge.begin()
+        self._compiled.begin_health()
 
     def _zeroed(self, sample: Sample) -> Array:
         """Strokes without what their sensors read too much."""
@@ -667,7 +406,8 @@ class Twin:
             events += self._take_over(sample.stamp)
             values = self._zeroed(sample)
         told = asked or "clock set" in events
-        if ((values < self._shortest) | (values > self._longest)).any():
+        limits = self._compiled.limits
+        if ((values < limits.shortest) | (values > limits.longest)).any():
             events.append("out of range")
         sample = replace(sample, values=values)
         if self._run is not None:
@@ -688,10 +428,10 @@ class Twin:
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
         deviations = Deviations(self.plan, self.settings, self._state, sample.stamp, speeds)
-        self._run = _Run(self._state, deviations, sample.stamp, speeds is not None)
+        self._run = Run(self._state, deviations, sample.stamp, speeds is not None)
         return self._step(self._run, sample, events)
 
-    def _step(self, run: _Run, sample: Sample, events: list[str]) -> Report:
+    def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
         """Step the model to strokes that were looked at, their values less the sensors' zeros."""
         self._lines[Stream.STROKES].take(sample.stamp)
         estimate = self._boom.estimate if run.is_predicted else None
@@ -700,11 +440,11 @@ class Twin:
         events += oddities
         self._state.strokes[:], self._state.taken[:] = sample.values, taken
         self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._advance(self._one, trusted=True)
+        reason, _ = self._compiled.advance(self._run, self._one, trusted=True)
         if reason == FAILED:
             return self._fail(sample, events)
         self.counts.update(events)
-        return self._report(sample.stamp, events)
+        return self._compiled.report(sample.stamp, events)
 
     def _fail(self, sample: Sample, events: list[str]) -> Report:
         """The model failed at a stroke sample."""
@@ -736,10 +476,10 @@ class Twin:
             events = ("partial",)
             self.counts.update(events)
         self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._advance(self._one, trusted=True)
+        reason, _ = self._compiled.advance(self._run, self._one, trusted=True)
         if reason != DONE:
             return self._refuse(sample, "unmatched", *events)
-        return self._report(sample.stamp, list(events))
+        return self._compiled.report(sample.stamp, list(events))
 
     def _hold(self, sample: Sample, event: str) -> Report:
         """Taken as a witness of time alone, at first."""
@@ -749,21 +489,6 @@ class Twin:
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
         self.counts.update(events)
         return Report(sample.stamp, False, events=events, status=status)
-
-
-@dataclass
-class _UpdateExtras:
-    """What one call of the compiled update gives beside numbers.
-
-    outlines by row of a prediction, health by row of a sample, deflected: rows of samples.
-    """
-
-    outlines: dict[int, Outline] = field(default_factory=dict)
-    health: dict[int, Health] = field(default_factory=dict)
-    deflected: set[int] = field(default_factory=set)
-
-
-NO_EXTRAS = _UpdateExtras()
 
 
 def _are_readings(values: list[float]) -> bool:

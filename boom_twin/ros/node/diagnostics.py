@@ -22,7 +22,8 @@ from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...system.terminal_text import printable
-from ...twin.twin import EVENTS, TOLD_AT_ONCE, Twin
+from ...twin.events import EVENTS, TOLD_AT_ONCE
+from ...twin.twin import Twin
 from ...types import NANO, Report, Sample, Stream
 from ..log import Log
 from ..runtime import qos_profile

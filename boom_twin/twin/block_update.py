@@ -1,0 +1,266 @@
+"""Call the compiled update with blocks of samples, and make reports of the rows that it gives."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.equilibrium import SHARE
+from ..compiler.plan import Plan
+from ..config.settings import Settings
+from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.look_ahead import Tuning
+from ..estimation.sensor_model import Mounting
+from ..health.inference.block_problem import MeasuredRows, PredictionRows
+from ..health.monitor import HealthMonitor
+from ..kernels.result_row import PIN
+from ..scene.schema import Scene
+from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
+from .blocks import STREAMS, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .run import Run
+from .state import BEGINS_SLOT, IS_DEFLECTED, STROKES, UNMATCHED, Limits, TwinState, new_output
+from .stroke_check import FAR
+from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
+
+CAPACITY = 4096  # samples that one call of the compiled update takes at most
+
+
+def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> Limits:
+    """What the compiled update judges by: of a scene, compiled as `plan` with its load, and its angle sensors."""
+    counts = np.array([len(names) for names in channels_of(plan.joints).values()])
+    mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
+    tuning = Tuning(
+        settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
+    )
+    return Limits(
+        tuning=tuning,
+        patient=tuning._replace(lag=max(AFTER_PAUSE, settings.lag)),
+        gap=round(settings.gap * SECOND),
+        leap=settings.leap / NANO,
+        far=far,
+        rate=settings.stroke_rate,
+        shortest=np.full(plan.joints, -far),
+        longest=np.array([joint.cylinder.max_stroke for joint in scene.joints]) + far,
+        valid=SHARE * scene.reach,
+        angle_variance=settings.angle_variance,
+        gravity=np.array(plan.tables.gravity),
+        inclination=scene.base.inclination,
+        is_mounted=mounting.has_any,
+        absolute=mounting.absolute,
+        frames=mounting.frames,
+        first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
+        channels=counts,
+    )
+
+
+@dataclass
+class _UpdateExtras:
+    """What one call of the compiled update gives beside numbers.
+
+    outlines by row of a prediction, health by row of a sample, deflected: rows of samples.
+    """
+
+    outlines: dict[int, Outline] = field(default_factory=dict)
+    health: dict[int, Health] = field(default_factory=dict)
+    deflected: set[int] = field(default_factory=set)
+
+
+NO_EXTRAS = _UpdateExtras()
+
+
+class BlockUpdate:
+    """Ordinary samples through the compiled update.
+
+    Parameters
+    ----------
+    boom : BoomPredictor
+    limits : Limits
+    state : TwinState
+    channels : dict of Stream to tuple of str
+        See `boom_twin.types.channels_of`.
+    step : float
+        What the time between strokes is taken for until there are two, s.
+    judge : HealthMonitor or None
+    counts : Counter
+        Of events; ``deflected`` and ``unmatched`` are counted here.
+
+    Attributes
+    ----------
+    limits : Limits
+    """
+
+    def __init__(
+        self,
+        boom: BoomPredictor,
+        limits: Limits,
+        state: TwinState,
+        channels: Mapping[Stream, tuple[str, ...]],
+        step: float,
+        judge: HealthMonitor | None,
+        counts: Counter[str],
+    ) -> None:
+        self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
+        self._judge, self._told_counts = judge, counts
+        self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
+        self._widths, compiled = limits.channels, boom.compiled
+        self._found = new_output(2 * CAPACITY, self._joints, len(compiled.row), len(compiled.bending), limits.channels)
+        self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
+
+    def begin_health(self) -> None:
+        """What was found up to now is of no concern to the health monitor any more."""
+        self._told = tuple(self._found.counts.tolist())
+        if self._judge is not None:
+            self._judge.begin()
+
+    def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
+        """Take samples of a block as long as they are ordinary; `reports` or `report` tell what they caused.
+
+        Parameters
+        ----------
+        run : Run or None
+            The present one; only measured samples, one a block, are taken without.
+        block : SampleBlock
+            At most `CAPACITY` samples.
+        trusted : bool
+            Whether its only sample was looked at before.
+
+        Returns
+        -------
+        reason, count : int
+            Why that ended, see `boom_twin.twin.update.DONE`, and how many samples were taken.
+        """
+        found = self._found
+        self.make_room()
+        if len(block.stamps) == 1 and block.streams[0] != STROKES:
+            args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
+            reason, row = (DONE, 1) if measure(self.limits, self._state, *args, trusted, found) else (ODD, 0)
+        else:
+            reason, row = self._advance_strokes(run, block, trusted)
+        if unmatched := int(self._state.clock[UNMATCHED]):
+            self._told_counts["unmatched"] += unmatched
+            self._state.clock[UNMATCHED] = 0
+        return reason, row
+
+    def make_room(self) -> None:
+        """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
+        self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
+        if max(self._begin) > CAPACITY:
+            self._tell_health()
+            self._found.counts[:] = 0
+            self._begin = self._told = 0, 0
+
+    def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
+        row, is_resumed, size = 0, False, len(block.stamps)
+        assert run is not None
+        while True:
+            reason, row = update(*self._boom.compiled, self.limits, self._state, *block, row, is_resumed, trusted, self._found)
+            if is_resumed := reason == REFRESH:
+                interval = run.interval or self._step
+                run.deviations.refresh(self._boom.prediction(run.newest), interval, self._boom.live, self._boom.angles)
+            elif reason != LOOK:
+                return reason, row
+            else:
+                self._look_around(run, row)
+                row += 1
+                if row == size:
+                    return DONE, row
+
+    def _look_around(self, run: Run, row: int) -> None:
+        """What a prediction that begins a slot, or left the model's validity, has beside its numbers."""
+        clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
+        if self._news is NO_EXTRAS:
+            self._news = _UpdateExtras()
+        news = self._news
+        if clock[IS_DEFLECTED]:
+            news.deflected.add(row)
+            self._told_counts["deflected"] += 1
+        if not clock[BEGINS_SLOT]:
+            return
+        news.outlines[at] = self._boom.outline()
+        if self._judge is not None:
+            self._tell_health()
+            health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, run.deviations.tip)
+            if health is not None:
+                news.health[row] = health
+
+    def _tell_health(self) -> None:
+        """Give the health monitor what has come since it was told last."""
+        found, at = self._found, self._boom.places
+        if self._judge is None:
+            return
+        new, last = (slice(told, count) for told, count in zip(self._told, found.counts.tolist(), strict=True))
+        if new.stop > new.start:
+            rows = found.rows[new].copy()
+            acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
+            followed = PredictionRows(
+                found.stamps[new].copy(), found.measured[new].copy(), rows[:, at.strokes], rows[:, at.joints], acceleration
+            )
+            self._judge.predicted(followed)
+        if last.stop > last.start:
+            streams = found.residual_streams[last]
+            for code in sorted(set(streams.tolist())):
+                own, width = np.flatnonzero(streams == code) + last.start, int(self._widths[code])
+                self._judge.measured(
+                    STREAMS[code], MeasuredRows(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
+                )
+        self._told = new.stop, last.stop
+
+    def _residuals(self) -> ResidualBlock:
+        found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
+        return ResidualBlock(
+            at=found.residual_at[own].copy(),
+            streams=found.residual_streams[own].copy(),
+            stamps=found.residual_stamps[own].copy(),
+            values=found.values[own].copy(),
+            sigmas=found.sigmas[own].copy(),
+        )
+
+    def _predictions(self) -> PredictionBlock:
+        found, own, at = self._found, slice(self._begin[0], int(self._found.counts[0])), self._boom.places
+        rows = found.rows[own].copy()
+        tip = rows[:, at.tip].reshape(-1, 3, 3)
+        return PredictionBlock(
+            at=found.at[own].copy(),
+            stamps=found.stamps[own].copy(),
+            tip_position=tip[:, 0, :2],
+            tip_displacement=tip[:, 0, :2] - rows[:, at.rigid_tip],
+            tip_velocity=tip[:, 1, :2],
+            tip_acceleration=tip[:, 2, :2],
+            tip_angle=tip[:, 0, 2],
+            tip_angular_velocity=tip[:, 1, 2],
+            tip_angular_acceleration=tip[:, 2, 2],
+            joints=rows[:, at.joints],
+            strokes=rows[:, at.strokes],
+            cylinder_forces=rows[:, at.cylinder_forces],
+            clearances=rows[:, at.pins].reshape(len(rows), self._pins, PIN),
+            moments=found.moments[own].copy(),
+            outlines=self._news.outlines,
+        )
+
+    def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
+        """What the compiled update found of samples with these stamps (ns)."""
+        block = ReportBlock(stamps, self._predictions(), self._residuals(), self._news.health)
+        if not self._news.deflected:
+            return [block]
+        reports = enumerate(block.reports(self._joints))
+        return [replace(each, events=("deflected",)) if row in self._news.deflected else each for row, each in reports]
+
+    def report(self, stamp: int, events: list[str]) -> Report:
+        """What the compiled update found of one sample, of which `events` are to be told too."""
+        found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
+        residuals = []
+        for row in range(self._begin[1], known):
+            stream = STREAMS[found.residual_streams[row]]
+            names = self._channels[stream]
+            values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
+            residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
+        if predicted == self._begin[0]:
+            return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
+        prediction = self._boom.prediction(stamp, news.outlines.get(0))
+        told = (*events, "deflected") if news.deflected else tuple(events)
+        passes = int(found.passes[predicted - 1])
+        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))

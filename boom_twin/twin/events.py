@@ -1,0 +1,28 @@
+"""Events of the twin: what may be out of the ordinary about a sample, by the names in `Report.events`."""
+
+EVENTS = {
+    "late": "stamp not after the newest one of its stream; sample left out",
+    "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
+    "partial": "some values missing, not finite or absurd; the others were used",
+    "empty": "no usable value; sample left out",
+    "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
+    "gap": "longer pause between strokes, bridged",
+    "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
+    "leap": "stamp far from where its stream was; left out unless the next sample follows it",
+    "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
+    "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
+    "second source": "samples of another source among those that are followed; left out",
+    "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
+    "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
+    "held": "a stroke missing for long; taken to stay where it was",
+    "model": "the model failed; it starts again with the next full sample",
+    "reset": "asked for; the model started again from rest",
+    "load": "payload or line fill changed; the model started again from rest",
+    "limits": "other settings changed while the twin ran",
+    "zero": "the zero of a sensor was set anew",
+    "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
+    "unmatched": "no prediction at the stamp of this sample; no residual",
+}
+
+TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
+"""Events that `Report.change` goes with."""

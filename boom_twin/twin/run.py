@@ -1,0 +1,62 @@
+"""One run of the twin: from a start of the model at rest to the next one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..types import Array
+from .expected_readings import Deviations
+from .state import EPOCH, IN_SLOT, NEWEST, USUAL_STEP, TwinState
+from .stroke_check import StrokeCheck
+from .update import matched
+
+
+class Run:
+    """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
+
+    def __init__(self, state: TwinState, deviations: Deviations, stamp: int, is_again: bool) -> None:
+        self.deviations, self.is_again, self._state = deviations, is_again, state
+        self.plausible = StrokeCheck(state.clock)
+        self.is_predicted = False
+        state.clock[EPOCH] = state.clock[NEWEST] = stamp
+        state.clock[IN_SLOT] = -1
+        state.pace[:] = 0.0, 0.0, -math.inf
+        state.past.bounds[:] = 0
+
+    @property
+    def epoch(self) -> int:
+        """Stamp (ns) of the start."""
+        return int(self._state.clock[EPOCH])
+
+    @property
+    def newest(self) -> int:
+        """Stamp (ns) of the newest strokes that were followed."""
+        return int(self._state.clock[NEWEST])
+
+    @property
+    def interval(self) -> float:
+        """Running mean of the time between strokes, s."""
+        return float(self._state.pace[USUAL_STEP])
+
+    @property
+    def strokes(self) -> Array:
+        """The newest ones less their zeros, m, shape (n,); NaN where missing."""
+        return self._state.strokes
+
+    def strokes_at(self, stamp: int) -> Array | None:
+        """As measured at `stamp` (ns), linear between samples, m, shape (n,); None where that is not remembered."""
+        past = self._state.past
+        row, share = matched(past, stamp)
+        if row < 0:
+            return None
+        old = past.strokes[row - 1]
+        return np.asarray(past.strokes[row] if share == 1.0 else old + share * (past.strokes[row] - old))
+
+    def rebase(self, shift: int) -> None:
+        """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
+        self._state.clock[EPOCH] += shift
+        self._state.clock[NEWEST] += shift
+        self.deviations.rebase(shift)
+        self._state.past.bounds[:] = 0
