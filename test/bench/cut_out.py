@@ -28,7 +28,7 @@ CUTS = {
 }
 WORKER = """
 import sys
-from boom_twin.analysis.methods import march
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.scene import load_scene
 from boom_twin.analysis.motions import motion_of
 from boom_twin.reduction.variants import KINDS, without
@@ -38,7 +38,7 @@ for kind in KINDS:
     if kind.name in ("bending", "link masses", "barrel masses", "rod masses"):
         scene = without(scene, kind, range(4)).of(scene)
 for _ in sys.stdin:
-    run = march(scene, motion, 0.5, 1e-3, every=500, angles=motion.angles)
+    run = integrate_with(scene, motion, 0.5, 1e-3, every=500, angles=motion.angles)
     print(run.seconds, run.tip[-1, 0].hex(), run.tip[-1, 1].hex(), run.status, flush=True)
 """
 
