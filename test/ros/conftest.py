@@ -194,7 +194,7 @@ class Bench:
         self.imu = self.node.create_publisher(Imu, "tip_imu", 100)
         self.answers: list[int] = []
         self.diagnostics: list[Any] = []
-        self.node.create_subscription(
+        self.tip = self.node.create_subscription(
             PointStamped, "/boom_twin/tip/position", lambda msg: self.answers.append(stamp_of(msg)), 100
         )
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 10)
@@ -207,6 +207,12 @@ class Bench:
         while not condition():
             assert time.monotonic() < end, self.statuses()
             rclpy.spin_once(self.node, timeout_sec=0.05)
+
+    def until_matched(self) -> None:
+        """Listen until the node hears strokes and is heard: it may match this listener a moment after it is matched here."""
+        self.until(lambda: self.strokes.get_subscription_count() == 1 and self.tip.get_publisher_count() == 1)
+        ready = time.monotonic() + 0.5
+        self.until(lambda: time.monotonic() > ready)
 
     def statuses(self) -> dict[str, Any]:
         """The newest diagnostics by name."""

@@ -44,7 +44,7 @@ def prompt(spawn_node: Callable[..., Any]) -> Iterator[Any]:
 
 
 def test_diagnostics_follow_the_strokes(node: Any, bench: Any, motion: dict[str, Any]) -> None:
-    bench.until(lambda: bench.strokes.get_subscription_count() == 1)
+    bench.until_matched()
 
     def shows(model: bytes, strokes: bytes) -> bool:
         found = bench.statuses()
@@ -69,7 +69,7 @@ def test_diagnostics_follow_the_strokes(node: Any, bench: Any, motion: dict[str,
 
 def test_faults_of_sensors_are_told_and_taken_back(prompt: Any, bench: Any, motion: dict[str, Any]) -> None:
     """Cylinder 1 is well, 2 is frozen, 3 misses every fourth value, 4 is out of range; then all are well."""
-    bench.until(lambda: bench.strokes.get_subscription_count() == 1)
+    bench.until_matched()
     random, start = np.random.default_rng(2), motion["strokes"][0]
     sick, next_at, count = True, time.monotonic(), 0
 

@@ -23,7 +23,8 @@ def _strokes(stamp: tuple[int, int], names: list[str], values: list[float]) -> J
 
 
 def test_garbage_is_counted_and_survived(node: Any, bench: Any, motion: dict[str, Any]) -> None:
-    bench.until(lambda: bench.strokes.get_subscription_count() == 1 and bench.imu.get_subscription_count() == 1)
+    bench.until_matched()
+    bench.until(lambda: bench.imu.get_subscription_count() == 1)
     bench.until(lambda: bench.node.count_publishers("/boom_twin/tip/position") == 1 and bool(bench.diagnostics))
     start = [float(value) for value in motion["strokes"][0]]
     garbage = [

@@ -22,7 +22,7 @@ PERIOD = 5_000_000
 
 
 def test_a_raw_publisher_is_understood_live_as_in_a_replay(node: Any, bench: Any, motion: dict[str, Any]) -> None:
-    bench.until(lambda: bench.strokes.get_subscription_count() == 1)
+    bench.until_matched()
     bench.until(lambda: bench.node.count_publishers("/boom_twin/tip/position") == 1 and bool(bench.diagnostics))
     names, values = [f"cylinder_{i}" for i in range(1, 5)], array("d", motion["strokes"][0])
 

@@ -64,7 +64,7 @@ def test_a_killed_page_changes_nothing_at_the_node(watched: Any, bench: Any, mot
     url = re.search(r"open (http\S+)", watched.said())[1]
     assert b"boom twin" in urlopen(url).read()
     (page,) = children(watched)
-    bench.until(lambda: bench.strokes.get_subscription_count() == 1)
+    bench.until_matched()
     feed(bench, motion, range(50))
     os.kill(page, signal.SIGKILL)
     feed(bench, motion, range(50, 400))
