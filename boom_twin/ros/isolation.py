@@ -33,8 +33,8 @@ PORT_BASE, PORT_GAIN, UNUSED_PORT = 7400, 250, 9
 HANDED_OUT = Path("/proc/sys/net/ipv4/ip_local_port_range")
 PARTITION_FILE = Path(__file__).with_name("isolation.xml")
 """Profile of Fast DDS that puts every endpoint of a process into one partition."""
-FOREIGN_WAIT = 2.0
-"""Seconds within which those who are there are discovered."""
+FOREIGN_WAIT = 4.0
+"""Seconds within which those who are there are discovered: Fast DDS announces a participant every 3 s."""
 _REMOVED = ("ROS_DISCOVERY_SERVER", "ROS_STATIC_PEERS")
 """Variables that lead to other computers whatever the domain."""
 
