@@ -161,8 +161,8 @@ class BoomPredictor:
         shape = outline(self.plan, self.live, self._work.position)
         return Outline(shape, self._undeflected.at(self.angles), self.live.pins.copy())
 
-    def prediction(self, stamp: int, drawn: Outline | None = None) -> Prediction:
-        """What the newest sample gave, with an outline if there is one."""
+    def prediction(self, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
+        """What the newest sample gave, with an outline and bending moments (N m) if they are given."""
         row, at = self._row.copy(), self.places
         tip = row[at.tip].reshape(3, 3)
         angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
@@ -183,5 +183,5 @@ class BoomPredictor:
             undeflected=None if drawn is None else drawn.undeflected,
             pins=None if drawn is None else drawn.pins,
             clearances=row[at.pins].reshape(-1, PIN),
-            moments=self.compiled.bending @ self.live.z,
+            moments=moments,
         )

@@ -166,12 +166,12 @@ def replay_into(
         if not changes:
             samples = (sample for sample in samples if not isinstance(sample, Change))
         for step in drive_blocks(twin, samples):
+            if bar is not None:
+                bar.update(1 if step is None else len(step[0].stamps))
             if step is None:
                 recording.refused += 1
                 continue
             block, found = step
-            if not len(block.stamps):
-                continue
             for each in found:
                 recording.add(each)
                 for part in each.all if isinstance(each, Report) else (each,):
@@ -179,8 +179,6 @@ def replay_into(
             if recording.is_empty:
                 read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
             _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
-            if bar is not None:
-                bar.update(len(block.stamps))
         _refuse(session, taken, other_boom.judge())
         behind.close()
         if bar is not None:

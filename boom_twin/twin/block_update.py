@@ -260,7 +260,7 @@ class BlockUpdate:
             residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
-        prediction = self._boom.prediction(stamp, news.outlines.get(0))
+        prediction = self._boom.prediction(stamp, news.outlines.get(0), found.moments[predicted - 1].copy())
         told = (*events, "deflected") if news.deflected else tuple(events)
         passes = int(found.passes[predicted - 1])
         return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))

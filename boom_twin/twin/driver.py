@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
 
 from ..types import Change, Report, Sample
 from .blocks import ReportBlock, SampleBlock
 
 if TYPE_CHECKING:  # a replay imports this before it starts its other processes, and the model's modules beside them
     from .twin import Twin
+
+
+Item = TypeVar("Item", Sample, SampleBlock)
 
 
 class Step(NamedTuple):
@@ -48,10 +51,8 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step 
     Step or None
         Of every sample; None for a message without a usable value.
     """
-    for item in items:
-        if isinstance(item, Change):
-            twin.requests.repeat(item)
-        elif item is None:
+    for item in _repeating_changes(twin, items):
+        if item is None:
             yield None
         else:
             began = perf_counter()
@@ -63,10 +64,14 @@ def drive_blocks(
     twin: Twin, items: Iterable[SampleBlock | Change | None]
 ) -> Iterator[tuple[SampleBlock, list[ReportBlock | Report]] | None]:
     """As `drive`, block by block: the samples of a block and what they caused, see `Twin.update_block`."""
+    for item in _repeating_changes(twin, items):
+        yield None if item is None else (item, twin.update_block(item))
+
+
+def _repeating_changes(twin: Twin, items: Iterable[Item | Change | None]) -> Iterator[Item | None]:
+    """All but the changes, which are asked of the twin in their turn."""
     for item in items:
         if isinstance(item, Change):
             twin.requests.repeat(item)
-        elif item is None:
-            yield None
         else:
-            yield item, twin.update_block(item)
+            yield item

@@ -50,7 +50,7 @@ def told(reports: list[Report]) -> list[tuple[object, ...]]:
             p.stamp, p.tip_angle, p.tip_angular_velocity, p.tip_angular_acceleration,
             *(None if each is None else each.tobytes() for each in (
                 p.tip_position, p.tip_displacement, p.tip_velocity, p.tip_acceleration, p.joints, p.strokes,
-                p.cylinder_forces, p.shape, p.undeflected, p.pins, p.clearances)),
+                p.cylinder_forces, p.shape, p.undeflected, p.pins, p.clearances, p.moments)),
         )  # fmt: skip
         residuals = [(r.stream, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
         level = None if health is None else (health.stamp, health.alarms, health.levels.tobytes(), health.tip_sigmas.tobytes())
