@@ -249,6 +249,33 @@ class Prediction:
 
 
 @dataclass(frozen=True, slots=True)
+class Estimate:
+    """The tip as all sensors together see it, at the stamp of one stroke sample (model frame: x forward, y up).
+
+    Attributes
+    ----------
+    stamp : int
+        Nanoseconds.
+    tip, acceleration : ndarray, shape (3,)
+        x, y (m) and angle (rad) of the last head at the tip; their second derivatives.
+    load : ndarray, shape (2,)
+        Force at the tip that the model does not know, N.
+    tip_covariance, acceleration_covariance : ndarray, shape (6,)
+        Upper triangles by rows of the covariance of `tip` and of `acceleration`.
+    load_variance : ndarray, shape (2,)
+        N^2.
+    """
+
+    stamp: int
+    tip: Array
+    acceleration: Array
+    load: Array
+    tip_covariance: Array
+    acceleration_covariance: Array
+    load_variance: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Residuals:
     """Measured minus predicted at the stamp of one angle or IMU sample.
 
@@ -397,6 +424,8 @@ class Report:
         Newton passes that the prediction took, with those of what was stepped for good.
     health : Health or None
         Set once a second, and where an alarm began, changed or ended.
+    estimate : Estimate or None
+        Set beside every prediction.
     earlier : tuple of Report
         Of samples that were held until this one confirmed their stamps, in their order.
     """
@@ -410,6 +439,7 @@ class Report:
     change: Change | None = None
     passes: int = 0
     health: Health | None = None
+    estimate: Estimate | None = None
     earlier: tuple[Report, ...] = ()
 
     @property

@@ -19,6 +19,8 @@ from ..types import Array
 
 PLACES = (0.0, 0.5, 1.0)
 """Of the stations of a part, over its length."""
+SIMPSON = (1 / 6, 4 / 6, 1 / 6)
+"""Shares of a part's length in an integral over it, by station."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,20 @@ def stations(scene: Scene) -> tuple[Station, ...]:
         for start, stop in flexible_parts(scene, index)
         for at in PLACES
     )
+
+
+def flexibility_by_station(scene: Scene) -> Array:
+    """Weights (stations,), 1/(N m): the sum of weight, moment and another moment is the work of the one on the other's bending.
+
+    Simpson's rule over every part, exact while their product is of the third degree, divided by EI.
+    """
+    found = []
+    for index in range(len(scene.sections)):
+        inertia = scene.sections[index].I
+        for start, stop in flexible_parts(scene, index):
+            assert inertia is not None
+            found += [share * (stop - start) / (scene.material.E * inertia) for share in SIMPSON]
+    return np.array(found)
 
 
 def moments_by_unknowns(plan: Plan) -> Array:

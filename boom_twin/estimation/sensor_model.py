@@ -47,6 +47,13 @@ class Mounting:
     mounts : sequence of Mount or None
         Of the sensor of each joint; None is an encoder. Empty: encoders all.
 
+    Attributes
+    ----------
+    roots, frames : ndarray of int, shape (n,)
+        Frames of the chain that the sections' roots are, and that the sensors are fixed to if they are inclinometers.
+    absolute : ndarray of bool, shape (n,)
+        Which of them are.
+
     Raises
     ------
     UsageError
@@ -61,6 +68,7 @@ class Mounting:
         kinds = plan.tables.operations.kind
         roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
         heads = np.append(roots[1:] - 1, len(kinds))
+        self.roots = roots
         self.frames = np.where([mount == "head" for mount in mounts], heads, roots)
         self.absolute = np.array([mount is not None for mount in mounts])
         self._inclination = inclination

@@ -76,6 +76,13 @@ class HealthMonitor:
         """Samples of one stream with their residuals, at least one."""
         self._blocks.measured(stream, compared)
 
+    @property
+    def masked(self) -> NDArray[np.bool_]:
+        """Of all measured channels in the order of the streams, those whose sensor is known to fail."""
+        streams = [stream for stream in self._channels if stream is not Stream.STROKES]
+        none = {stream: np.zeros(len(self._channels[stream]), bool) for stream in streams}
+        return np.concatenate([self._sensors[each].masked if each in self._sensors else none[each] for each in streams])
+
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
 

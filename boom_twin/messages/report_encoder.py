@@ -16,8 +16,8 @@ from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..twin.blocks import STREAMS, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals, channels_of
+from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, Residuals, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
@@ -123,6 +123,61 @@ PREDICTED = (
 """In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
 
 
+def _put_pose(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.pose.pose.position, fields.row(2))
+    msg.pose.pose.orientation.y, msg.pose.pose.orientation.w = fields.row(2)
+    _put_covariance(msg.pose, fields)
+
+
+def _put_acceleration_estimate(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.accel.accel.linear, fields.row(2))
+    msg.accel.accel.angular.y = fields.double()
+    _put_covariance(msg.accel, fields)
+
+
+def _put_covariance(holder: Any, fields: NumberFields) -> None:
+    """Of x, z and the turn about y; the triangle that the numbers have comes first, then what mirrors it."""
+    table, (rows, columns) = np.zeros((6, 6)), np.triu_indices(3)
+    places = np.array([0, 2, 4])
+    table[places[rows], places[columns]] = fields.row(6)
+    off = rows != columns
+    table[places[columns[off]], places[rows[off]]] = fields.row(3)
+    holder.covariance = table.ravel()
+
+
+def _covariance_numbers(triangle: Array) -> Array:
+    """Numbers of `_put_covariance` from an upper triangle (6,) or (6, k) of x, y and the angle: the turn counts about -y."""
+    signed = (triangle.T * np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])).T
+    return np.concatenate([signed, signed[[1, 2, 4]]])
+
+
+def _pose_numbers(e: Estimate | EstimateBlock) -> Array:
+    x, y, angle = e.tip.T
+    place = np.array([x, y, -np.sin(0.5 * angle), np.cos(0.5 * angle)])
+    return np.concatenate([place, _covariance_numbers(e.tip_covariance.T)])
+
+
+def _acceleration_numbers(e: Estimate | EstimateBlock) -> Array:
+    x, y, angular = e.acceleration.T
+    return np.concatenate([np.array([x, y, -angular]), _covariance_numbers(e.acceleration_covariance.T)])
+
+
+class EstimatedOutput(NamedTuple):
+    """As `PredictedOutput`, of the estimate beside every prediction."""
+
+    output: Output
+    put: Callable[[Any, NumberFields], None]
+    numbers: Callable[[Estimate | EstimateBlock], Array]
+
+
+ESTIMATED = (
+    EstimatedOutput(Output.ESTIMATE_POSE, _put_pose, _pose_numbers),
+    EstimatedOutput(Output.ESTIMATE_ACCELERATION, _put_acceleration_estimate, _acceleration_numbers),
+    EstimatedOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), lambda e: e.load.T),
+)
+"""In the order in which a bag has them, behind ``joint_states``."""
+
+
 Messages = list[tuple[Output, bytes]]
 
 
@@ -142,6 +197,7 @@ class ReportEncoder:
         self._passive = PassiveJoints(scene)
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
         self._predicted = [(row.output, self._template(row.output, row.put), row.numbers) for row in PREDICTED]
+        self._estimated = [(row.output, self._template(row.output, row.put), row.numbers) for row in ESTIMATED]
         self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _put_vector)
         self._joints = self._joint_states(names, count, 0)
         self._all_joints = self._joint_states([*names, *self._passive.names], count, len(self._passive.names))
@@ -157,13 +213,15 @@ class ReportEncoder:
         Returns
         -------
         list of (Output, bytes)
-            Those of `PREDICTED`, ``joint_states``, and ``shape`` where it has one, if there is a prediction; ``residuals``
-            for each set of them; ``health`` and ``tip_uncertainty`` (m) where there is news of it.
+            Those of `PREDICTED`, ``joint_states``, those of `ESTIMATED`, and ``shape`` where it has one, if there is a
+            prediction; ``residuals`` for each set of them; ``health`` and ``tip_uncertainty`` (m) where there is news of it.
         """
         messages: Messages = []
         if (p := report.prediction) is not None:
             messages += [(output, template.fill(p.stamp, numbers(p))) for output, template, numbers in self._predicted]
             messages.append((Output.JOINT_STATES, self._fill_joint_states(p)))
+        if (e := report.estimate) is not None:
+            messages += [(output, template.fill(e.stamp, numbers(e))) for output, template, numbers in self._estimated]
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
             messages.append((Output.CHANGES, encode_changes(report.change)))
@@ -176,15 +234,18 @@ class ReportEncoder:
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
         """The messages of many reports: those that `fill` gives of one after the other."""
         p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
-        turn = len(self._predicted)  # of joint_states among the messages of one sample; residuals follow
-        last = turn + 1 + len(residuals.at)  # of health; shape follows
+        turn = len(self._predicted)  # of joint_states among the messages of one sample; estimates and residuals follow
+        first = turn + 1 + len(self._estimated)
+        last = first + len(residuals.at)  # of health; shape follows
         if len(p.at):
             for number, (output, template, numbers) in enumerate(self._predicted):
                 found.add(output, p.at, number, template.fill_rows(p.stamps, numbers(p)))
             for rows, data in self._joint_states_rows(p):
                 found.add(Output.JOINT_STATES, p.at[rows], turn, data)
+            for number, (output, template, estimated) in enumerate(self._estimated, start=turn + 1):
+                found.add(output, p.at, number, template.fill_rows(p.stamps, estimated(block.estimates)))
         for rows, data in self._residual_rows(residuals):
-            found.add(Output.RESIDUALS, residuals.at[rows], turn + 1 + rows, data)
+            found.add(Output.RESIDUALS, residuals.at[rows], first + rows, data)
         for row, health in block.health.items():
             for number, (output, message) in enumerate(self._fill_health(health), start=last):
                 found.add_one(output, row, number, message)

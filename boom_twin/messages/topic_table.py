@@ -100,6 +100,9 @@ class Output(StrEnum):
     CHANGES = "changes"
     HEALTH = "health"
     TIP_UNCERTAINTY = "tip_uncertainty"
+    ESTIMATE_POSE = "estimate_pose"
+    ESTIMATE_ACCELERATION = "estimate_acceleration"
+    ESTIMATE_LOAD = "estimate_load"
     DIAGNOSTICS = "diagnostics"
 
 
@@ -114,6 +117,9 @@ TYPES: dict[Stream | Output, str] = {
     Output.CHANGES: "sensor_msgs/msg/JointState",
     Output.HEALTH: "diagnostic_msgs/msg/DiagnosticArray",
     Output.TIP_UNCERTAINTY: "geometry_msgs/msg/Vector3Stamped",
+    Output.ESTIMATE_POSE: "geometry_msgs/msg/PoseWithCovarianceStamped",
+    Output.ESTIMATE_ACCELERATION: "geometry_msgs/msg/AccelWithCovarianceStamped",
+    Output.ESTIMATE_LOAD: "geometry_msgs/msg/WrenchStamped",
     Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 """The one message type that the program reads or fills for each role."""

@@ -13,6 +13,7 @@ from ..analysis.equilibrium import SHARE
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
@@ -20,7 +21,7 @@ from ..health.monitor import HealthMonitor
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
-from .blocks import STREAMS, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, STROKES, UNMATCHED, Limits, TwinState, new_output
 from .stroke_check import FAR
@@ -84,6 +85,8 @@ class BlockUpdate:
         See `boom_twin.types.channels_of`.
     step : float
         What the time between strokes is taken for until there are two, s.
+    modes : DeviationModes
+        Of the estimate.
     judge : HealthMonitor or None
     counts : Counter
         Of events; ``deflected`` and ``unmatched`` are counted here.
@@ -100,11 +103,12 @@ class BlockUpdate:
         state: TwinState,
         channels: Mapping[Stream, tuple[str, ...]],
         step: float,
+        modes: DeviationModes,
         judge: HealthMonitor | None,
         counts: Counter[str],
     ) -> None:
         self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
-        self._judge, self._told_counts = judge, counts
+        self._modes, self._judge, self._told_counts = modes, judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         self._widths, compiled = limits.channels, boom.compiled
         self._found = new_output(2 * CAPACITY, self._joints, len(compiled.row), len(compiled.bending), limits.channels)
@@ -137,7 +141,8 @@ class BlockUpdate:
         self.make_room()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
             args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            reason, row = (DONE, 1) if measure(self.limits, self._state, *args, trusted, found) else (ODD, 0)
+            is_taken = measure(self.limits, self._state, self._modes.filter, *args, trusted, found)
+            reason, row = (DONE, 1) if is_taken else (ODD, 0)
         else:
             reason, row = self._advance_strokes(run, block, trusted)
         if unmatched := int(self._state.clock[UNMATCHED]):
@@ -157,10 +162,14 @@ class BlockUpdate:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
         while True:
-            reason, row = update(*self._boom.compiled, self.limits, self._state, *block, row, is_resumed, trusted, self._found)
+            twin = *self._boom.compiled, self.limits, self._state, self._modes.filter
+            reason, row = update(*twin, *block, row, is_resumed, trusted, self._found)
             if is_resumed := reason == REFRESH:
                 interval = run.interval or self._step
-                run.deviations.refresh(self._boom.prediction(run.newest), interval, self._boom.live, self._boom.angles)
+                prediction = self._boom.prediction(run.newest)
+                run.deviations.refresh(prediction, interval, self._boom.live, self._boom.angles)
+                assert run.deviations.noise is not None
+                self._modes.refresh(prediction.strokes, self._boom.angles, run.deviations.noise)
             elif reason != LOOK:
                 return reason, row
             else:
@@ -186,6 +195,7 @@ class BlockUpdate:
             health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, run.deviations.tip)
             if health is not None:
                 news.health[row] = health
+            self._modes.mask(self._judge.masked)
 
     def _tell_health(self) -> None:
         """Give the health monitor what has come since it was told last."""
@@ -241,9 +251,13 @@ class BlockUpdate:
             outlines=self._news.outlines,
         )
 
+    def _estimates(self) -> EstimateBlock:
+        own = slice(self._begin[0], int(self._found.counts[0]))
+        return EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
+
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
         """What the compiled update found of samples with these stamps (ns)."""
-        block = ReportBlock(stamps, self._predictions(), self._residuals(), self._news.health)
+        block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
         if not self._news.deflected:
             return [block]
         reports = enumerate(block.reports(self._joints))
@@ -262,5 +276,6 @@ class BlockUpdate:
             return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
         prediction = self._boom.prediction(stamp, news.outlines.get(0), found.moments[predicted - 1].copy())
         told = (*events, "deflected") if news.deflected else tuple(events)
-        passes = int(found.passes[predicted - 1])
-        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=news.health.get(0))
+        estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
+        passes, health = int(found.passes[predicted - 1]), news.health.get(0)
+        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=health, estimate=estimate)

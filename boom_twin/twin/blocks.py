@@ -10,7 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import Array, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..estimation.tip_estimate import (
+    ACCELERATION,
+    ACCELERATION_COVARIANCE,
+    FORCE,
+    FORCE_VARIANCE,
+    TIP,
+    TIP_COVARIANCE,
+    WIDTH,
+)
+from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
 
@@ -96,6 +105,69 @@ class PredictionBlock(NamedTuple):
         )
 
 
+class EstimateBlock(NamedTuple):
+    """Estimates, one beside every prediction.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (p,)
+        Nanoseconds.
+    rows : ndarray, shape (p, WIDTH)
+        See `boom_twin.estimation.tip_estimate.WIDTH`.
+    """
+
+    stamps: Integers
+    rows: Array
+
+    @property
+    def tip(self) -> Array:
+        """Place of the tip, shape (p, 3): x, y (m) and the angle of the last head (rad)."""
+        return self.rows[:, TIP : TIP + 3]
+
+    @property
+    def acceleration(self) -> Array:
+        """Of these, shape (p, 3): m/s^2, rad/s^2."""
+        return self.rows[:, ACCELERATION : ACCELERATION + 3]
+
+    @property
+    def load(self) -> Array:
+        """Force at the tip that the model does not know, shape (p, 2), N."""
+        return self.rows[:, FORCE : FORCE + 2]
+
+    @property
+    def tip_covariance(self) -> Array:
+        """Of `tip`, upper triangle by rows, shape (p, 6)."""
+        return self.rows[:, TIP_COVARIANCE : TIP_COVARIANCE + 6]
+
+    @property
+    def acceleration_covariance(self) -> Array:
+        """Of `acceleration`, likewise."""
+        return self.rows[:, ACCELERATION_COVARIANCE : ACCELERATION_COVARIANCE + 6]
+
+    @property
+    def load_variance(self) -> Array:
+        """Of `load`, shape (p, 2)."""
+        return self.rows[:, FORCE_VARIANCE : FORCE_VARIANCE + 2]
+
+    def one(self, row: int) -> Estimate:
+        """The estimate of a row."""
+        return estimate_of(int(self.stamps[row]), self.rows[row])
+
+
+def estimate_of(stamp: int, row: Array) -> Estimate:
+    """The estimate at `stamp` (ns) in a row, see `boom_twin.estimation.tip_estimate.WIDTH`; its arrays are views."""
+    block = EstimateBlock(np.array([stamp]), row[None, :])
+    return Estimate(stamp, *(getattr(block, name)[0] for name in ESTIMATED))
+
+
+def row_of(estimate: Estimate) -> Array:
+    """Inverse of `estimate_of`."""
+    return np.concatenate([getattr(estimate, name) for name in ESTIMATED])
+
+
+ESTIMATED = ("tip", "acceleration", "load", "tip_covariance", "acceleration_covariance", "load_variance")
+
+
 class ResidualBlock(NamedTuple):
     """Residuals, in the order in which they became known; see `Residuals`.
 
@@ -127,6 +199,8 @@ class ReportBlock(NamedTuple):
     stamps : ndarray of int64, shape (k,)
         Of all samples, nanoseconds.
     predictions : PredictionBlock
+    estimates : EstimateBlock
+        Of the same rows.
     residuals : ResidualBlock
     health : dict of int to Health
         By row of the sample.
@@ -134,6 +208,7 @@ class ReportBlock(NamedTuple):
 
     stamps: Integers
     predictions: PredictionBlock
+    estimates: EstimateBlock
     residuals: ResidualBlock
     health: dict[int, Health]
 
@@ -146,9 +221,11 @@ class ReportBlock(NamedTuple):
             stream = STREAMS[code]
             names = channels[stream]
             found[at].append(Residuals(stream, stamp, names, values[: len(names)], sigmas[: len(names)]))
-        predicted = {at: self.predictions.one(row) for row, at in enumerate(self.predictions.at.tolist())}
+        places = self.predictions.at.tolist()
+        predicted = {at: self.predictions.one(row) for row, at in enumerate(places)}
+        estimated = {at: self.estimates.one(row) for row, at in enumerate(places)}
         return [
-            Report(stamp, True, predicted.get(row), tuple(found[row]), health=self.health.get(row))
+            Report(stamp, True, predicted.get(row), tuple(found[row]), health=self.health.get(row), estimate=estimated.get(row))
             for row, stamp in enumerate(self.stamps.tolist())
         ]
 
@@ -204,7 +281,13 @@ def report_block(reports: list[Report], joints: int) -> ReportBlock:
         sigmas=sigmas,
     )
     health = {at: each.health for at, each in enumerate(reports) if each.health is not None}
-    return ReportBlock(np.array([each.stamp for each in reports], np.int64), predictions, residuals, health)
+    estimates = EstimateBlock(predictions.stamps, table_of([each.estimate for each in reports if each.prediction is not None]))
+    return ReportBlock(np.array([each.stamp for each in reports], np.int64), predictions, estimates, residuals, health)
+
+
+def table_of(estimates: list[Estimate | None]) -> Array:
+    """Rows of estimates, shape (k, WIDTH); NaN where there is none."""
+    return np.array([np.full(WIDTH, np.nan) if each is None else row_of(each) for each in estimates]).reshape(-1, WIDTH)
 
 
 def _outline_of(prediction: Prediction) -> Outline | None:
@@ -229,6 +312,7 @@ def joined(parts: list[ReportBlock]) -> ReportBlock:
     return ReportBlock(
         np.concatenate([part.stamps for part in parts]),
         PredictionBlock._make([np.concatenate(at), *map(np.concatenate, fields), outlines]),
+        EstimateBlock._make(map(np.concatenate, zip(*(part.estimates for part in parts), strict=True))),
         ResidualBlock._make([np.concatenate(residuals_at), *map(np.concatenate, others)]),
         {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
     )

@@ -125,7 +125,7 @@ class Deviations:
         return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
 
 
-IMU = CODES[Stream.IMU]
+ANGLES, IMU = CODES[Stream.ANGLES], CODES[Stream.IMU]
 
 
 @inner

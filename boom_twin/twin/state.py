@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.look_ahead import Tuning
+from ..estimation.tip_estimate import WIDTH
 from ..kernels.jit import inner
 from ..types import Array, Stream
 from .blocks import CODES
@@ -107,7 +108,8 @@ class Limits(NamedTuple):
 class UpdateOutput(NamedTuple):
     """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 
-    rows : results and estimates, see `boom_twin.kernels.result_row`. measured : strokes less their zeros, m. raw : as measured.
+    rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.estimation.tip_estimate`.
+    measured : strokes less their zeros, m. raw : as measured.
     """
 
     counts: Integers
@@ -115,6 +117,7 @@ class UpdateOutput(NamedTuple):
     stamps: Integers
     rows: Array
     moments: Array
+    estimates: Array
     measured: Array
     passes: Integers
     residual_at: Integers
@@ -161,7 +164,8 @@ def new_output(samples: int, joints: int, row: int, moments: int, channels: Inte
     width, residuals = int(channels.max()), samples + WAITING
     return UpdateOutput(
         counts=np.zeros(2, np.int64), at=np.zeros(samples, np.int64), stamps=np.zeros(samples, np.int64),
-        rows=np.zeros((samples, row)), moments=np.zeros((samples, moments)), measured=np.zeros((samples, joints)),
+        rows=np.zeros((samples, row)), moments=np.zeros((samples, moments)),
+        estimates=np.zeros((samples, WIDTH)), measured=np.zeros((samples, joints)),
         passes=np.zeros(samples, np.int64), residual_at=np.zeros(residuals, np.int64),
         residual_streams=np.zeros(residuals, np.int64), residual_stamps=np.zeros(residuals, np.int64),
         values=np.full((residuals, width), np.nan), sigmas=np.full((residuals, width), np.nan),

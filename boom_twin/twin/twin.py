@@ -12,6 +12,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.deviation_modes import DeviationModes
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
@@ -151,9 +152,10 @@ class Twin:
         self.judge = None
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        limits = limits_of(scene, self._boom.plan, self.settings, self.mounts)
+        self._modes = DeviationModes(scene, self.plan, self.settings, self.mounts)
+        limits = limits_of(scene, self.plan, self.settings, self.mounts)
         self._compiled = BlockUpdate(
-            self._boom, limits, self._state, self._channels, self.settings.step, self.judge, self.counts
+            self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge, self.counts
         )
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
 
@@ -385,6 +387,7 @@ class Twin:
         """Stamps are later by `shift` (ns) from now on, and the model goes on."""
         before = run.newest
         run.rebase(shift)
+        self._modes.rebase(shift)
         for line in self._lines.values():
             line.newest = None
         self._zeros.forget_past()
@@ -429,6 +432,7 @@ class Twin:
         speeds, self._speeds = self._speeds, None
         deviations = Deviations(self.plan, self.settings, self._state, sample.stamp, speeds)
         self._run = Run(self._state, deviations, sample.stamp, speeds is not None)
+        self._modes.begin()
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:

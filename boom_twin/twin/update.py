@@ -13,11 +13,12 @@ import numpy as np
 
 from ..estimation.look_ahead import follow
 from ..estimation.sensor_model import TURN
+from ..estimation.tip_estimate import advance_estimate, take_angles, take_imu, write_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
 from ..types import LIMIT, NANO
-from .expected_readings import INTERVAL, SPAN, write_expected
+from .expected_readings import ANGLES, IMU, INTERVAL, SPAN, write_expected
 from .sample_check import SHORTEST
 from .stamp_check import SMOOTHING, STEP
 from .state import (
@@ -55,7 +56,9 @@ was stepped to; the sample is complete and begins a slot or left the model's val
 
 
 @kernel
-def update(t, anchor, live, work, track, bending, out, limits, state, streams, stamps, values, first, resumed, trusted, found):
+def update(
+    t, anchor, live, work, track, bending, out, limits, state, tip, streams, stamps, values, first, resumed, trusted, found
+):
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
     Parameters
@@ -65,6 +68,8 @@ def update(t, anchor, live, work, track, bending, out, limits, state, streams, s
     limits : Limits
     state : TwinState
         Of a run that has begun.
+    tip : DeviationFilter
+        See `boom_twin.estimation.tip_estimate`.
     streams, stamps, values : ndarray
         See `boom_twin.twin.blocks.SampleBlock`.
     resumed : bool
@@ -83,7 +88,7 @@ def update(t, anchor, live, work, track, bending, out, limits, state, streams, s
     while row < stamps.shape[0]:
         stamp = stamps[row]
         if streams[row] != STROKES:
-            if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
+            if not compare(limits, state, tip, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
             row += 1
             continue
@@ -100,8 +105,9 @@ def update(t, anchor, live, work, track, bending, out, limits, state, streams, s
             if stamp >= state.clock[SEEN] + INTERVAL:
                 return REFRESH, row
         resumed = False
-        remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, stamp, row, found)
-        flush_waiting(limits, state, row, found)
+        remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, tip, stamp, row, found)
+        flush_waiting(limits, state, tip, row, found)
+        estimate(out, t.clearances.shape[0], tip, found)
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1
@@ -109,12 +115,12 @@ def update(t, anchor, live, work, track, bending, out, limits, state, streams, s
 
 
 @kernel
-def measure(limits, state, stream, stamp, values, trusted, found):
+def measure(limits, state, tip, stream, stamp, values, trusted, found):
     """Take one measured sample, as `update`, which needs the boom too; False, and nothing done, if it is not ordinary.
 
     One that is `trusted` is refused only if nothing was expected at its stamp.
     """
-    return compare(limits, state, stream, stamp, values, 0, trusted, found)
+    return compare(limits, state, tip, stream, stamp, values, 0, trusted, found)
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
@@ -184,8 +190,8 @@ def end_step(state, stamp):
 
 
 @inner
-def remember(live, bending, out, pins, passes, limits, state, stamp, row, found):
-    """Give the prediction, and keep what residuals need."""
+def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, found):
+    """Give the prediction, keep what residuals need, and let the estimate follow."""
     n, k = state.strokes.shape[0], found.counts[0]
     results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
     found.at[k], found.stamps[k], found.passes[k] = row, stamp, passes
@@ -210,13 +216,21 @@ def remember(live, bending, out, pins, passes, limits, state, stamp, row, found)
     for i in range(n):
         past.strokes[at, i] = state.strokes[i]
     write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
+    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
+
+
+@inner
+def estimate(out, pins, tip, found):
+    """Give the estimate beside the newest prediction."""
+    n = found.measured.shape[1]
+    write_estimate(tip, results_in(out, n, pins), estimates_in(out, n, pins), found.estimates[found.counts[0] - 1])
 
 
 # -- measured angles and accelerations --------------------------------------------------------------------------------------
 
 
 @inner
-def compare(limits, state, stream, stamp, values, row, trusted, found):
+def compare(limits, state, tip, stream, stamp, values, row, trusted, found):
     """Residuals of a measured sample, now or when the strokes have come; False, and nothing done, if it is not ordinary."""
     if not trusted and not is_due(limits, state, stream, stamp, values):
         return False
@@ -225,7 +239,7 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
             forget_waiting(state.waiting, 1)
             state.clock[UNMATCHED] += 1
         wait(limits, state, stream, stamp, values)
-    elif not write_residual(limits, state, stream, stamp, values, row, found):
+    elif not write_residual(limits, state, tip, stream, stamp, values, row, found):
         return False
     if not trusted:
         note_stamp(state, stream, stamp)
@@ -269,11 +283,11 @@ def move_row(ring, old, new):
 
 
 @inner
-def flush_waiting(limits, state, row, found):
+def flush_waiting(limits, state, tip, row, found):
     """Residuals of all samples that waited for the newest stroke."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
-        if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
+        if not write_residual(limits, state, tip, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
             state.clock[UNMATCHED] += 1
         done += 1
     if done > 0:
@@ -289,7 +303,7 @@ def forget_waiting(ring, count):
 
 
 @inner
-def write_residual(limits, state, stream, stamp, values, row, found):
+def write_residual(limits, state, tip, stream, stamp, values, row, found):
     """Residuals of one sample against what was expected at its stamp; False if nothing was."""
     after, share = matched(state.past, stamp)
     if after < 0:
@@ -314,7 +328,17 @@ def write_residual(limits, state, stream, stamp, values, row, found):
         found.values[k, i] = found.sigmas[k, i] = found.raw[k, i] = math.nan
     found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
     found.counts[1] = k + 1
+    correct_estimate(limits, tip, stream, stamp, found.values[k])
     return True
+
+
+@inner
+def correct_estimate(limits, tip, stream, stamp, residuals):
+    """Let the estimate know of residuals."""
+    if stream == ANGLES:
+        take_angles(tip, residuals, limits.first[ANGLES], stamp)
+    elif stream == IMU:
+        take_imu(tip, residuals, limits.first[IMU], stamp)
 
 
 @kernel

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from boom_twin import load_scene
+from boom_twin.estimation.tip_estimate import WIDTH
 from boom_twin.scene.schema import Scene
+from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Alarm, Array, Change, Health, Prediction, Ranked, Report, Residuals, Stream, channels_of
 
 START, STEP = 1_700_000_000_000_000_000, 1_666_667
@@ -45,13 +47,15 @@ def random_reports(seed: int, count: int, told: Told) -> list[Report]:
 def _report(random: np.random.Generator, stamp: int, told: Told) -> Report:
     streams = [Stream.ANGLES, *([Stream.IMU] if told.imu else [])]
     chosen = random.integers(0, len(streams), random.choice([0, 1, 2, 5], p=[0.4, 0.4, 0.1, 0.1]))
+    prediction = _prediction(random, stamp, told) if random.random() < 0.4 else None
     return Report(
         stamp,
         True,
-        _prediction(random, stamp, told) if random.random() < 0.4 else None,
+        prediction,
         tuple(_residuals(random, stamp, streams[k], told.joints) for k in chosen),
         change=Change(stamp, True, {"load": 1.5}, {"joint_1": 0.01}) if random.random() < told.changes else None,
         health=_health(random, stamp) if random.random() < told.health else None,
+        estimate=None if prediction is None else estimate_of(prediction.stamp, random.normal(size=WIDTH)),
     )
 
 

@@ -83,7 +83,7 @@ def test_a_block_says_the_same_as_its_reports() -> None:
 
 
 def test_a_report_with_a_change_stays_by_itself() -> None:
-    reports = random_reports(3, 200, Told(2, changes=0.05))
+    reports = random_reports(3, 300, Told(2, changes=0.05))
     packed = pack(reports, 2)
     changed = [report for report in reports if report.change is not None]
     assert len(changed) > 3 and [each for each in packed if isinstance(each, Report)] == changed

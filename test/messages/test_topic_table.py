@@ -23,6 +23,9 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.CHANGES: "/boom_twin/changes",
         Output.HEALTH: "/boom_twin/health",
         Output.TIP_UNCERTAINTY: "/boom_twin/tip/uncertainty",
+        Output.ESTIMATE_POSE: "/boom_twin/estimate/tip/pose",
+        Output.ESTIMATE_ACCELERATION: "/boom_twin/estimate/tip/acceleration",
+        Output.ESTIMATE_LOAD: "/boom_twin/estimate/tip/load",
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"

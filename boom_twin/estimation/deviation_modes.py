@@ -1,0 +1,198 @@
+"""Modes of the present posture for the estimate of the tip: how deviations move, what drives them, how sensors read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.bending_moments import flexibility_by_station, moments_by_unknowns, stations
+from ..analysis.equilibrium import settle
+from ..analysis.modal import Mode, StrokeNoise, along, damping_ratio, natural_modes
+from ..compiler.plan import Plan, first_row, taken_apart
+from ..config.settings import Settings
+from ..errors import BoomTwinError
+from ..kernels.elements.linkage import cylinder_length
+from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
+from ..scene.schema import Scene
+from ..types import SENSORS, Array, Mount, Stream
+from .sensor_model import Mounting
+from .tip_estimate import (
+    ANGLES_STAMP,
+    COUNT,
+    ERROR,
+    FED,
+    JERKY,
+    LOAD,
+    MODES,
+    SHARES,
+    STAMP,
+    STARTED,
+    USUAL_LOAD,
+    DeviationFilter,
+)
+
+HIGHEST = 25.0  # Hz; what is faster follows a load without vibration of its own
+WIDTH = 1e-3  # relative accuracy of frequencies
+POSTURE_STEP = 0.03  # m of stroke after which the modes are made anew
+SCENE_ERROR = 0.02  # standard deviation of a cylinder's compliance, as a share, while nothing is measured
+
+
+class DeviationModes:
+    """Keeps the modes in a `DeviationFilter` those of the present posture.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    plan : Plan
+        The same compiled.
+    settings : Settings
+    mounts : sequence of Mount or None
+        Of the angle sensors.
+
+    Attributes
+    ----------
+    filter : DeviationFilter
+    """
+
+    def __init__(self, scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> None:
+        self._plan, self._probe, self._work = plan, plan.state(), plan.work()
+        self._bending = moments_by_unknowns(plan) * flexibility_by_station(scene)[:, None]
+        self._sections = np.array([settings.section_deviation * scene.is_flexible(i) for i in range(plan.joints)])
+        mounting = Mounting(plan, scene.base.inclination, mounts)
+        self.filter = _new_filter(scene, plan, settings, mounting)
+        self._motions: list[Array] = []
+        self._at = np.full(plan.joints, math.inf)
+
+    def begin(self) -> None:
+        """A new run: nothing is known of the deviation."""
+        f = self.filter
+        f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = 0
+        f.level[0], self._at[:] = USUAL_LOAD, math.inf
+        f.last[:] = 0.0
+
+    def mask(self, masked: NDArray[np.bool_]) -> None:
+        """Leave out the channels (c,) that are masked."""
+        self.filter.masked[:] = masked
+
+    def rebase(self, shift: int) -> None:
+        """All stamps are later by `shift` (ns) from now on."""
+        self.filter.status[STAMP] += shift
+        self.filter.status[ANGLES_STAMP] += shift
+
+    def refresh(self, strokes: Array, angles: Array, noise: StrokeNoise) -> None:
+        """Make the modes anew, about the equilibrium at `strokes` (m), shape (n,), if these have moved far enough.
+
+        Where there is no equilibrium, they stay as they are.
+
+        Parameters
+        ----------
+        angles : ndarray, shape (n,)
+            Joint angles of the rigid boom, rad.
+        noise : StrokeNoise
+            At this posture.
+        """
+        if float(np.max(np.abs(strokes - self._at))) <= POSTURE_STEP:
+            return
+        self._at, f, plan = strokes.copy(), self.filter, self._plan
+        try:
+            settle(plan, self._probe, self._work, strokes, angles)
+        except BoomTwinError:
+            return
+        modes = natural_modes(plan, self._probe, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
+        kept = []
+        for j, mode in enumerate(modes):
+            is_turned = j < len(self._motions) and float((plan.masses * mode.motion) @ self._motions[j]) < 0.0
+            kept.append(self._put(j, mode, -1.0 if is_turned else 1.0))
+            f.density[j] = 0.0
+            if j < len(noise.modes):
+                f.density[j] = 2.0 * noise.collected[j] * f.decay[j] * f.omega[j] ** 2
+        f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
+        count, size = int(f.status[COUNT]), SHARES + 2 * plan.joints
+        self._motions, f.status[COUNT] = kept, len(modes)
+        if not f.status[STARTED]:
+            self._start()
+        elif len(modes) > count:
+            self._start_modes(count)
+        f.x[size + 2 * len(modes) :] = 0.0
+
+    def _put(self, j: int, mode: Mode, sign: float) -> Array:
+        """A mode as number j of the filter, turned round if `sign` is -1; gives its motion."""
+        f, plan, state = self.filter, self._plan, self._probe
+        f.omega[j] = 2.0 * math.pi * mode.frequency
+        f.decay[j] = 2.0 * damping_ratio(plan, mode) * f.omega[j]
+        f.forces[j] = sign * mode.increments[plan.tables.cylinders.z]
+        f.bending[j] = sign * (self._bending @ mode.increments)
+        frames = sign * along(plan, state, self._work, mode.increments, lambda: state.frames.copy())
+        f.relative[:, j] = _relative(state.frames, frames)
+        f.turns[j] = sign * along(
+            plan, state, self._work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints
+        )
+        return np.asarray(sign * mode.motion)
+
+    def _start(self) -> None:
+        """What is not known at the start: the load, what it has done, and what the scene may be off by."""
+        f, n = self.filter, self._plan.joints
+        f.x[:], f.p[:] = 0.0, 0.0
+        f.p[LOAD, LOAD] = f.p[LOAD + 1, LOAD + 1] = USUAL_LOAD**2
+        f.p[ERROR, ERROR] = f.p[ERROR + 1, ERROR + 1] = JERKY**2
+        for i in range(n):
+            f.p[SHARES + i, SHARES + i] = SCENE_ERROR**2
+            f.p[SHARES + n + i, SHARES + n + i] = self._sections[i] ** 2
+        self._start_modes(0)
+        f.status[STARTED] = 1
+
+    def _start_modes(self, first: int) -> None:
+        """Of the modes from number `first` on: bent, and shaken, as if by the usual load at the tip."""
+        f, size = self.filter, SHARES + 2 * self._plan.joints
+        for j in range(first, int(f.status[COUNT])):
+            at = size + 2 * j
+            swing = f.relative[:, j]
+            motion = math.hypot(*_tip_motion(self._probe.frames, swing))
+            f.x[at : at + 2] = f.p[at : at + 2] = f.p[:, at : at + 2] = 0.0
+            f.p[at, at] = (motion * USUAL_LOAD / f.omega[j] ** 2) ** 2
+            f.p[at + 1, at + 1] = f.p[at, at] * f.omega[j] ** 2
+
+
+def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting) -> DeviationFilter:
+    n, frames, places = plan.joints, len(plan.tables.operations) + 1, stations(scene)
+    noise = [
+        settings.variance(kind) for stream, kind in SENSORS.items() if stream is not Stream.STROKES for _ in kind.channels(n)
+    ]
+    size = SHARES + 2 * n + 2 * MODES
+    return DeviationFilter(
+        status=np.zeros(5, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
+        relative=np.zeros((frames, MODES, 3)), forces=np.zeros((MODES, n)), bending=np.zeros((MODES, len(places))),
+        sections=np.array([each.section for each in places], np.int64),
+        softness=np.array([0.0 if joint.cylinder.k is None else 1.0 / joint.cylinder.k for joint in scene.joints]),
+        slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
+        noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
+        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
+        x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
+        level=np.full(1, USUAL_LOAD), last=np.zeros(len(noise)), now=np.zeros(3),
+    )  # fmt: skip
+
+
+def _relative(frames: Array, motion: Array) -> Array:
+    """Motion of every frame (f, 5) relative to the one before, in its axes, from their absolute `motion`; shape (f, 3)."""
+    found = np.zeros((len(frames), 3))
+    found[0] = motion[0, [FRAME_X, FRAME_Y, FRAME_ANGLE]]
+    before, turn = frames[:-1], motion[:-1, FRAME_ANGLE]
+    step = frames[1:] - before
+    x = motion[1:, FRAME_X] - motion[:-1, FRAME_X] + turn * step[:, FRAME_Y]
+    y = motion[1:, FRAME_Y] - motion[:-1, FRAME_Y] - turn * step[:, FRAME_X]
+    c, s = before[:, FRAME_COS], before[:, FRAME_SIN]
+    found[1:] = np.column_stack([c * x + s * y, c * y - s * x, motion[1:, FRAME_ANGLE] - turn])
+    return found
+
+
+def _tip_motion(frames: Array, relative: Array) -> tuple[float, float]:
+    """Motion of the last frame by the frames' relative motion; inverse of `_relative`."""
+    before, own, rest = frames[:-1], relative[1:], frames[-1] - frames[1:]
+    c, s = before[:, FRAME_COS], before[:, FRAME_SIN]
+    x = c * own[:, 0] - s * own[:, 1] - own[:, 2] * rest[:, FRAME_Y]
+    y = s * own[:, 0] + c * own[:, 1] + own[:, 2] * rest[:, FRAME_X]
+    return float(x.sum()), float(y.sum())

@@ -1,0 +1,481 @@
+"""Kalman filter of how the boom deviates from its prediction: the tip as all sensors see it, and the unknown load there.
+
+The prediction is a function of the strokes alone. What it lacks, by load or by parameters that are off, is a small motion
+about it, in the natural modes j of the present posture (coordinates q_j, unit modal mass):
+
+    q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j = Phi_j^T f + sum_i N_ij (F_i / k_i) a_i + sum_s B_js b_s + w_j
+
+- f (2), N: force at the tip that the model does not know, a Gauss-Markov process of correlation time `LOAD_TIME`; Phi_j is the
+  mode's motion of the tip, 1/sqrt(kg). Its level follows the sensors: while successive innovations of the angles are alike,
+  the filter is too slow and the level rises, while they alternate it is too quick and it falls (Mehra 1970). A pump's pulses
+  need no periodic part of their own: the process is as wide as they are.
+- a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
+  F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it.
+- b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
+  moment, M_j the mode's, w Simpson's weights.
+- w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
+- e (2), m/s^2: fast error of the predicted acceleration by strokes' noise, Gauss-Markov of time `JERK_TIME`.
+
+Measured less predicted:
+
+    angle_i   Theta_i q + what is quasi-static in a and b and in no mode
+    force_i   N_i q, likewise
+    IMU       Phi q'' + e, turned into the tip's axes, and the specific force turned by the tip's own turn
+
+What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
+cylinder's force. The part of that which the few modes lack is added (static correction).
+
+The modes are made anew when the posture has changed; their motion of the tip follows the posture at every sample, for the
+motions of the parts relative to one another stay, see `follow_posture`.
+
+Sources: E. Lourens et al., Mech. Syst. Signal Process. 27 (2012), unknown forces as states; R. Mehra, IEEE Trans. Automat.
+Control 15 (1970), 175-184.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.jit import inner
+from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
+from ..types import NANO, Array
+
+MODES = 6  # at most
+LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
+LEAST_LOAD, MOST_LOAD, USUAL_LOAD = 25.0, 200.0, 60.0  # N, of the load's standard deviation
+JERKY = 0.08  # m/s^2, standard deviation of e
+SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
+AGILITY = 1.0  # 1/s, by which the load's level follows the innovations
+UNLIKELY = 4.0  # innovations beyond so many deviations count less, in proportion: a spike moves little
+ALIKE = 4.0  # most that one product of successive innovations counts
+LONGEST_STEP = 0.05  # s, of the covariance's differential equation
+OLDEST = 0.25  # s, age of a sample that still counts
+
+LOAD, ERROR, SHARES = 0, 2, 4
+"""First places in the state: the load's x and y, e's x and y, the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
+
+WIDTH = 22
+TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
+"""First places in a row of an estimate: x, y, angle of the tip (3); their second derivatives (3); load (2); covariances of the
+first two, upper triangles by rows (6 each); variances of the load (2). SI."""
+
+COUNT, STARTED, FED, STAMP, ANGLES_STAMP = range(5)  # of `status`
+ANGLE, FELT_X, FELT_Y = range(3)  # of `now`: of the tip, rad; predicted acceleration less gravity, m/s^2
+
+
+class DeviationFilter(NamedTuple):
+    """The filter as kernels take it; n joints, m modes at most, s states, c measured channels, f frames, k stations.
+
+    status : (5,) number of modes; whether it has begun; whether anything was measured; stamps of the newest strokes and of the
+    newest angles, ns.
+    omega, decay, density : (m,) rad/s; 2 zeta omega, 1/s; of w, m^2 kg/s^3.
+    relative : (f, m, 3) motion of every frame relative to the one before, in its axes: m, m, rad per unit of q.
+    forces : (m, n) N per unit. bending : (m, k) M_j w / EI. sections : (k,) of the stations, 0-based.
+    softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
+    roots : (n,) frames of the pivots. sensed, absolute : (n,) frames of the inclinometers, and which angle sensors are such.
+    noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
+    tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
+    tip by strokes.
+    coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m. variances : (n,) of the strokes' estimates, m^2.
+    x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. level : (1,) N. last : (c,) innovations.
+    now : (3,) see `ANGLE`.
+    """
+
+    status: NDArray[np.int64]
+    omega: Array
+    decay: Array
+    density: Array
+    relative: Array
+    forces: Array
+    bending: Array
+    sections: NDArray[np.int64]
+    softness: Array
+    slopes: Array
+    roots: NDArray[np.int64]
+    sensed: NDArray[np.int64]
+    absolute: NDArray[np.bool_]
+    noise: Array
+    masked: NDArray[np.bool_]
+    tip: Array
+    turns: Array
+    lever: Array
+    coupling: Array
+    drawn: Array
+    variances: Array
+    x: Array
+    p: Array
+    row: Array
+    gain: Array
+    rows: Array
+    level: Array
+    last: Array
+    now: Array
+
+
+@inner
+def states_of(f):
+    """Number of states: the first places, and those of the modes that there are."""
+    return SHARES + 2 * f.softness.shape[0] + 2 * f.status[COUNT]
+
+
+@inner
+def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
+    """Go on to the newest strokes, of this stamp (ns), and follow the prediction there.
+
+    Parameters
+    ----------
+    f : DeviationFilter
+    live : State
+        The boom as predicted.
+    results, estimates : Results, Estimates
+        See `boom_twin.kernels.result_row`.
+    moments : ndarray, shape (stations,)
+        Predicted, N m.
+    gravity : ndarray, shape (2,)
+        m/s^2.
+    """
+    follow_posture(f, live)
+    follow_prediction(f, results, estimates, moments, gravity)
+    h = (stamp - f.status[STAMP]) * NANO
+    f.status[STAMP] = stamp
+    if f.status[FED] == 0 or h <= 0.0:
+        return
+    steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
+    for _ in range(steps):
+        step_state(f, h / steps)
+
+
+@inner
+def follow_posture(f, live):
+    """Motion of the tip and turns of the angle sensors by the modes, and of the tip by strokes, as the boom now stands."""
+    n, last = f.softness.shape[0], live.frames.shape[0] - 1
+    tip_x, tip_y = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
+    for j in range(f.status[COUNT]):
+        x, y, turn = 0.0, 0.0, 0.0
+        for k in range(1, last + 1):
+            before = live.frames[k - 1]
+            c, s = before[FRAME_COS], before[FRAME_SIN]
+            own = f.relative[k, j]
+            x += c * own[0] - s * own[1] - own[2] * (tip_y - live.frames[k, FRAME_Y])
+            y += s * own[0] + c * own[1] + own[2] * (tip_x - live.frames[k, FRAME_X])
+            turn += own[2]
+            for i in range(n):
+                if f.absolute[i] and f.sensed[i] == k:
+                    f.turns[j, i] = turn
+        f.tip[j, 0], f.tip[j, 1], f.tip[j, 2] = x, y, turn
+    for i in range(n):
+        pivot = live.frames[f.roots[i]]
+        f.lever[i, 0] = -(tip_y - pivot[FRAME_Y]) / f.slopes[i]
+        f.lever[i, 1] = (tip_x - pivot[FRAME_X]) / f.slopes[i]
+        f.lever[i, 2] = 1.0 / f.slopes[i]
+
+
+@inner
+def follow_prediction(f, results, estimates, moments, gravity):
+    """How load and shares drive the modes at the predicted forces and moments."""
+    n = f.softness.shape[0]
+    for i in range(n):
+        f.drawn[i] = results.cylinder_forces[i] * f.softness[i]
+        f.variances[i] = estimates.variances[i]
+    for j in range(f.status[COUNT]):
+        c = f.coupling[j]
+        c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
+        for i in range(n):
+            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], 0.0
+        for k in range(moments.shape[0]):
+            c[2 + n + f.sections[k]] += f.bending[j, k] * moments[k]
+    f.now[ANGLE] = results.tip[0, 2]
+    f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
+
+
+@inner
+def oscillate(omega, decay, h):
+    """What position and rate of q'' + decay q' + omega^2 q = 0 become within h (s): a 2 by 2 matrix by rows."""
+    half = 0.5 * decay
+    wave2 = omega * omega - half * half
+    if wave2 > 0.0:
+        wave = math.sqrt(wave2)
+        c, s = math.cos(wave * h), math.sin(wave * h) / wave
+    else:
+        wave = math.sqrt(-wave2)
+        c, s = math.cosh(wave * h), h
+        if wave > 0.0:
+            s = math.sinh(wave * h) / wave
+    e = math.exp(-half * h)
+    return e * (c + half * s), e * s, -omega * omega * e * s, e * (c - half * s)
+
+
+@inner
+def step_state(f, h):
+    """Mean and covariance h (s) later; inputs of the modes are held."""
+    n, size, inputs = f.softness.shape[0], states_of(f), f.coupling.shape[1]
+    x, p, row = f.x, f.p, f.row
+    for j in range(f.status[COUNT]):
+        c, at = f.coupling[j], size - 2 * (f.status[COUNT] - j)
+        a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], h)
+        g1, g2 = (1.0 - a11) / (f.omega[j] * f.omega[j]), -a21 / (f.omega[j] * f.omega[j])
+        force = 0.0
+        for k in range(size):
+            row[k] = 0.0
+        for b in range(inputs):
+            place = input_place(b)
+            force += c[b] * x[place]
+            for k in range(size):
+                row[k] += c[b] * p[place, k]
+        x[at], x[at + 1] = a11 * x[at] + a12 * x[at + 1] + g1 * force, a21 * x[at] + a22 * x[at + 1] + g2 * force
+        for k in range(size):
+            q, rate = p[at, k], p[at + 1, k]
+            p[at, k], p[at + 1, k] = a11 * q + a12 * rate + g1 * row[k], a21 * q + a22 * rate + g2 * row[k]
+        for k in range(size):
+            force = 0.0
+            for b in range(inputs):
+                force += c[b] * p[k, input_place(b)]
+            q, rate = p[k, at], p[k, at + 1]
+            p[k, at], p[k, at + 1] = a11 * q + a12 * rate + g1 * force, a21 * q + a22 * rate + g2 * force
+        p[at, at] += f.density[j] * h * h * h / 3.0
+        p[at, at + 1] += f.density[j] * h * h / 2.0
+        p[at + 1, at] += f.density[j] * h * h / 2.0
+        p[at + 1, at + 1] += f.density[j] * h
+    fade(f, LOAD, math.exp(-h / LOAD_TIME), f.level[0] * f.level[0], size)
+    fade(f, ERROR, math.exp(-h / JERK_TIME), JERKY * JERKY, size)
+    for i in range(n):
+        if f.drawn[i] != 0.0:
+            p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+
+
+@inner
+def input_place(b):
+    """Place in the state of an input of the modes: of the load the first two, then the shares."""
+    return b if b < 2 else b + SHARES - 2
+
+
+@inner
+def fade(f, first, kept, variance, size):
+    """A step of the two Gauss-Markov processes from `first` on, of this variance."""
+    for a in range(first, first + 2):
+        f.x[a] *= kept
+        for k in range(size):
+            f.p[a, k] *= kept
+        for k in range(size):
+            f.p[k, a] *= kept
+        f.p[a, a] += variance * (1.0 - kept * kept)
+
+
+# -- rows of what is read ------------------------------------------------------------------------------------------------
+
+
+@inner
+def read_tip(f, axis, row):
+    """Row of the tip's x, y or angle."""
+    n, size = f.softness.shape[0], states_of(f)
+    clear(row, size)
+    for i in range(n):
+        row[SHARES + i] = f.lever[i, axis] * f.drawn[i]
+    for j in range(f.status[COUNT]):
+        at, still = size - 2 * (f.status[COUNT] - j), f.tip[j, axis] / (f.omega[j] * f.omega[j])
+        row[at] = f.tip[j, axis]
+        for i in range(n):
+            row[SHARES + i] -= still * f.coupling[j, 2 + i]
+
+
+@inner
+def read_angle(f, i, row):
+    """Row of an angle sensor; gives the variance that strokes' noise adds to it."""
+    n, size, variance = f.softness.shape[0], states_of(f), 0.0
+    clear(row, size)
+    for k in range(n):
+        if k == i or (f.absolute[i] and k < i):
+            row[SHARES + k] = f.drawn[k] / f.slopes[k]
+            variance += f.variances[k] / (f.slopes[k] * f.slopes[k])
+    for j in range(f.status[COUNT]):
+        at, still = size - 2 * (f.status[COUNT] - j), f.turns[j, i] / (f.omega[j] * f.omega[j])
+        row[at] = f.turns[j, i]
+        for k in range(n):
+            row[SHARES + k] -= still * f.coupling[j, 2 + k]
+            if not f.absolute[i]:
+                row[SHARES + n + k] -= still * f.coupling[j, 2 + n + k]
+    return variance
+
+
+@inner
+def read_force(f, i, row):
+    """Row of a cylinder's force, which no share changes at rest."""
+    n, size = f.softness.shape[0], states_of(f)
+    clear(row, size)
+    for j in range(f.status[COUNT]):
+        at, still = size - 2 * (f.status[COUNT] - j), f.forces[j, i] / (f.omega[j] * f.omega[j])
+        row[at] = f.forces[j, i]
+        for k in range(2 * n):
+            row[SHARES + k] -= still * f.coupling[j, 2 + k]
+
+
+@inner
+def read_acceleration(f, x, y, turn, turned, row):
+    """Row of the tip's acceleration along (x, y), `turn` times its angular one and `turned` times its turn beside."""
+    size = states_of(f)
+    clear(row, size)
+    row[ERROR], row[ERROR + 1] = x, y
+    for j in range(f.status[COUNT]):
+        at = size - 2 * (f.status[COUNT] - j)
+        along = x * f.tip[j, 0] + y * f.tip[j, 1] + turn * f.tip[j, 2]
+        row[at] = -f.omega[j] * f.omega[j] * along + turned * f.tip[j, 2]
+        row[at + 1] = -f.decay[j] * along
+        for b in range(f.coupling.shape[1]):
+            row[input_place(b)] += along * f.coupling[j, b]
+
+
+@inner
+def clear(row, size):
+    """No reading of anything."""
+    for k in range(size):
+        row[k] = 0.0
+
+
+# -- measurements --------------------------------------------------------------------------------------------------------
+
+
+@inner
+def feed(f):
+    """From now on the filter runs: something was measured, and what cylinders may be off by will show."""
+    if f.status[FED] == 0:
+        f.status[FED] = 1
+        for i in range(f.softness.shape[0]):
+            if f.softness[i] > 0.0:
+                f.p[SHARES + i, SHARES + i] = SOFT * SOFT
+
+
+@inner
+def take_angles(f, residuals, first, stamp):
+    """Use what angle sensors read at `stamp` (ns) less what they should have read (rad, NaN = not measured)."""
+    age = (f.status[STAMP] - stamp) * NANO
+    if age > OLDEST:
+        return
+    feed(f)
+    alike, count = 0.0, 0
+    for i in range(f.softness.shape[0]):
+        if usable(f, first + i, residuals[i]):
+            variance = f.noise[first + i] + read_angle(f, i, f.row)
+            alike += correct(f, first + i, residuals[i], variance, age)
+            count += 1
+    if count > 0 and stamp > f.status[ANGLES_STAMP]:
+        h = min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP)
+        level = f.level[0] * math.exp(AGILITY * h * alike / math.sqrt(count))
+        f.level[0] = min(max(level, LEAST_LOAD), MOST_LOAD)
+        f.status[ANGLES_STAMP] = stamp
+
+
+@inner
+def take_imu(f, residuals, first, stamp):
+    """Likewise of the tip IMU's x and z, m/s^2."""
+    age = (f.status[STAMP] - stamp) * NANO
+    if age > OLDEST:
+        return
+    feed(f)
+    c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
+    if usable(f, first, residuals[0]):
+        read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
+        correct(f, first, residuals[0], f.noise[first], age)
+    if usable(f, first + 1, residuals[1]):
+        read_acceleration(f, -s, c, 0.0, -c * f.now[FELT_X] - s * f.now[FELT_Y], f.row)
+        correct(f, first + 1, residuals[1], f.noise[first + 1], age)
+
+
+@inner
+def take_forces(f, residuals, first, stamp):
+    """Likewise of the cylinder forces, N."""
+    age = (f.status[STAMP] - stamp) * NANO
+    if age > OLDEST:
+        return
+    feed(f)
+    for i in range(f.softness.shape[0]):
+        if usable(f, first + i, residuals[i]):
+            read_force(f, i, f.row)
+            correct(f, first + i, residuals[i], f.noise[first + i], age)
+
+
+@inner
+def usable(f, channel, residual):
+    """Whether a reading may be used."""
+    return math.isfinite(residual) and not f.masked[channel]
+
+
+@inner
+def correct(f, channel, residual, variance, age):
+    """Correct the state by one reading that is read by `f.row`; gives the product of its innovation with the one before."""
+    size = states_of(f)
+    x, p, row, gain = f.x, f.p, f.row, f.gain
+    if age > 0.0:
+        for j in range(f.status[COUNT]):
+            at = size - 2 * (f.status[COUNT] - j)
+            a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
+            row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+    spread, off = variance, residual
+    for k in range(size):
+        total = 0.0
+        for b in range(size):
+            total += p[k, b] * row[b]
+        gain[k] = total
+        spread += row[k] * total
+        off -= row[k] * x[k]
+    innovation = off / math.sqrt(spread)
+    alike = min(max(innovation * f.last[channel], -ALIKE), ALIKE)
+    f.last[channel] = innovation
+    if abs(innovation) > UNLIKELY:
+        spread *= abs(innovation) / UNLIKELY
+    for k in range(size):
+        share = gain[k] / spread
+        x[k] += share * off
+        for b in range(size):
+            p[k, b] -= share * gain[b]
+    return alike
+
+
+# -- results -------------------------------------------------------------------------------------------------------------
+
+
+@inner
+def write_estimate(f, results, estimates, out):
+    """Write the estimate at the newest prediction: see `WIDTH`."""
+    size = states_of(f)
+    for a in range(3):
+        read_tip(f, a, f.rows[a])
+        out[TIP + a], out[ACCELERATION + a] = results.tip[0, a], results.tip[2, a]
+    read_acceleration(f, 1.0, 0.0, 0.0, 0.0, f.rows[3])
+    read_acceleration(f, 0.0, 1.0, 0.0, 0.0, f.rows[4])
+    read_acceleration(f, 0.0, 0.0, 1.0, 0.0, f.rows[5])
+    for a in range(3):
+        for k in range(size):
+            out[TIP + a] += f.rows[a, k] * f.x[k]
+            out[ACCELERATION + a] += f.rows[3 + a, k] * f.x[k]
+    write_covariance(f, 0, size, out[TIP_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, 3, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    at = TIP_COVARIANCE
+    for a in range(3):
+        for b in range(a, 3):
+            for i in range(f.softness.shape[0]):
+                out[at] += f.lever[i, a] * f.lever[i, b] * estimates.variances[i]
+            at += 1
+    for a in range(2):
+        out[FORCE + a], out[FORCE_VARIANCE + a] = f.x[LOAD + a], f.p[LOAD + a, LOAD + a]
+
+
+@inner
+def write_covariance(f, first, size, out):
+    """Upper triangle of the covariance of three rows."""
+    at = 0
+    for a in range(first, first + 3):
+        for k in range(size):
+            total = 0.0
+            for b in range(size):
+                total += f.p[k, b] * f.rows[a, b]
+            f.gain[k] = total
+        for b in range(a, first + 3):
+            total = 0.0
+            for k in range(size):
+                total += f.rows[b, k] * f.gain[k]
+            out[at] = total
+            at += 1
