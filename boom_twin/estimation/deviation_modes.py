@@ -22,10 +22,7 @@ from .sensor_model import Mounting
 from .tip_estimate import (
     ANGLES_STAMP,
     COUNT,
-    ERROR,
     FED,
-    JERKY,
-    LOAD,
     MODES,
     SHARES,
     STAMP,
@@ -37,7 +34,6 @@ from .tip_estimate import (
 HIGHEST = 25.0  # Hz; what is faster follows a load without vibration of its own
 WIDTH = 1e-3  # relative accuracy of frequencies
 POSTURE_STEP = 0.03  # m of stroke after which the modes are made anew
-SCENE_ERROR = 0.02  # standard deviation of a cylinder's compliance, as a share, while nothing is measured
 
 
 class DeviationModes:
@@ -61,7 +57,6 @@ class DeviationModes:
     def __init__(self, scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> None:
         self._plan, self._probe, self._work = plan, plan.state(), plan.work()
         self._bending = moments_by_unknowns(plan) * flexibility_by_station(scene)[:, None]
-        self._sections = np.array([settings.section_deviation * scene.is_flexible(i) for i in range(plan.joints)])
         mounting = Mounting(plan, scene.base.inclination, mounts)
         self.filter = _new_filter(scene, plan, settings, mounting)
         self._motions: list[Array] = []
@@ -72,11 +67,17 @@ class DeviationModes:
         f = self.filter
         f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = 0
         f.level[0], self._at[:] = USUAL_LOAD, math.inf
-        f.last[:] = 0.0
+        f.last[:], f.spread[:] = 0.0, 0.0
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
         """Leave out the channels (c,) that are masked."""
         self.filter.masked[:] = masked
+
+    @property
+    def tip_variances(self) -> Array:
+        """Mean square by which the predicted tip is off in x and y, as sensors show it, m^2, shape (2,); 0 without any."""
+        spread = self.filter.spread
+        return np.maximum(spread[0], spread[1]) if self.filter.status[FED] else np.zeros(2)
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns) from now on."""
@@ -113,11 +114,8 @@ class DeviationModes:
         f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
         count, size = int(f.status[COUNT]), SHARES + 2 * plan.joints
         self._motions, f.status[COUNT] = kept, len(modes)
-        if not f.status[STARTED]:
-            self._start()
-        elif len(modes) > count:
-            self._start_modes(count)
-        f.x[size + 2 * len(modes) :] = 0.0
+        first = size + 2 * min(count, len(modes))  # of modes that were not there, or are there no more
+        f.x[first:], f.p[first:], f.p[:, first:] = 0.0, 0.0, 0.0
 
     def _put(self, j: int, mode: Mode, sign: float) -> Array:
         """A mode as number j of the filter, turned round if `sign` is -1; gives its motion."""
@@ -133,29 +131,6 @@ class DeviationModes:
         )
         return np.asarray(sign * mode.motion)
 
-    def _start(self) -> None:
-        """What is not known at the start: the load, what it has done, and what the scene may be off by."""
-        f, n = self.filter, self._plan.joints
-        f.x[:], f.p[:] = 0.0, 0.0
-        f.p[LOAD, LOAD] = f.p[LOAD + 1, LOAD + 1] = USUAL_LOAD**2
-        f.p[ERROR, ERROR] = f.p[ERROR + 1, ERROR + 1] = JERKY**2
-        for i in range(n):
-            f.p[SHARES + i, SHARES + i] = SCENE_ERROR**2
-            f.p[SHARES + n + i, SHARES + n + i] = self._sections[i] ** 2
-        self._start_modes(0)
-        f.status[STARTED] = 1
-
-    def _start_modes(self, first: int) -> None:
-        """Of the modes from number `first` on: bent, and shaken, as if by the usual load at the tip."""
-        f, size = self.filter, SHARES + 2 * self._plan.joints
-        for j in range(first, int(f.status[COUNT])):
-            at = size + 2 * j
-            swing = f.relative[:, j]
-            motion = math.hypot(*_tip_motion(self._probe.frames, swing))
-            f.x[at : at + 2] = f.p[at : at + 2] = f.p[:, at : at + 2] = 0.0
-            f.p[at, at] = (motion * USUAL_LOAD / f.omega[j] ** 2) ** 2
-            f.p[at + 1, at + 1] = f.p[at, at] * f.omega[j] ** 2
-
 
 def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting) -> DeviationFilter:
     n, frames, places = plan.joints, len(plan.tables.operations) + 1, stations(scene)
@@ -167,12 +142,13 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         status=np.zeros(5, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
         relative=np.zeros((frames, MODES, 3)), forces=np.zeros((MODES, n)), bending=np.zeros((MODES, len(places))),
         sections=np.array([each.section for each in places], np.int64),
+        sections_off=np.array([settings.section_deviation * scene.is_flexible(i) for i in range(n)]),
         softness=np.array([0.0 if joint.cylinder.k is None else 1.0 / joint.cylinder.k for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
         lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
-        level=np.full(1, USUAL_LOAD), last=np.zeros(len(noise)), now=np.zeros(3),
+        spread=np.zeros((2, 2)), level=np.full(1, USUAL_LOAD), last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip
 
 
@@ -187,12 +163,3 @@ def _relative(frames: Array, motion: Array) -> Array:
     c, s = before[:, FRAME_COS], before[:, FRAME_SIN]
     found[1:] = np.column_stack([c * x + s * y, c * y - s * x, motion[1:, FRAME_ANGLE] - turn])
     return found
-
-
-def _tip_motion(frames: Array, relative: Array) -> tuple[float, float]:
-    """Motion of the last frame by the frames' relative motion; inverse of `_relative`."""
-    before, own, rest = frames[:-1], relative[1:], frames[-1] - frames[1:]
-    c, s = before[:, FRAME_COS], before[:, FRAME_SIN]
-    x = c * own[:, 0] - s * own[:, 1] - own[:, 2] * rest[:, FRAME_Y]
-    y = s * own[:, 0] + c * own[:, 1] + own[:, 2] * rest[:, FRAME_X]
-    return float(x.sum()), float(y.sum())

@@ -48,10 +48,13 @@ MODES = 6  # at most
 LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = 25.0, 200.0, 60.0  # N, of the load's standard deviation
 JERKY = 0.08  # m/s^2, standard deviation of e
+SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
 AGILITY = 1.0  # 1/s, by which the load's level follows the innovations
 UNLIKELY = 4.0  # innovations beyond so many deviations count less, in proportion: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
+REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
+INEXACT = 0.05  # share of the deviation that modes and static corrections may be wrong by
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
 
@@ -64,7 +67,8 @@ TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANC
 first two, upper triangles by rows (6 each); variances of the load (2). SI."""
 
 COUNT, STARTED, FED, STAMP, ANGLES_STAMP = range(5)  # of `status`
-ANGLE, FELT_X, FELT_Y = range(3)  # of `now`: of the tip, rad; predicted acceleration less gravity, m/s^2
+ANGLE, FELT_X, FELT_Y, STEP = range(4)
+"""Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s."""
 
 
 class DeviationFilter(NamedTuple):
@@ -75,14 +79,16 @@ class DeviationFilter(NamedTuple):
     omega, decay, density : (m,) rad/s; 2 zeta omega, 1/s; of w, m^2 kg/s^3.
     relative : (f, m, 3) motion of every frame relative to the one before, in its axes: m, m, rad per unit of q.
     forces : (m, n) N per unit. bending : (m, k) M_j w / EI. sections : (k,) of the stations, 0-based.
-    softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
+    sections_off : (n,) standard deviation of b. softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
     roots : (n,) frames of the pivots. sensed, absolute : (n,) frames of the inclinometers, and which angle sensors are such.
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
     coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m. variances : (n,) of the strokes' estimates, m^2.
-    x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. level : (1,) N. last : (c,) innovations.
-    now : (3,) see `ANGLE`.
+    x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. last : (c,) innovations. level : (1,) N.
+    spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
+    it, m^2.
+    now : (4,) see `ANGLE`.
     """
 
     status: NDArray[np.int64]
@@ -93,6 +99,7 @@ class DeviationFilter(NamedTuple):
     forces: Array
     bending: Array
     sections: NDArray[np.int64]
+    sections_off: Array
     softness: Array
     slopes: Array
     roots: NDArray[np.int64]
@@ -111,6 +118,7 @@ class DeviationFilter(NamedTuple):
     row: Array
     gain: Array
     rows: Array
+    spread: Array
     level: Array
     last: Array
     now: Array
@@ -140,13 +148,52 @@ def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
     """
     follow_posture(f, live)
     follow_prediction(f, results, estimates, moments, gravity)
+    if f.status[STARTED] == 0:
+        start_state(f)
     h = (stamp - f.status[STAMP]) * NANO
-    f.status[STAMP] = stamp
+    f.status[STAMP], f.now[STEP] = stamp, h
     if f.status[FED] == 0 or h <= 0.0:
         return
     steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
     for _ in range(steps):
         step_state(f, h / steps)
+
+
+@inner
+def start_state(f):
+    """What is not known at the start: load and shares, with the deflection that they have caused, and vibration beside."""
+    n, size = f.softness.shape[0], states_of(f)
+    for k in range(f.x.shape[0]):
+        f.x[k] = 0.0
+        for b in range(f.x.shape[0]):
+            f.p[k, b] = 0.0
+    for b in range(2):
+        add_unknown(f, b, USUAL_LOAD)
+        f.p[ERROR + b, ERROR + b] = JERKY * JERKY
+    for i in range(n):
+        if f.softness[i] > 0.0:
+            add_unknown(f, 2 + i, SCENE_ERROR)
+        add_unknown(f, 2 + n + i, f.sections_off[i])
+    for j in range(f.status[COUNT]):
+        at = size - 2 * (f.status[COUNT] - j)
+        swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * USUAL_LOAD / (f.omega[j] * f.omega[j])
+        f.p[at, at] += swing * swing
+        f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
+    f.status[STARTED] = 1
+
+
+@inner
+def add_unknown(f, b, deviation):
+    """Add to what is not known an input of the modes, of this standard deviation, and what it has done at rest."""
+    size = states_of(f)
+    clear(f.row, size)
+    f.row[input_place(b)] = deviation
+    for j in range(f.status[COUNT]):
+        at = size - 2 * (f.status[COUNT] - j)
+        f.row[at] = deviation * f.coupling[j, b] / (f.omega[j] * f.omega[j])
+    for k in range(size):
+        for i in range(size):
+            f.p[k, i] += f.row[k] * f.row[i]
 
 
 @inner
@@ -345,7 +392,7 @@ def feed(f):
         f.status[FED] = 1
         for i in range(f.softness.shape[0]):
             if f.softness[i] > 0.0:
-                f.p[SHARES + i, SHARES + i] = SOFT * SOFT
+                add_unknown(f, 2 + i, SOFT)
 
 
 @inner
@@ -458,9 +505,22 @@ def write_estimate(f, results, estimates, out):
         for b in range(a, 3):
             for i in range(f.softness.shape[0]):
                 out[at] += f.lever[i, a] * f.lever[i, b] * estimates.variances[i]
+            if a == b:
+                out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
             at += 1
+    write_spread(f, results, out)
     for a in range(2):
         out[FORCE + a], out[FORCE_VARIANCE + a] = f.x[LOAD + a], f.p[LOAD + a, LOAD + a]
+
+
+@inner
+def write_spread(f, results, out):
+    """Note how far off the predicted tip is."""
+    kept = math.exp(-min(max(f.now[STEP], 0.0) / REMEMBERED, 50.0))
+    for a in range(2):
+        off = out[TIP + a] - results.tip[0, a]
+        f.spread[1, a] = off * off + out[TIP_COVARIANCE + 3 * a]
+        f.spread[0, a] = f.spread[1, a] + kept * (f.spread[0, a] - f.spread[1, a])
 
 
 @inner

@@ -93,7 +93,7 @@ class HealthMonitor:
         noise : StrokeNoise or None
             With the modes at the present posture.
         tip : ndarray, shape (2,)
-            Deviation (m) of the tip that a start from rest leaves.
+            Deviation (m) of the tip that a start from rest leaves, and that the estimate shows.
         """
         self._variances, self._noise, self._tip = variances, noise, tip
         news: list[Alarm] = []

@@ -192,7 +192,8 @@ class BlockUpdate:
         news.outlines[at] = self._boom.outline()
         if self._judge is not None:
             self._tell_health()
-            health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, run.deviations.tip)
+            off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
+            health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
             if health is not None:
                 news.health[row] = health
             self._modes.mask(self._judge.masked)

@@ -1,0 +1,324 @@
+"""The estimate of the tip: its filter against dense matrices, against Monte Carlo, against statics and kinematics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from boom_twin import load_scene, statics
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.analysis.modal import StrokeNoise, natural_modes
+from boom_twin.config.settings import Settings
+from boom_twin.estimation import tip_estimate as tip
+from boom_twin.estimation.boom_predictor import BoomPredictor
+from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.estimation.tip_estimate import DeviationFilter
+from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
+from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
+from boom_twin.kernels.transfer.time_step import observe
+from boom_twin.scene.edit import parameter, with_parameters
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.schema import Scene
+from boom_twin.twin.blocks import ReportBlock, block_of, row_of
+from boom_twin.twin.twin import Twin
+from boom_twin.types import Array, Sample, Stream
+
+H = 0.005  # s
+STEP = 5_000_000  # ns
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene()
+
+
+class Posed:
+    """A boom at rest, and its filter there."""
+
+    def __init__(self, scene: Scene, strokes: Array, settings: Settings | None = None) -> None:
+        self.boom = BoomPredictor(scene)
+        self.modes = DeviationModes(scene, self.boom.plan, settings or Settings(), ())
+        self.rest(strokes)
+        self.modes.begin()
+        self.modes.refresh(strokes, self.boom.angles, NO_NOISE)
+        self.follow()
+        tip.start_state(self.modes.filter)
+
+    def rest(self, strokes: Array) -> None:
+        boom = self.boom
+        boom.start(strokes)
+        settle(boom.plan, boom.live, boom.compiled.work, strokes, boom.angles.copy())
+        observe(boom.plan.tables, boom.live, boom.compiled.row)
+
+    def follow(self) -> None:
+        boom, f = self.boom, self.modes.filter
+        results, estimates = rows_of(boom)
+        moments = boom.compiled.bending @ boom.live.z
+        tip.follow_posture(f, boom.live)
+        tip.follow_prediction(f, results, estimates, moments, np.array(boom.plan.tables.gravity))
+
+
+def rows_of(boom: BoomPredictor) -> tuple[Results, Estimates]:
+    size = boom.plan.joints, len(boom.plan.pins)
+    return results_in(boom.compiled.row, *size), estimates_in(boom.compiled.row, *size)
+
+
+NO_NOISE = StrokeNoise(np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), ())
+
+
+@pytest.fixture
+def posed(scene: Scene) -> Posed:
+    return Posed(scene, strokes_of_posture(scene, "arch"))
+
+
+def dense(f: DeviationFilter) -> tuple[Array, Array]:
+    """Continuous system x' = A x + white noise of density Q, from the equations in the module's text."""
+    n, count, size = len(f.softness), int(f.status[tip.COUNT]), int(tip.states_of(f))
+    a, q = np.zeros((size, size)), np.zeros((size, size))
+    for first, time, sigma in ((tip.LOAD, tip.LOAD_TIME, f.level[0]), (tip.ERROR, tip.JERK_TIME, tip.JERKY)):
+        for k in (first, first + 1):
+            a[k, k], q[k, k] = -1.0 / time, 2.0 * sigma**2 / time
+    for i in range(n):
+        q[tip.SHARES + i, tip.SHARES + i] = tip.SOFTENING**2
+    places = [0, 1, *range(tip.SHARES, tip.SHARES + 2 * n)]
+    for j in range(count):
+        at = tip.SHARES + 2 * n + 2 * j
+        a[at, at + 1] = 1.0
+        a[at + 1, at], a[at + 1, at + 1] = -(f.omega[j] ** 2), -f.decay[j]
+        a[at + 1, places] = f.coupling[j]
+        q[at + 1, at + 1] = f.density[j]
+    return a, q
+
+
+def discrete(a: Array, q: Array, h: float) -> tuple[Array, Array]:
+    """Transition and covariance over h, exact (Van Loan 1978)."""
+    size = len(a)
+    big = expm(np.block([[-a, q], [np.zeros_like(a), a.T]]) * h)
+    turn = big[size:, size:].T
+    return turn, turn @ big[:size, size:]
+
+
+def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
+    """Of order 2 in the step where inputs are held, and exact for the modes alone."""
+    f = posed.modes.filter
+    rng = np.random.default_rng(1)
+    f.density[:] = rng.uniform(0.0, 1e-4, len(f.density))
+    size = int(tip.states_of(f))
+    scale = np.sqrt(np.diag(f.p)[:size] + 1e-12)
+    start_x, start_p = scale * rng.normal(size=size), f.p[:size, :size].copy()
+    a, q = dense(f)
+    errors = []
+    for steps in (1, 4, 16):
+        f.x[:size], f.p[:size, :size] = start_x, start_p
+        for _ in range(steps):
+            tip.step_state(f, 0.02 / steps)
+        turn, noise = discrete(a, q, 0.02)
+        x, p = turn @ start_x, turn @ start_p @ turn.T + noise
+        size_p = np.sqrt(np.diag(p) + 1e-12)
+        errors.append(
+            [np.abs((f.x[:size] - x) / size_p).max(), np.abs((f.p[:size, :size] - p) / np.outer(size_p, size_p)).max()]
+        )
+    errors_x, errors_p = np.array(errors).T
+    assert errors_x[2] < 2e-3 and errors_p[2] < 2e-3
+    assert errors_x[2] < errors_x[0] / 8.0 and errors_p[2] < errors_p[0] / 8.0
+
+
+def test_corrections_are_those_of_the_dense_filter(posed: Posed) -> None:
+    f = posed.modes.filter
+    size, rng = int(tip.states_of(f)), np.random.default_rng(2)
+    x, p = np.zeros(size), f.p[:size, :size].copy()
+    f.status[tip.FED] = 1
+    for i in (0, 3):
+        tip.read_angle(f, i, f.row)
+        row, value, variance = f.row[:size].copy(), 1e-4 * rng.normal(), 1e-8
+        tip.correct(f, i, value, variance, 0.0)
+        gain = p @ row / (row @ p @ row + variance)
+        x, p = x + gain * (value - row @ x), p - np.outer(gain, row @ p)
+    scale = np.sqrt(np.diag(p) + 1e-15)
+    assert np.abs((f.x[:size] - x) / scale).max() < 1e-9
+    assert np.abs((f.p[:size, :size] - p) / np.outer(scale, scale)).max() < 1e-9
+
+
+def test_a_late_reading_is_read_by_the_state_as_it_was(posed: Posed) -> None:
+    """A row turned back by an age reads of the state now what the row read then: without noise and inputs."""
+    f = posed.modes.filter
+    size = int(tip.states_of(f))
+    first = tip.SHARES + 8
+    f.x[first:size] = np.random.default_rng(3).normal(size=size - first)
+    tip.read_angle(f, 2, f.row)
+    then = float(f.row[first:size] @ f.x[first:size])
+    tip.step_state(f, 0.03)
+    tip.read_angle(f, 2, f.row)
+    f.p[:] = 0.0
+    tip.correct(f, 2, 0.0, 1.0, 0.03)
+    assert float(f.row[first:size] @ f.x[first:size]) == pytest.approx(then, rel=1e-9)
+
+
+@pytest.mark.parametrize("posture", ["arch", "high"])
+def test_motion_of_the_tip_follows_the_posture(scene: Scene, posture: str) -> None:
+    """What modes of one posture do to the tip in another: derivative of the frames' places there."""
+    posed = Posed(scene, strokes_of_posture(scene, "arch"))
+    there = strokes_of_posture(scene, posture) + np.array([0.02, 0.01, -0.02, 0.015])
+    posed.rest(there)
+    posed.follow()
+    f, frames = posed.modes.filter, posed.boom.live.frames
+    for j in range(int(f.status[tip.COUNT])):
+        sides = []
+        for sign in (1e-6, -1e-6):
+            place, heading = frames[0, [FRAME_X, FRAME_Y]].copy(), frames[0, FRAME_ANGLE]
+            for k in range(1, len(frames)):
+                step = frames[k, [FRAME_X, FRAME_Y]] - frames[k - 1, [FRAME_X, FRAME_Y]]
+                before = frames[k - 1, FRAME_ANGLE]
+                own = np.array(
+                    [np.cos(before) * step[0] + np.sin(before) * step[1], np.cos(before) * step[1] - np.sin(before) * step[0]]
+                )
+                own = own + sign * f.relative[k, j, :2]
+                c, s = math.cos(heading), math.sin(heading)
+                place = place + np.array([c * own[0] - s * own[1], s * own[0] + c * own[1]])
+                heading += frames[k, FRAME_ANGLE] - before + sign * f.relative[k, j, 2]
+            sides.append([*place, heading])
+        motion = (np.array(sides[0]) - sides[1]) / 2e-6
+        assert f.tip[j] == pytest.approx(motion, rel=1e-5, abs=1e-8)
+
+
+def test_modes_move_the_tip_as_they_do_where_they_were_made(posed: Posed) -> None:
+    plan, f = posed.boom.plan, posed.modes.filter
+    modes = natural_modes(plan, posed.boom.live, posed.boom.compiled.work, 4, 1e-6)
+    for j, mode in enumerate(modes):
+        motion = mode.motion[plan.tables.tip : plan.tables.tip + 3]
+        assert f.tip[j] * np.sign(f.tip[j] @ motion) == pytest.approx(motion, rel=2e-3, abs=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "tolerance"),
+    [("cylinder_2.k", 1 / 1.04, 0.03), ("cylinder_1.k", 1 / 1.04, 0.03), ("section_2.EI", 1 / 1.04, 0.06)],
+)
+def test_shares_do_at_rest_what_the_changed_scene_does(scene: Scene, name: str, change: float, tolerance: float) -> None:
+    """Tip and angles of a scene with one stiffness changed, from equilibria, against the rows of the filter."""
+    strokes = strokes_of_posture(scene, "arch")
+    posed = Posed(scene, strokes)
+
+    changed = with_parameters(scene, {name: parameter(scene, name) * change})
+    base, other = statics(scene, strokes=strokes), statics(changed, strokes=strokes)
+    f, n = posed.modes.filter, 4
+    place = tip.SHARES + int(name[name.index("_") + 1]) - 1 + (n if name.startswith("section") else 0)
+    f.x[:] = 0.0
+    f.x[place] = 1.0 / change - 1.0
+    for j in range(int(f.status[tip.COUNT])):
+        f.x[tip.SHARES + 2 * n + 2 * j] = f.coupling[j, place - tip.SHARES + 2] * f.x[place] / f.omega[j] ** 2
+    found = []
+    for axis in (0, 1):
+        tip.read_tip(f, axis, f.row)
+        found.append(float(f.row @ f.x))
+    assert found == pytest.approx(
+        np.subtract(other.tip, base.tip).tolist(), abs=tolerance * float(np.hypot(*np.subtract(other.tip, base.tip)))
+    )
+    turns = np.subtract(other.joints, base.joints)
+    for i in range(n):
+        tip.read_angle(f, i, f.row)
+        assert float(f.row @ f.x) == pytest.approx(turns[i], abs=tolerance * max(1e-3, float(np.abs(turns).max())))
+
+
+def pseudo_session(scene: Scene, true: Scene, seconds: float, seed: int) -> tuple[list[Sample], dict[str, Array]]:
+    """A boom at rest that is another one than the twin's: readings with noise."""
+    strokes = strokes_of_posture(scene, "arch")
+    at = statics(true, strokes=strokes)
+    settings, rng = Settings(), np.random.default_rng(seed)
+    samples = []
+    for k in range(round(seconds / H)):
+        samples.append(Sample(Stream.STROKES, k * STEP, strokes + settings.stroke_sigma * rng.normal(size=4)))
+        samples.append(Sample(Stream.ANGLES, k * STEP, np.array(at.joints) + settings.angle_sigma * rng.normal(size=4)))
+    return samples, {"tip": np.array(at.tip)}
+
+
+def test_a_load_that_hangs_at_the_tip_is_found(scene: Scene) -> None:
+    """20 kg more than the scene says pull by 196 N; sensors are angles only. What stays looks like softer cylinders in part."""
+    heavy = with_parameters(scene, {"tip.payload": 60.0})
+    light = with_parameters(scene, {"tip.payload": 40.0})
+    samples, truth = pseudo_session(light, heavy, 6.0, 1)
+    twin = Twin(light)
+    report = None
+    for sample in samples:
+        told = twin.update(sample)
+        report = told if told.prediction is not None else report
+    assert report is not None and report.estimate is not None and report.prediction is not None
+    off = np.hypot(*(report.prediction.tip_position - truth["tip"]))
+    assert off > 0.02
+    assert np.hypot(*(report.estimate.tip[:2] - truth["tip"])) < 0.25 * off
+    deviation = np.sqrt(report.estimate.tip_covariance[[0, 3]])
+    assert (np.abs(report.estimate.tip[:2] - truth["tip"]) < 4.0 * deviation + 1e-3).all()
+
+
+def test_without_other_sensors_it_is_the_prediction(scene: Scene) -> None:
+    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
+    for k in range(40):
+        report = twin.update(Sample(Stream.STROKES, k * STEP, strokes))
+    assert report.prediction is not None and report.estimate is not None
+    p, e = report.prediction, report.estimate
+    assert e.tip.tolist() == [*p.tip_position.tolist(), p.tip_angle]
+    assert e.acceleration.tolist() == [*p.tip_acceleration.tolist(), p.tip_angular_acceleration]
+    assert e.load.tolist() == [0.0, 0.0]
+    assert 3e-3 < math.sqrt(e.tip_covariance[3]) < 5e-2, "nothing tells of a load there"
+
+
+def test_order_of_streams_within_a_stamp_changes_little_and_blocks_nothing(scene: Scene) -> None:
+    """Angles before or after the strokes of their stamp, or 40 ms late: nearly the same estimate; in blocks the very same."""
+    heavy = with_parameters(scene, {"tip.payload": 60.0})
+    light = with_parameters(scene, {"tip.payload": 40.0})
+    samples, _ = pseudo_session(light, heavy, 5.0, 2)
+    strokes = [sample for sample in samples if sample.stream is Stream.STROKES]
+    angles = [sample for sample in samples if sample.stream is Stream.ANGLES]
+    before = [each for pair in zip(angles, strokes, strict=True) for each in pair]
+    late = [each for k in range(8, len(strokes)) for each in (strokes[k], angles[k - 8])]
+    ends = []
+    for order in (samples, before, [*strokes[:8], *late]):
+        one, many = Twin(light), Twin(light)
+        rows = [row_of(report.estimate) for report in map(one.update, order) if report.estimate is not None]
+
+        found = []
+        for part in many.update_block(block_of(order, 4)):
+            if isinstance(part, ReportBlock):
+                found += list(part.estimates.rows)
+            elif part.estimate is not None:
+                found.append(row_of(part.estimate))
+        assert np.array_equal(np.array(rows), np.array(found))
+        ends.append(rows[-1])
+    assert np.abs(ends[0][:2] - ends[1][:2]).max() < 1e-3
+    assert np.abs(ends[0][:2] - ends[2][:2]).max() < 2e-3
+
+
+def test_the_covariance_stays_one(scene: Scene) -> None:
+    """After a minute of readings at 200 Hz it is symmetric and positive, at rest as with late and missing readings."""
+    samples, _ = pseudo_session(scene, scene, 60.0, 3)
+    twin = Twin(scene)
+    for sample in samples:
+        twin.update(sample)
+    f = twin._modes.filter
+    size = int(tip.states_of(f))
+    p = f.p[:size, :size]
+    scale = np.sqrt(np.diag(p)[:, None] * np.diag(p)) + 1e-300
+    normal = p / scale
+    used = np.diag(p) > 0.0
+    assert np.abs(normal - normal.T).max() < 1e-9
+    assert np.linalg.eigvalsh(normal[np.ix_(used, used)]).min() > -1e-9
+
+
+def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
+    """Tips of scenes whose compliances differ as stated: the normalised error is near 1 over many of them."""
+    errors = []
+    for seed in range(8):
+        rng = np.random.default_rng(100 + seed)
+
+        values = {f"cylinder_{i + 1}.k": parameter(scene, f"cylinder_{i + 1}.k") / (1.0 + 0.1 * rng.normal()) for i in range(4)}
+        samples, truth = pseudo_session(scene, with_parameters(scene, values), 3.0, seed)
+        twin, estimates = Twin(scene), []
+        for sample in samples:
+            report = twin.update(sample)
+            if report.estimate is not None:
+                estimates.append(report.estimate)
+        e = estimates[-1]
+        errors.append((e.tip[:2] - truth["tip"]) / np.sqrt(e.tip_covariance[[0, 3]]))
+    assert 0.3 < math.sqrt(float(np.mean(np.square(errors)))) < 1.6
