@@ -258,9 +258,10 @@ def oscillate(omega, decay, h):
 
 @inner
 def step_state(f, h):
-    """Mean and covariance h (s) later; inputs of the modes are held."""
-    n, size, inputs = f.softness.shape[0], states_of(f), f.coupling.shape[1]
+    """Mean and covariance h (s) later: half a step of the inputs, one of the modes under these, the other half (Strang)."""
+    size, inputs = states_of(f), f.coupling.shape[1]
     x, p, row = f.x, f.p, f.row
+    step_inputs(f, 0.5 * h, size)
     for j in range(f.status[COUNT]):
         c, at = f.coupling[j], size - 2 * (f.status[COUNT] - j)
         a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], h)
@@ -283,15 +284,23 @@ def step_state(f, h):
                 force += c[b] * p[k, input_place(b)]
             q, rate = p[k, at], p[k, at + 1]
             p[k, at], p[k, at + 1] = a11 * q + a12 * rate + g1 * force, a21 * q + a22 * rate + g2 * force
-        p[at, at] += f.density[j] * h * h * h / 3.0
-        p[at, at + 1] += f.density[j] * h * h / 2.0
-        p[at + 1, at] += f.density[j] * h * h / 2.0
-        p[at + 1, at + 1] += f.density[j] * h
-    fade(f, LOAD, math.exp(-h / LOAD_TIME), f.level[0] * f.level[0], size)
+        _, b12, _, b22 = oscillate(f.omega[j], f.decay[j], 0.5 * h)
+        share = f.density[j] * h / 6.0  # of the noise's integral, by Simpson's rule
+        p[at, at] += share * (4.0 * b12 * b12 + a12 * a12)
+        p[at, at + 1] += share * (4.0 * b12 * b22 + a12 * a22)
+        p[at + 1, at] += share * (4.0 * b12 * b22 + a12 * a22)
+        p[at + 1, at + 1] += share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
+    step_inputs(f, 0.5 * h, size)
     fade(f, ERROR, math.exp(-h / JERK_TIME), JERKY * JERKY, size)
-    for i in range(n):
+
+
+@inner
+def step_inputs(f, h, size):
+    """Load and shares h (s) later."""
+    fade(f, LOAD, math.exp(-h / LOAD_TIME), f.level[0] * f.level[0], size)
+    for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
-            p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+            f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
 
 
 @inner
