@@ -12,6 +12,7 @@ from ..scene.load import DEFAULT_NAME, examine
 from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
+from . import accuracy
 from . import reduce as need
 from .main import add_json, add_scene, open_scene, print_result
 
@@ -24,11 +25,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     add_json(parser)
     need.add_arguments(parser)
+    accuracy.add_arguments(parser)
 
 
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
     need.refuse_misuse(args)
+    sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     account = explain(scene)
     name = args.scene or DEFAULT_NAME
@@ -40,6 +43,10 @@ def run(args: Namespace) -> int:
         if args.out is not None:
             need.write(args.scene, scene, found, args.need, args.out)
             lines.append(f"Written: {args.out}")
+    if sensors is not None:
+        told, rows = accuracy.table(scene, sensors)
+        values |= told
+        lines += rows
     print_result(args.json, values, lines)
     return 0
 

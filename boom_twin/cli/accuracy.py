@@ -1,0 +1,73 @@
+"""`boom_twin check --sensors`: which accuracy of the tip which sensors give, by posture."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from itertools import combinations
+from typing import Any
+
+from ..errors import BoomTwinError, UsageError
+from ..estimation.accuracy import TipAccuracy, accuracy_at
+from ..scene.kinematics import strokes_of_posture
+from ..scene.schema import Scene
+from ..types import Stream
+
+NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """``--sensors``."""
+    parser.add_argument(
+        "--sensors",
+        metavar="NAME,..",
+        help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
+        f"{', '.join(NAMES)}; a name given twice is two such sensors (example: angles,imu,imu)",
+    )
+
+
+def sensors_of(text: str) -> list[Stream]:
+    """The sensors that are named; UsageError for a name that is none."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in NAMES:
+            raise UsageError(f"--sensors: {name!r} is no sensor. Known: {', '.join(NAMES)}.")
+    return [NAMES[name] for name in names]
+
+
+def sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
+    """None of them, and every selection, fewest first; each once."""
+    found = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
+    return list(dict.fromkeys(found))
+
+
+def words(chosen: tuple[Stream, ...]) -> str:
+    """A selection as it is written on the command line."""
+    names = {stream: name for name, stream in NAMES.items()}
+    return ",".join(names[stream] for stream in chosen) or "strokes only"
+
+
+def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
+    """The accuracy at every posture: as values for ``--json``, and as lines."""
+    values: dict[str, Any] = {}
+    lines = ["", "Accuracy of the estimate at rest, while an unknown load of about 60 N acts at the tip (standard deviations)"]
+    lines.append(
+        f"  {'posture':12} {'sensors beside strokes':24} {'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
+    )
+    for posture in scene.postures:
+        for chosen in sets_of(sensors):
+            key = f"{posture}:{words(chosen)}"
+            try:
+                found = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
+            except BoomTwinError as error:
+                lines.append(f"  {posture:12} {words(chosen):24} {error}")
+                continue
+            values[key] = [*found.tip.tolist(), *found.acceleration.tolist(), *found.load.tolist()]
+            lines.append(f"  {posture:12} {words(chosen):24} {_row(found)}")
+    return {"accuracy": values}, lines
+
+
+def _row(found: TipAccuracy) -> str:
+    x, y, pitch = 1e3 * found.tip
+    acceleration = float((found.acceleration**2).sum() ** 0.5)
+    load = f"{found.load[0]:.0f}, {found.load[1]:.0f}"
+    return f"{f'{x:.2f}, {y:.2f}':>16} {pitch:11.2f} {acceleration:7.3f} m/s² {load:>14}"

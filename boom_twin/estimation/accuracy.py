@@ -1,0 +1,112 @@
+"""Which accuracy of the tip which sensors give at a posture at rest: the estimate's covariance, once it has settled.
+
+A Kalman filter's covariance does not depend on what is measured. So the filter of `boom_twin.estimation.tip_estimate` is run
+over sensors that read just what is predicted, from nothing known until its covariance changes no more; a load of the usual level
+acts that the model does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.equilibrium import settle
+from ..analysis.modal import stroke_noise
+from ..compiler.plan import first_row
+from ..config.settings import Settings
+from ..kernels.jit import kernel
+from ..kernels.result_row import estimates_in, results_in
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.schema import Scene
+from ..types import SECOND, SENSORS, Array, Mount, Stream
+from .boom_predictor import BoomPredictor
+from .deviation_modes import DeviationModes
+from .tip_estimate import (
+    ACCELERATION_COVARIANCE,
+    FORCE_VARIANCE,
+    TIP_COVARIANCE,
+    WIDTH,
+    advance_estimate,
+    take_angles,
+    take_imu,
+    write_estimate,
+)
+
+SETTLED = 20.0  # s
+
+
+class TipAccuracy(NamedTuple):
+    """Standard deviations of the estimate: tip's x, y (m) and angle (rad), acceleration (m/s^2), load (N); (3,), (2,), (2,)."""
+
+    tip: Array
+    acceleration: Array
+    load: Array
+
+
+def accuracy_at(
+    scene: Scene,
+    strokes: Array,
+    sensors: Sequence[Stream],
+    settings: Settings | None = None,
+    mounts: Sequence[Mount | None] = (),
+    rate: float = 200.0,
+) -> TipAccuracy:
+    """What the estimate is accurate to at rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    strokes : ndarray, shape (n,)
+        m.
+    sensors : sequence of Stream
+        Beside the strokes; one that is named twice is there twice.
+    rate : float
+        Of all of them, Hz.
+
+    Returns
+    -------
+    TipAccuracy
+        What is stated after `SETTLED` s.
+
+    Raises
+    ------
+    UsageError, SolverError
+        Strokes out of reach; no equilibrium there.
+    """
+    settings, boom = settings or Settings(), BoomPredictor(scene)
+    plan, work, live = boom.plan, boom.compiled.work, boom.live
+    modes = DeviationModes(scene, plan, settings, mounts)
+    angles = joint_angles_of_strokes(scene, strokes)
+    settle(plan, live, work, strokes, angles)
+    noise = stroke_noise(plan, live, work, settings.stroke_variance, 1.0 / rate, settings.jerk_density)
+    modes.begin()
+    modes.refresh(strokes, angles, noise)
+    row = boom.compiled.row
+    row[:] = 0.0
+    row[: len(first_row(plan, live))] = first_row(plan, live)
+    boom.variances[:] = settings.stroke_variance
+    moments, out = boom.compiled.bending @ live.z, np.zeros(WIDTH)
+    counts = np.array([sum(each is stream for each in sensors) for stream in SENSORS])
+    size = np.array([plan.joints, len(plan.pins)])
+    gravity, zeros = np.array(plan.tables.gravity), np.zeros(max(plan.joints, 2))
+    run_covariance(
+        modes.filter, live, row, size, moments, gravity, counts, round(SECOND / rate), round(SETTLED * rate), zeros, out
+    )
+    tip, acceleration = (out[np.array([0, 3, 5]) + first] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
+    return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))
+
+
+@kernel
+def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, zeros, out):
+    """Run the filter at rest, `counts` (streams,) sensors of each stream reading what is predicted every `span` ns."""
+    results, estimates = results_in(row, size[0], size[1]), estimates_in(row, size[0], size[1])
+    for k in range(1, steps + 1):
+        advance_estimate(f, live, results, estimates, moments, gravity, k * span)
+        for _ in range(counts[1]):
+            take_angles(f, zeros, 0, k * span)
+        for _ in range(counts[2]):
+            take_imu(f, zeros, size[0], k * span)
+    write_estimate(f, results, estimates, out)
