@@ -6,22 +6,24 @@ frequencies below omega (the counting of Wittrick and Williams 1971). Bisection 
 starting guess; a mode follows by inverse iteration with the same sweep.
 
 Two ways lead from a stroke's noise to a predicted angle. The estimate of now is off by its own variance P, and turns the joint
-by dphi/ds. And what the strokes did before, white noise of density r T (variance times sample interval) as far as the smoother
+by dphi/ds. And what the strokes did before, white noise of density r T (variance times sample interval) as far as the filter
 lets it through, has shaken the natural modes. Mode j with modal load N_ij by the drive of cylinder i (the increment of that
 cylinder's force, unit modal mass) collects, after a time t,
 
-    var eta_j = sum_i N_ij^2 / omega_j^4 . r T omega_j / (4 zeta_j) . G(omega_j)^2 (1 - exp(-2 zeta_j omega_j t)),
-    G(omega) = 1 / (1 + (omega/omega_c)^6),   omega_c = (q / (r T))^(1/6),
+    var eta_j = sum_i N_ij^2 / omega_j^4 . S_i(omega_j) omega_j / (4 zeta_j) . (1 - exp(-2 zeta_j omega_j t)),
+    S_i(omega) = T (r sum_m mu_im G_m(omega)^2 + e_i),   G_m(omega) = 1 / (1 + (omega/omega_m)^6),
 
-G being the gain of the smoother for strokes that are integrated white jerk of density q. White noise through a resonance:
-Crandall and Mark, Random Vibration in Mechanical Systems, 1963.
+G_m being the gain of the smoother with corner frequency omega_m, mu_im how probable it was for stroke i in this time, and e_i
+the power of innovations beyond noise where a stroke was not followed (`boom_twin.estimation.stroke_filter`). White noise
+through a resonance: Crandall and Mark, Random Vibration in Mechanical Systems, 1963.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import spherical_jn
@@ -196,10 +198,36 @@ def along(plan: Plan, state: State, work: Work, increments: Array, read: Callabl
     return np.asarray((sides[0] - sides[1]) / (2.0 * size))
 
 
-BAND = 2.5  # modes are looked at up to this multiple of the smoother's own frequency
 SWUNG = 0.3  # of the tip's deflection: how far a boom at work swings
 TINY = 1e-300
 WIDTH = 1e-3  # relative accuracy of their frequencies
+
+
+class StrokeSpectrum(NamedTuple):
+    """Noise in the estimates of n strokes by frequency, see the module; m smoothers.
+
+    Attributes
+    ----------
+    variance, interval : float
+        Of a reading, m^2; time between samples, s.
+    corners : ndarray, shape (m,)
+        rad/s, ascending.
+    shares : ndarray, shape (n, m)
+        How probable each smoother was.
+    excess : ndarray, shape (n,)
+        Power of what was not followed, m^2.
+    """
+
+    variance: float
+    interval: float
+    corners: Array
+    shares: Array
+    excess: Array
+
+    def at(self, omegas: Array) -> Array:
+        """Power spectral density of every stroke, m^2 s, at frequencies (k,) in rad/s; shape (k, n)."""
+        gains = 1.0 / (1.0 + (omegas[:, None] / self.corners) ** 6)
+        return np.asarray(self.interval * (self.variance * gains**2 @ self.shares.T + self.excess))
 
 
 @dataclass(frozen=True)
@@ -209,27 +237,38 @@ class StrokeNoise:
     Attributes
     ----------
     joints : ndarray, shape (modes, n)
-        rad^2, once the mode has been shaken for long.
-    swing : ndarray, shape (modes, 2)
-        Deviation of the tip's acceleration, as a vector along the mode's motion there, m/s^2, likewise.
+        Of the joint angles, rad^2 for a variance of the modal coordinate of 1 m^2 kg.
     decay : ndarray, shape (modes,)
         2 zeta omega, 1/s.
+    response : ndarray, shape (modes, n)
+        Variance of the modal coordinates, m^2 kg, that white noise of 1 m^2 s in a stroke gives in the long run.
     collected : ndarray, shape (modes,)
-        Of the modal coordinates, likewise, m^2 kg.
+        That of the modal coordinates in the long run, m^2 kg.
     modes : tuple of Mode
     """
 
     joints: Array
-    swing: Array
     decay: Array
+    response: Array
     collected: Array
     modes: tuple[Mode, ...]
 
-    def after(self, time: float, angle: float) -> tuple[Array, Array]:
-        """Variances of joint angles (n,), and of tip acceleration (2,) in axes turned by `angle`, `time` s from rest."""
-        grown = 1.0 - np.exp(-self.decay * time)
-        c, s = np.cos(angle), np.sin(angle)
-        return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2
+    def collected_of(self, spectrum: StrokeSpectrum) -> Array:
+        """Variances (modes,) of the modal coordinates, m^2 kg, in the long run under other noise of the strokes."""
+        return np.asarray((self.response * spectrum.at(self._omegas())).sum(axis=1))
+
+    def pushes(self, plan: Plan, angle: float) -> Array:
+        """What an error of the present strokes, too short for any mode to follow, makes of the tip's acceleration.
+
+        In axes turned by `angle`, (m/s^2)^2 for a variance of 1 m^2; shape (n, 2).
+        """
+        return np.asarray((self._loads(plan).T @ self._tip_motions(plan, angle)) ** 2)
+
+    def _tip_motions(self, plan: Plan, angle: float = 0.0) -> Array:
+        """Of the modes, per unit of their coordinates, in axes turned by `angle`; shape (modes, 2)."""
+        tip, (c, s) = plan.tables.tip, (np.cos(angle), np.sin(angle))
+        motions = np.array([mode.motion[tip : tip + 2] for mode in self.modes]).reshape(-1, 2)
+        return np.asarray(motions @ np.array([[c, -s], [s, c]]))
 
     def of_start(self, plan: Plan, speeds: Array, sag: Array) -> Array:
         """Variances (modes,), m^2 kg, of vibration that a model lacks when it is started at rest.
@@ -280,33 +319,24 @@ class StrokeNoise:
 
     def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array]:
         """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, tip (2,)."""
-        share = variances / np.maximum(self.collected, TINY)
-        c, s = np.cos(angle), np.sin(angle)
-        swing = (self.swing @ np.array([[c, -s], [s, c]])) ** 2
-        motions = np.array([mode.motion[plan.tables.tip : plan.tables.tip + 2] for mode in self.modes]).reshape(-1, 2)
-        return share @ self.joints, share @ swing, variances @ motions**2
+        swing = self._omegas()[:, None] ** 2 * self._tip_motions(plan, angle)
+        return variances @ self.joints, variances @ swing**2, variances @ self._tip_motions(plan) ** 2
 
 
-def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval: float, density: float) -> StrokeNoise:
-    """Propagate strokes measured with `variance` (m^2) every `interval` s, smoothed for jerk `density` (m^2/s^5)."""
-    spectrum = variance * interval
-    corner = (density / spectrum) ** (1.0 / 6.0)
-    modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=BAND * corner)
-    joints, swing, decay, variances = [], [], [], []
-    tip = plan.tables.tip
+def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum) -> StrokeNoise:
+    """Propagate noise of the strokes to the natural modes within the band of the quickest smoother."""
+    n = plan.joints
+    modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=float(spectrum.corners[-1]))
+    joints, response, decay = [], [], []
     for mode in modes:
         omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
-        load = float(np.sum(mode.increments[plan.tables.cylinders.z] ** 2))
-        gain = 1.0 / (1.0 + (omega / corner) ** 6)
-        collected = load / omega**4 * spectrum * omega / (4.0 * max(zeta, 1e-6)) * gain**2
-        joints.append(collected * joint_increments(plan, state, work, mode) ** 2)
-        swing.append(np.sqrt(collected) * omega**2 * mode.motion[tip : tip + 2])
+        joints.append(joint_increments(plan, state, work, mode) ** 2)
+        response.append(mode.increments[plan.tables.cylinders.z] ** 2 / (4.0 * max(zeta, 1e-6) * omega**3))
         decay.append(2.0 * zeta * omega)
-        variances.append(collected)
-    n = plan.joints
-    return StrokeNoise(
-        np.array(joints).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay), np.array(variances), modes
+    found = StrokeNoise(
+        np.array(joints).reshape(-1, n), np.array(decay), np.array(response).reshape(-1, n), np.zeros(len(modes)), modes
     )
+    return replace(found, collected=found.collected_of(spectrum))
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

@@ -1,7 +1,7 @@
 """Measured sessions as arrays, with strokes smoothed forth and back on a uniform grid.
 
 The filter is Butterworth's of third order run in both directions, so that its gain is 1 / (1 + (omega/omega_c)^6) without any
-lag: that of the twin's smoother for strokes that are integrated white jerk, with its corner omega_c = (q / (r T))^(1/6).
+lag: that of the quietest smoother of the twin's strokes (`boom_twin.estimation.stroke_filter`), at whose corner it is.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..bag.joint_names import refuse_other_names
 from ..bag.reader import Session, check_topic, scan
 from ..config.settings import Settings
 from ..errors import BagError
+from ..estimation.stroke_filter import corners
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..system.received_files import open_received
@@ -218,8 +219,8 @@ def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
     step = settings.step
     grid: Array = np.asarray(step * np.arange(int(times[-1] / step) + 1))
     refuse_short(session.name, float(grid[-1]), "without a gap in the strokes")
-    spectrum = settings.stroke_variance * float(np.median(np.diff(times)))
-    corner = min((settings.jerk_density / spectrum) ** (1.0 / 6.0) / (2.0 * np.pi), HIGHEST / step)
+    quietest = corners(settings.stroke_variance, float(np.median(np.diff(times))), settings.stroke_agility)[0]
+    corner = min(float(quietest) / (2.0 * np.pi), HIGHEST / step)
     strokes = _smoothed(times, filled(times, series.values), grid, corner)
     first = _rest(np.abs(np.gradient(strokes, step, axis=0)).max(axis=1), round(REST / step))
     if first is None:

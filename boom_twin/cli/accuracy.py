@@ -50,9 +50,8 @@ def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str
     """The accuracy at every posture: as values for ``--json``, and as lines."""
     values: dict[str, Any] = {}
     lines = ["", "Accuracy of the estimate at rest, while an unknown load of about 60 N acts at the tip (standard deviations)"]
-    lines.append(
-        f"  {'posture':12} {'sensors beside strokes':24} {'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
-    )
+    titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
+    lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:
         for chosen in sets_of(sensors):
             key = f"{posture}:{words(chosen)}"

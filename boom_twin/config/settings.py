@@ -14,6 +14,8 @@ from ..types import SensorKind
 from .yaml_text import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)
+RETIRED = dict.fromkeys(("jerk_density", "lag"), "the stroke filter adapts by itself: leave it out, or set stroke_agility")
+"""Parameters of earlier versions, and what takes their place."""
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
@@ -30,7 +32,10 @@ def checked(table: type[Table], values: dict[str, Any], source: str) -> Table:
     try:
         return table(**values)
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
+        lines = []
+        for e in error.errors():
+            name = ".".join(map(str, e["loc"]))
+            lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, e['msg'])}")
         known = ", ".join(table.model_fields)
         raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
 
@@ -91,6 +96,9 @@ Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
 Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
+Agility = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
+
+
 class Settings(BaseModel):
     """Numbers of the twin; SI units. Defaults are those of ``msg_config/twin.yaml``, which tells what each one does."""
 
@@ -104,8 +112,7 @@ class Settings(BaseModel):
     section_deviation: NotNegative = Field(
         default=0.0, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
     )
-    jerk_density: Positive = Field(default=4.0e-4, description="density of the strokes' white jerk, m^2/s^5")
-    lag: Positive = Field(default=0.045, description="time a stroke is smoothed for, s")
+    stroke_agility: Agility = Field(default=1.0, description="more follows strokes sooner, lets more noise through")
     step: Positive = Field(default=0.005, description="longest step of the remembered boom, s")
     look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s")
     rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")

@@ -1,8 +1,8 @@
 """Which accuracy of the tip which sensors give at a posture at rest: the estimate's covariance, once it has settled.
 
 A Kalman filter's covariance does not depend on what is measured. So the filter of `boom_twin.estimation.tip_estimate` is run
-over sensors that read just what is predicted, from nothing known until its covariance changes no more; a load of the usual level
-acts that the model does not know.
+over sensors that read just what is predicted, from nothing known until its covariance changes no more; a load of the usual
+level acts that the model does not know.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analysis.equilibrium import settle
-from ..analysis.modal import stroke_noise
+from ..analysis.modal import StrokeSpectrum, stroke_noise
 from ..compiler.plan import first_row
 from ..config.settings import Settings
 from ..kernels.jit import kernel
@@ -23,6 +23,7 @@ from ..scene.schema import Scene
 from ..types import SECOND, SENSORS, Array, Mount, Stream
 from .boom_predictor import BoomPredictor
 from .deviation_modes import DeviationModes
+from .stroke_filter import corners
 from .tip_estimate import (
     ACCELERATION_COVARIANCE,
     FORCE_VARIANCE,
@@ -35,6 +36,7 @@ from .tip_estimate import (
 )
 
 SETTLED = 20.0  # s
+SHARE = 2.0  # of the variance of an integrated white jerk filtered at omega_c: P = 2 omega_c T r while omega_c T is small
 
 
 class TipAccuracy(NamedTuple):
@@ -81,13 +83,16 @@ def accuracy_at(
     modes = DeviationModes(scene, plan, settings, mounts)
     angles = joint_angles_of_strokes(scene, strokes)
     settle(plan, live, work, strokes, angles)
-    noise = stroke_noise(plan, live, work, settings.stroke_variance, 1.0 / rate, settings.jerk_density)
+    quietest = corners(settings.stroke_variance, 1.0 / rate, settings.stroke_agility)
+    at_rest = np.tile(np.eye(len(quietest))[0], (plan.joints, 1))  # the quietest smoother of every stroke
+    spectrum = StrokeSpectrum(settings.stroke_variance, 1.0 / rate, quietest, at_rest, np.zeros(plan.joints))
+    noise = stroke_noise(plan, live, work, spectrum)
     modes.begin()
     modes.refresh(strokes, angles, noise)
     row = boom.compiled.row
     row[:] = 0.0
     row[: len(first_row(plan, live))] = first_row(plan, live)
-    boom.variances[:] = settings.stroke_variance
+    boom.variances[:] = SHARE * settings.stroke_variance * quietest[0] / rate
     moments, out = boom.compiled.bending @ live.z, np.zeros(WIDTH)
     counts = np.array([sum(each is stream for each in sensors) for stream in SENSORS])
     size = np.array([plan.joints, len(plan.pins)])

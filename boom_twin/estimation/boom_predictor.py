@@ -132,24 +132,40 @@ class BoomPredictor:
 
     def extrapolated(self, span: float) -> Array:
         """Strokes (m) `span` s after the newest sample, by its estimates; shape (n,)."""
-        x = self._track.x[0]
+        x = self._track.bank.nodes[0]
         return np.asarray(x[:, 0] + span * (x[:, 1] + 0.5 * span * x[:, 2]))
 
     @property
     def speeds(self) -> Array:
         """Of the strokes at the newest sample, as estimated, m/s, shape (n,)."""
-        return np.asarray(self._track.x[0][:, 1])
+        return np.asarray(self._track.bank.nodes[0][:, 1])
 
     def least_way(self, span: float, sure: float) -> float:
         """How far (m) the fastest stroke goes on for `span` s at least, unless it brakes harder than it now does.
 
         Speeds and braking are taken `sure` deviations to the safe side.
         """
-        x, c = self._track.x[0], self._track.c[0]
+        x, c = self._track.bank.nodes[0], self._track.bank.covariance
         deviations = np.sqrt(np.maximum(c.diagonal(axis1=1, axis2=2), 0.0))
         speeds = np.maximum(np.abs(x[:, 1]) - sure * deviations[:, 1], 0.0)
         braking = np.maximum(-x[:, 2] * np.sign(x[:, 1]), 0.0) + sure * deviations[:, 2]
         return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, TINY))).max())
+
+    def take_filtered(self) -> tuple[Array, Array]:
+        """How strokes were filtered since this was called last: probabilities (n, m) of their densities, excess (n,) in m^2.
+
+        See `boom_twin.estimation.stroke_filter.StrokeFilter`.
+        """
+        bank = self._track.bank
+        span = float(bank.span[0])
+        found = (bank.shares / span, bank.excesses / span) if span else (bank.weights.copy(), np.zeros(len(bank.weights)))
+        bank.span[:], bank.shares[:], bank.excesses[:] = 0.0, 0.0, 0.0
+        return found
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether a stroke came to move, with the newest sample, in a way that its filter cannot follow."""
+        return bool(self._track.bank.began[0])
 
     @property
     def estimate(self) -> Array:

@@ -94,11 +94,17 @@ class DeviationModes:
         angles : ndarray, shape (n,)
             Joint angles of the rigid boom, rad.
         noise : StrokeNoise
-            At this posture.
+            As it is now.
         """
-        if float(np.max(np.abs(strokes - self._at))) <= POSTURE_STEP:
-            return
-        self._at, f, plan = strokes.copy(), self.filter, self._plan
+        if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
+            self._at = strokes.copy()
+            self._make(strokes, angles)
+        f, known = self.filter, min(len(noise.modes), int(self.filter.status[COUNT]))
+        f.density[:] = 0.0
+        f.density[:known] = 2.0 * noise.collected[:known] * f.decay[:known] * f.omega[:known] ** 2
+
+    def _make(self, strokes: Array, angles: Array) -> None:
+        f, plan = self.filter, self._plan
         try:
             settle(plan, self._probe, self._work, strokes, angles)
         except BoomTwinError:
@@ -108,13 +114,9 @@ class DeviationModes:
         for j, mode in enumerate(modes):
             is_turned = j < len(self._motions) and float((plan.masses * mode.motion) @ self._motions[j]) < 0.0
             kept.append(self._put(j, mode, -1.0 if is_turned else 1.0))
-            f.density[j] = 0.0
-            if j < len(noise.modes):
-                f.density[j] = 2.0 * noise.collected[j] * f.decay[j] * f.omega[j] ** 2
         f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
-        count, size = int(f.status[COUNT]), SHARES + 2 * plan.joints
+        first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
         self._motions, f.status[COUNT] = kept, len(modes)
-        first = size + 2 * min(count, len(modes))  # of modes that were not there, or are there no more
         f.x[first:], f.p[first:], f.p[:, first:] = 0.0, 0.0, 0.0
 
     def _put(self, j: int, mode: Mode, sign: float) -> Array:
@@ -146,7 +148,8 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         softness=np.array([0.0 if joint.cylinder.k is None else 1.0 / joint.cylinder.k for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
-        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
+        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n), 
+        pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
         spread=np.zeros((2, 2)), level=np.full(1, USUAL_LOAD), last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip

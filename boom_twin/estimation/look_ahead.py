@@ -22,10 +22,11 @@ from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
 from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe
 from ..types import Array
-from .stroke_filter import add_node, drive_between, measure, start_node
+from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, new_filter, start_filter, take_strokes
 
 TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left is about its square
 LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
+LOOK_SHARE = 0.58  # of the lag, longest step ahead of the anchor: two steps
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
 REST_PASSES, REST_INCREMENT = np.int64(60), 0.1
@@ -33,11 +34,13 @@ WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
 
 
 class Tuning(NamedTuple):
-    """Numbers of the estimator; see `boom_twin.config.settings`. Lengths of time in s, variance in m^2, density in m^2/s^5."""
+    """Numbers of the estimator; see `boom_twin.config.settings`.
 
-    variance: float
-    density: float
-    lag: float
+    strokes : of their filter. least_lag : s, that they are smoothed for at least.
+    """
+
+    strokes: FilterTuning
+    least_lag: float
     step: float
     look_step: float
     rho: float
@@ -48,7 +51,7 @@ class Track(NamedTuple):
 
     nodes : (1,) number of nodes in the window. passes : (1,) Newton passes for the newest sample.
     moved : (1,) whether the anchor has left its first equilibrium.
-    times : (NODES,) s. x, c : nodes of the smoother. anchor : (n, 3) drive where the anchor stands.
+    times : (NODES,) s. bank : smoothers of the strokes. anchor : (n, 3) drive where the anchor stands.
     angles : (n,) of the rigid boom, rad. drive, rate : (n,) scratch.
     """
 
@@ -56,8 +59,7 @@ class Track(NamedTuple):
     passes: np.ndarray
     moved: np.ndarray
     times: Array
-    x: Array
-    c: Array
+    bank: StrokeFilter
     anchor: Array
     angles: Array
     drive: Array
@@ -71,7 +73,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     n = plan.joints
     return Track(
         nodes=np.zeros(1, np.int64), passes=np.zeros(1, np.int64), moved=np.zeros(1, np.int64), times=np.zeros(NODES),
-        x=np.zeros((NODES, n, 3)), c=np.zeros((NODES, n, 3, 3)), anchor=np.zeros((n, 3)), angles=np.zeros(n),
+        bank=new_filter(n, NODES), anchor=np.zeros((n, 3)), angles=np.zeros(n),
         drive=np.zeros(n), rate=np.zeros(n), closed=plan.closed_lengths, lengths=lengths,
     )  # fmt: skip
 
@@ -88,13 +90,15 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     """
     add_sample(track, tuning, time, y)
     track.passes[0] = 0
-    ahead, old = False, track.nodes[0] - 1
+    ahead, old, nodes = False, track.nodes[0] - 1, track.bank.nodes
+    lag = lag_of(track.bank, tuning.strokes)
+    look_step, lag = min(tuning.look_step, LOOK_SHARE * lag), max(lag, tuning.least_lag)
     boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
     while True:
-        if not ahead and not anchor_must_advance(track, tuning, old):
+        if not ahead and not anchor_must_advance(track, lag, old):
             track.nodes[0] = old + 1
             if track.moved[0] == 0:
-                hold(track, track.x[old])
+                hold(track, nodes[old])
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
                     t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None
@@ -103,7 +107,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
                 if status != OK:
                     return status
             copy_state(anchor, live)
-            ahead, boom, longest, tolerance = True, live, tuning.look_step, LOOK_TOLERANCE
+            ahead, boom, longest, tolerance = True, live, look_step, LOOK_TOLERANCE
         if old == 0:
             report(t, live, track, out)
             return OK
@@ -114,7 +118,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         steps = max(1, math.ceil(span / longest - 1e-6))
         scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
         for k in range(steps):
-            drive_to(track, start, track.x[new], span, (k + 1) / steps)
+            drive_to(track, start, nodes[new], span, (k + 1) / steps)
             status, count, _ = advance(
                 t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None
             )
@@ -122,17 +126,17 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
             if status != OK:
                 return status
         if not ahead:
-            copy_node(track.x[new], track.anchor)
+            copy_node(nodes[new], track.anchor)
             track.moved[0] = 1
         else:
-            start = track.x[new]
+            start = nodes[new]
         old = new
 
 
 @inner
-def anchor_must_advance(track, tuning, old):
+def anchor_must_advance(track, lag, old):
     """Whether the anchor, at the oldest node, has to go on: the node before it is older than the lag, or room runs out."""
-    return old > 1 and (track.times[0] - track.times[old - 1] >= tuning.lag or old == NODES - 1)
+    return old > 1 and (track.times[0] - track.times[old - 1] >= lag or old == NODES - 1)
 
 
 @inner
@@ -168,10 +172,9 @@ def add_sample(track, tuning, time, y):
     track.times[0] = time
     if track.nodes[0] == 0:
         track.moved[0] = 0
-        start_node(track.x, track.c, y, tuning.variance)
+        start_filter(track.bank, tuning.strokes, y)
     else:
-        add_node(track.x, track.c, track.nodes[0], time - track.times[1], tuning.density)
-        measure(track.x, track.c, track.nodes[0] + 1, y, tuning.variance)
+        take_strokes(track.bank, tuning.strokes, track.nodes[0], time - track.times[1], y)
     track.nodes[0] += 1
 
 
@@ -182,7 +185,7 @@ def report(t, live, track, out):
     observe(t, live, out)
     found = estimates_in(out, n, t.clearances.shape[0])
     for i in range(n):
-        found.strokes[i], found.variances[i] = track.x[0, i, 0], track.c[0, i, 0, 0]
+        found.strokes[i], found.variances[i] = track.bank.nodes[0, i, 0], track.bank.covariance[i, 0, 0]
     found.rigid_tip[0], found.rigid_tip[1] = rigid_tip(t, track)
 
 
@@ -221,7 +224,7 @@ def rigid_tip(t, track):
     """Tip (m) of the undeformed boom at the newest strokes; a stroke out of reach leaves its joint where it was."""
     x, y, heading = t.joints[0].x, t.joints[0].y, 0.0
     for i in range(track.angles.shape[0]):
-        length = track.closed[i] + track.x[0, i, 0]
+        length = track.closed[i] + track.bank.nodes[0, i, 0]
         angle = angle_of_length(t.linkages[i], length, track.angles[i], -WIDEST, WIDEST)
         if math.isfinite(angle):
             track.angles[i] = angle

@@ -14,7 +14,8 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
   moment, M_j the mode's, w Simpson's weights.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
-- e (2), m/s^2: fast error of the predicted acceleration by strokes' noise, Gauss-Markov of time `JERK_TIME`.
+- e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
+  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke.
 
 Measured less predicted:
 
@@ -46,8 +47,8 @@ from ..types import NANO, Array
 
 MODES = 6  # at most
 LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
-LEAST_LOAD, MOST_LOAD, USUAL_LOAD = 25.0, 200.0, 60.0  # N, of the load's standard deviation
-JERKY = 0.08  # m/s^2, standard deviation of e
+LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
+LEAST_LOAD, MOST_LOAD, USUAL_LOAD = 15.0, 200.0, 60.0  # N, of the load's standard deviation
 SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
 AGILITY = 1.0  # 1/s, by which the load's level follows the innovations
@@ -85,6 +86,7 @@ class DeviationFilter(NamedTuple):
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
     coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m. variances : (n,) of the strokes' estimates, m^2.
+    pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. last : (c,) innovations. level : (1,) N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
@@ -113,6 +115,7 @@ class DeviationFilter(NamedTuple):
     coupling: Array
     drawn: Array
     variances: Array
+    pushes: Array
     x: Array
     p: Array
     row: Array
@@ -169,7 +172,7 @@ def start_state(f):
             f.p[k, b] = 0.0
     for b in range(2):
         add_unknown(f, b, USUAL_LOAD)
-        f.p[ERROR + b, ERROR + b] = JERKY * JERKY
+        f.p[ERROR + b, ERROR + b] = f.pushes[b]
     for i in range(n):
         if f.softness[i] > 0.0:
             add_unknown(f, 2 + i, SCENE_ERROR)
@@ -228,6 +231,7 @@ def follow_prediction(f, results, estimates, moments, gravity):
     for i in range(n):
         f.drawn[i] = results.cylinder_forces[i] * f.softness[i]
         f.variances[i] = estimates.variances[i]
+    follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
         c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
@@ -237,6 +241,19 @@ def follow_prediction(f, results, estimates, moments, gravity):
             c[2 + n + f.sections[k]] += f.bending[j, k] * moments[k]
     f.now[ANGLE] = results.tip[0, 2]
     f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
+
+
+@inner
+def follow_errors(f):
+    """Variances of the acceleration that errors of the strokes push the tip with."""
+    f.pushes[0], f.pushes[1] = LEAST_ERROR * LEAST_ERROR, LEAST_ERROR * LEAST_ERROR
+    for i in range(f.softness.shape[0]):
+        x, y = 0.0, 0.0
+        for j in range(f.status[COUNT]):
+            x += f.forces[j, i] * f.tip[j, 0]
+            y += f.forces[j, i] * f.tip[j, 1]
+        f.pushes[0] += x * x * f.variances[i]
+        f.pushes[1] += y * y * f.variances[i]
 
 
 @inner
@@ -291,13 +308,17 @@ def step_state(f, h):
         p[at + 1, at] += share * (4.0 * b12 * b22 + a12 * a22)
         p[at + 1, at + 1] += share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
     step_inputs(f, 0.5 * h, size)
-    fade(f, ERROR, math.exp(-h / JERK_TIME), JERKY * JERKY, size)
+    kept = math.exp(-h / JERK_TIME)
+    fade(f, ERROR, kept, f.pushes[0], size)
+    fade(f, ERROR + 1, kept, f.pushes[1], size)
 
 
 @inner
 def step_inputs(f, h, size):
     """Load and shares h (s) later."""
-    fade(f, LOAD, math.exp(-h / LOAD_TIME), f.level[0] * f.level[0], size)
+    kept, level2 = math.exp(-h / LOAD_TIME), f.level[0] * f.level[0]
+    fade(f, LOAD, kept, level2, size)
+    fade(f, LOAD + 1, kept, level2, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
             f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
@@ -310,15 +331,14 @@ def input_place(b):
 
 
 @inner
-def fade(f, first, kept, variance, size):
-    """A step of the two Gauss-Markov processes from `first` on, of this variance."""
-    for a in range(first, first + 2):
-        f.x[a] *= kept
-        for k in range(size):
-            f.p[a, k] *= kept
-        for k in range(size):
-            f.p[k, a] *= kept
-        f.p[a, a] += variance * (1.0 - kept * kept)
+def fade(f, place, kept, variance, size):
+    """A step of the Gauss-Markov process at `place`, of this variance."""
+    f.x[place] *= kept
+    for k in range(size):
+        f.p[place, k] *= kept
+    for k in range(size):
+        f.p[k, place] *= kept
+    f.p[place, place] += variance * (1.0 - kept * kept)
 
 
 # -- rows of what is read ------------------------------------------------------------------------------------------------

@@ -14,9 +14,14 @@ from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels
 from .baseline import JUDGED, Baseline, judged_channels
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import SensorCheck, SensorMonitor, sensor_ranges
+from .sensor_monitor import SensorCheck, SensorMonitor, bends2, sensor_ranges
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
+UNCERTAIN = 2.0
+"""Variances of a reading; strokes that are known worse are not followed, and then sensors are not judged by residuals."""
+SHAKEN = 3.0
+"""Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
+looks like noise in strokes may be motion."""
 CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.is_smooth)
 """The streams whose single sensors are checked."""
 
@@ -116,11 +121,15 @@ class HealthMonitor:
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []
         readings = {stream: block.readings(stream, len(names)) for stream, names in self._channels.items()}
+        is_followed = bool((predictions.variances < UNCERTAIN * self._settings.stroke_variance).all())
+        is_shaken = any(self._is_shaken(stream, rows.raw) for stream, rows in readings.items() if stream is not Stream.STROKES)
         for stream, (stamps, raw, left) in readings.items():
             if stream in CHECKED and stream is not Stream.STROKES:
-                news += self._check(stream, block, stamps, raw, raw - left)
+                expected = raw - left if is_followed else np.full_like(raw, np.nan)
+                news += self._check(stream, block, stamps, raw, expected)
         strokes = predictions.measured
-        news += self._check(Stream.STROKES, block, predictions.stamps, strokes, np.zeros_like(strokes))
+        expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
+        news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
         if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
             ended = self.residuals.close(start)
             self.residuals.begin()
@@ -128,6 +137,11 @@ class HealthMonitor:
         averaged = self._means(block, predictions, {stream: rows.left for stream, rows in readings.items()})
         told = self.residuals.take(averaged, self._noise)
         return news if told is None else [*news, told]
+
+    def _is_shaken(self, stream: Stream, raw: Array) -> bool:
+        """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
+        power = bends2(raw if stream not in CHECKED else raw[:, ~self._sensors[stream].masked])
+        return bool(power.sum(axis=0).max(initial=0.0) > SHAKEN * self._settings.variance(SENSORS[stream]) * len(power))
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
@@ -155,7 +169,7 @@ class HealthMonitor:
             left=np.concatenate([mean for mean, _ in found]),
             counts=np.concatenate([count for _, count in found]),
             strokes=predictions.strokes[len(stamps) // 2],
-            variances=self._variances,
+            variances=predictions.variances.mean(axis=0),
             rates=rates,
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
         )

@@ -174,7 +174,7 @@ class SensorCheck:
 
     def _listen(self, left: Array, span: float) -> None:
         """Power of the noise, by second differences of neighbours; single outliers are cut off."""
-        bend2 = np.minimum((left[2:] - 2.0 * left[1:-1] + left[:-2]) ** 2 / 6.0, (4.0 * NOISY * self._sigma) ** 2)
+        bend2 = np.minimum(bends2(left), (4.0 * NOISY * self._sigma) ** 2)
         power = bend2.sum(axis=0) / len(bend2)
         if not np.isfinite(power.sum()):
             known = np.isfinite(bend2)
@@ -211,6 +211,11 @@ class SensorCheck:
             calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
             sudden &= calm < 0.3 * np.abs(step)
         return np.where(sudden.any(axis=0), np.where(sudden, step, 0.0).sum(axis=0), 0.0)
+
+
+def bends2(values: Array) -> Array:
+    """Squares of second differences of neighbours, shape (k - 2, ..); their mean is the variance of white noise."""
+    return np.asarray((values[2:] - 2.0 * values[1:-1] + values[:-2]) ** 2 / 6.0)
 
 
 def _newest(stamps: Array, raw: Array, before: Array) -> Array:

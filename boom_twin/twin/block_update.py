@@ -16,6 +16,7 @@ from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
+from ..estimation.stroke_filter import filter_tuning
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.result_row import PIN
@@ -34,12 +35,11 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mou
     """What the compiled update judges by: of a scene, compiled as `plan` with its load, and its angle sensors."""
     counts = np.array([len(names) for names in channels_of(plan.joints).values()])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
-    tuning = Tuning(
-        settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
-    )
+    strokes = filter_tuning(settings.stroke_variance, settings.stroke_agility)
+    tuning = Tuning(strokes, 0.0, settings.step, settings.look_step, settings.rho)
     return Limits(
         tuning=tuning,
-        patient=tuning._replace(lag=max(AFTER_PAUSE, settings.lag)),
+        patient=tuning._replace(least_lag=AFTER_PAUSE),
         gap=round(settings.gap * SECOND),
         leap=settings.leap / NANO,
         far=far,
@@ -62,12 +62,12 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mou
 class _UpdateExtras:
     """What one call of the compiled update gives beside numbers.
 
-    outlines by row of a prediction, health by row of a sample, deflected: rows of samples.
+    outlines by row of a prediction, health and events by row of a sample.
     """
 
     outlines: dict[int, Outline] = field(default_factory=dict)
     health: dict[int, Health] = field(default_factory=dict)
-    deflected: set[int] = field(default_factory=set)
+    events: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
 
 NO_EXTRAS = _UpdateExtras()
@@ -89,7 +89,7 @@ class BlockUpdate:
         Of the estimate.
     judge : HealthMonitor or None
     counts : Counter
-        Of events; ``deflected`` and ``unmatched`` are counted here.
+        Of events; ``deflected``, ``not followed`` and ``unmatched`` are counted here.
 
     Attributes
     ----------
@@ -165,11 +165,11 @@ class BlockUpdate:
             twin = *self._boom.compiled, self.limits, self._state, self._modes.filter
             reason, row = update(*twin, *block, row, is_resumed, trusted, self._found)
             if is_resumed := reason == REFRESH:
-                interval = run.interval or self._step
-                prediction = self._boom.prediction(run.newest)
-                run.deviations.refresh(prediction, interval, self._boom.live, self._boom.angles)
+                interval, boom = run.interval or self._step, self._boom
+                prediction = boom.prediction(run.newest)
+                run.deviations.refresh(prediction, interval, boom.take_filtered(), boom.live, boom.angles)
                 assert run.deviations.noise is not None
-                self._modes.refresh(prediction.strokes, self._boom.angles, run.deviations.noise)
+                self._modes.refresh(prediction.strokes, boom.angles, run.deviations.noise)
             elif reason != LOOK:
                 return reason, row
             else:
@@ -179,14 +179,15 @@ class BlockUpdate:
                     return DONE, row
 
     def _look_around(self, run: Run, row: int) -> None:
-        """What a prediction that begins a slot, or left the model's validity, has beside its numbers."""
+        """What a prediction that begins a slot, left the model's validity or is not followed has beside its numbers."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
             self._news = _UpdateExtras()
         news = self._news
-        if clock[IS_DEFLECTED]:
-            news.deflected.add(row)
-            self._told_counts["deflected"] += 1
+        oddities = {"deflected": clock[IS_DEFLECTED], "not followed": self._boom.is_lost}
+        if events := tuple(name for name, happened in oddities.items() if happened):
+            news.events[row] = events
+            self._told_counts.update(events)
         if not clock[BEGINS_SLOT]:
             return
         news.outlines[at] = self._boom.outline()
@@ -208,7 +209,12 @@ class BlockUpdate:
             rows = found.rows[new].copy()
             acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
             followed = PredictionRows(
-                found.stamps[new].copy(), found.measured[new].copy(), rows[:, at.strokes], rows[:, at.joints], acceleration
+                stamps=found.stamps[new].copy(),
+                measured=found.measured[new].copy(),
+                strokes=rows[:, at.strokes],
+                variances=rows[:, at.variances],
+                joints=rows[:, at.joints],
+                accelerations=acceleration,
             )
             self._judge.predicted(followed)
         if last.stop > last.start:
@@ -259,10 +265,10 @@ class BlockUpdate:
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
         """What the compiled update found of samples with these stamps (ns)."""
         block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
-        if not self._news.deflected:
+        if not self._news.events:
             return [block]
         reports = enumerate(block.reports(self._joints))
-        return [replace(each, events=("deflected",)) if row in self._news.deflected else each for row, each in reports]
+        return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
     def report(self, stamp: int, events: list[str]) -> Report:
         """What the compiled update found of one sample, of which `events` are to be told too."""
@@ -276,7 +282,7 @@ class BlockUpdate:
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
         prediction = self._boom.prediction(stamp, news.outlines.get(0), found.moments[predicted - 1].copy())
-        told = (*events, "deflected") if news.deflected else tuple(events)
+        told = (*events, *news.events.get(0, ()))
         estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
         passes, health = int(found.passes[predicted - 1]), news.health.get(0)
         return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=health, estimate=estimate)

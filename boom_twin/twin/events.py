@@ -21,6 +21,7 @@ EVENTS = {
     "limits": "other settings changed while the twin ran",
     "zero": "the zero of a sensor was set anew",
     "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
+    "not followed": "a stroke began to move faster than its filter can follow; deviations are wider until it is followed again",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from ..analysis.modal import StrokeNoise, stroke_noise
+from ..analysis.modal import StrokeNoise, StrokeSpectrum, stroke_noise
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.look_ahead import copy_state
 from ..estimation.sensor_model import specific_force
+from ..estimation.stroke_filter import corners
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, State
@@ -19,15 +21,17 @@ from .blocks import CODES
 from .state import NONE, SEEN, TwinState
 
 SPAN = 2_000_000_000  # ns
+TINY = 1e-300
 
 
 POSTURE_STEP = 0.04  # m of stroke after which the noise is propagated anew
 INTERVAL_STEP = 0.2  # of the time between samples, likewise
+NOISE_STEP = 1.5  # factor on what a mode collects after which others are told
 INTERVAL = 250_000_000  # ns between looks at whether it has, and evaluations of how the noise has grown
 
 
 class Deviations:
-    """Expected standard deviations of the residuals, following the posture.
+    """Expected standard deviations of the residuals, following the posture and how the strokes are filtered.
 
     Parameters
     ----------
@@ -43,8 +47,9 @@ class Deviations:
     Attributes
     ----------
     tip : ndarray, shape (2,)
-        Deviation of the tip (m) by vibration that the model cannot know of: a start from rest while the boom was at work,
-        what strokes did in a pause, a pause that may have been a clock. It decays with the modes' damping.
+        Deviation of the tip (m) by vibration that the model cannot know of: what the strokes' noise has shaken, a start from
+        rest while the boom was at work, what strokes did in a pause, a pause that may have been a clock. It decays with the
+        modes' damping.
     noise : StrokeNoise or None
         As propagated last; None before the first prediction.
     """
@@ -55,12 +60,14 @@ class Deviations:
         self._interval, self._speeds, self.tip = 0.0, speeds, np.zeros(2)
         self._at = np.zeros(plan.joints)
         self._unknown, self._since = np.zeros(0), epoch
+        self._shaken, self._until = np.zeros(0), epoch
         state.clock[SEEN] = NONE
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns) from now on."""
         self._epoch += shift
         self._since += shift
+        self._until += shift
         self._state.clock[SEEN] += shift
 
     def add_pause(self, stamp: int, span: float, densities: Array) -> None:
@@ -80,14 +87,22 @@ class Deviations:
 
     def _left(self, stamp: int) -> Array:
         """What is left of the unknown vibration at `stamp`; of the modes at the present posture."""
-        assert self.noise is not None
-        found = np.zeros(len(self.noise.modes))
-        count = min(len(found), len(self._unknown))
-        found[:count] = self._unknown[:count]
-        return found * np.exp(-self.noise.decay * max(0.0, (stamp - self._since) * NANO))
+        return self._of_modes(self._unknown) * self._decayed(stamp - self._since)
 
-    def refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
-        """Follow the posture: variances of joint angles (rad^2) and deviations of the specific force (m/s^2) into the state.
+    def _of_modes(self, variances: Array) -> Array:
+        """Variances of modes as many as there are at the present posture."""
+        assert self.noise is not None
+        return np.pad(variances, (0, len(self.noise.modes)))[: len(self.noise.modes)]
+
+    def _decayed(self, span: int) -> Array:
+        """What the modes' damping leaves of variances after `span` ns, shape (modes,)."""
+        assert self.noise is not None
+        return np.asarray(np.exp(-self.noise.decay * max(0.0, span * NANO)))
+
+    def refresh(
+        self, prediction: Prediction, interval: float, filtered: tuple[Array, Array], live: State, angles: Array
+    ) -> None:
+        """Follow the posture: variances of joint angles (rad^2) and of the specific force ((m/s^2)^2) into the state.
 
         Parameters
         ----------
@@ -95,6 +110,8 @@ class Deviations:
             The newest one.
         interval : float
             Time between stroke samples, s.
+        filtered : two ndarray, shape (n, m), (n,)
+            Since this was called last, see `boom_twin.estimation.boom_predictor.BoomPredictor.take_filtered`.
         live : State
             The boom as predicted; left as it is.
         angles : ndarray, shape (n,)
@@ -102,27 +119,39 @@ class Deviations:
         """
         self._state.clock[SEEN] = prediction.stamp
         moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP
+        spectrum = self._spectrum(interval, *filtered)
         if self.noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
-            self.noise = self._propagate(live, interval)
+            self.noise = self._propagate(live, spectrum)
             self._at, self._interval = prediction.strokes, interval
             slopes = [cylinder_length(self._plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
             self._state.slopes2[:] = 1.0 / np.square(slopes)
         if self._speeds is not None:
             self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
             self._speeds, self._state.clock[SEEN] = None, prediction.stamp
-        time = (prediction.stamp - self._epoch) * NANO
-        joints, acceleration = self.noise.after(time, prediction.tip_angle)
-        if len(self._unknown):
-            more, swing, tip = self.noise.of(self._left(prediction.stamp), self._plan, prediction.tip_angle)
-            joints, acceleration, self.tip = joints + more, acceleration + swing, np.sqrt(tip)
+        variances = self._shake(spectrum, prediction.stamp) + self._left(prediction.stamp)
+        joints, acceleration, tip = self.noise.of(variances, self._plan, prediction.tip_angle)
+        self.tip = np.sqrt(tip)
         self._state.joints2[:] = self._settings.angle_variance + joints
-        self._state.force[:] = np.sqrt(self._settings.imu_sigma**2 + acceleration)
+        self._state.forces2[:] = self._settings.imu_sigma**2 + acceleration
+        self._state.pushes2[:] = self.noise.pushes(self._plan, prediction.tip_angle)
 
-    def _propagate(self, live: State, interval: float) -> StrokeNoise:
+    def _spectrum(self, interval: float, shares: Array, excess: Array) -> StrokeSpectrum:
+        variance = self._settings.stroke_variance
+        return StrokeSpectrum(variance, interval, corners(variance, interval, self._settings.stroke_agility), shares, excess)
+
+    def _propagate(self, live: State, spectrum: StrokeSpectrum) -> StrokeNoise:
         probe, work = self._plan.state(), self._plan.work()
         copy_state(live, probe)
-        tuned = self._settings
-        return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
+        return stroke_noise(self._plan, probe, work, spectrum)
+
+    def _shake(self, spectrum: StrokeSpectrum, stamp: int) -> Array:
+        """Variances (modes,) that noise with this spectrum since the last call, and the noise before, have collected."""
+        assert self.noise is not None
+        collected, left = self.noise.collected_of(spectrum), self._decayed(stamp - self._until)
+        self._shaken, self._until = left * self._of_modes(self._shaken) + (1.0 - left) * collected, stamp
+        if (np.abs(np.log((collected + TINY) / (self.noise.collected + TINY))) > np.log(NOISE_STEP)).any():
+            self.noise = replace(self.noise, collected=collected)
+        return self._shaken
 
 
 ANGLES, IMU = CODES[Stream.ANGLES], CODES[Stream.IMU]
@@ -143,7 +172,7 @@ def write_expected(limits, state, live, results, estimates, values, sigmas):
         In the order of the streams: angles (rad), then the tip IMU's x and z (m/s^2).
     """
     write_angles(limits, state, live, results, estimates, values, sigmas)
-    write_specific_force(limits, state, results, values, sigmas)
+    write_specific_force(limits, state, results, estimates, values, sigmas)
 
 
 @inner
@@ -165,12 +194,16 @@ def write_angles(limits, state, live, results, estimates, values, sigmas):
 
 
 @inner
-def write_specific_force(limits, state, results, values, sigmas):
+def write_specific_force(limits, state, results, estimates, values, sigmas):
     """Of an IMU at the tip, along its x and z."""
     at, angle = limits.first[IMU], results.tip[0, 2]
     x, y = results.tip[2, 0] - limits.gravity[0], results.tip[2, 1] - limits.gravity[1]
     values[at], values[at + 1] = specific_force(x, y, math.cos(angle), math.sin(angle))
-    sigmas[at], sigmas[at + 1] = state.force[0], state.force[1]
+    for axis in range(2):
+        variance = state.forces2[axis]
+        for i in range(state.pushes2.shape[0]):
+            variance += state.pushes2[i, axis] * estimates.variances[i]
+        sigmas[at + axis] = math.sqrt(variance)
 
 
 def tip_specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:

@@ -52,7 +52,8 @@ AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped ov
 
 DONE, ODD, REFRESH, LOOK, FAILED = range(5)
 """Why `update` returned: all samples taken; the sample is not ordinary; deviations are to be made anew for the sample, which
-was stepped to; the sample is complete and begins a slot or left the model's validity; the model failed (see `STATUS`)."""
+was stepped to; the sample is complete and begins a slot, left the model's validity or is not followed; the model failed (see
+`STATUS`)."""
 
 
 @kernel
@@ -94,7 +95,7 @@ def update(
             continue
         if not resumed:
             if not trusted:
-                if not is_ordinary(track.x[0], limits, state, stamp, values[row]):
+                if not is_ordinary(track.bank.nodes[0], limits, state, stamp, values[row]):
                     return ODD, row
                 note_stamp(state, STROKES, stamp)
             time, tuning = begin_step(limits, state, stamp)
@@ -102,14 +103,14 @@ def update(
             if state.clock[STATUS] != OK:
                 return FAILED, row
             end_step(state, stamp)
-            if stamp >= state.clock[SEEN] + INTERVAL:
+            if stamp >= state.clock[SEEN] + INTERVAL or track.bank.began[0]:
                 return REFRESH, row
         resumed = False
         remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, tip, stamp, row, found)
         flush_waiting(limits, state, tip, row, found)
         estimate(out, t.clearances.shape[0], tip, found)
         row += 1
-        if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
+        if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED] or track.bank.began[0]:
             return LOOK, row - 1
     return DONE, row
 

@@ -1,4 +1,4 @@
-"""The estimator's trade between lag and noise, and what its steps cost: numbers and picture for docs/estimator.md.
+"""The estimator at rest and in haste, and what its steps cost: numbers and picture for docs/estimator.md.
 
 Run ``python test/bench/estimator.py``; writes docs/estimator.png and prints Markdown tables. Uses the bundled session, which is
 synthetic: with the noise of its sensors, and with the true strokes that it keeps beside them.
@@ -6,6 +6,7 @@ synthetic: with the noise of its sensors, and with the true strokes that it keep
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 
@@ -14,6 +15,10 @@ import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from estimation.motions import measured
+from estimation.test_motions import error, followed
 
 from boom_twin import Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
@@ -24,8 +29,12 @@ from boom_twin.twin.blocks import SampleBlock
 
 ROOT = Path(__file__).parents[2]
 SESSION = ROOT / "bags" / "arch_session"
-DENSITIES = (1e-6, 1e-5, 1e-4, 4e-4, 2e-3, 1e-2, 1e-1)
-LAGS = (0.001, 0.01, 0.02, 0.03, 0.045, 0.06, 0.1)
+AGILITIES = (0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
+RATES = (50.0, 100.0, 200.0, 1000.0)
+SHOWN = ("rests", "sweep", "stops")
+BIN = 0.1  # s, over which errors are drawn
+BEFORE = ROOT / "docs" / "estimator_before.csv"
+"""Errors (m/s^2 rms over `BIN`) of the filter of 0.1.0, with one jerk density, 4e-4 m^2/s^5, and a lag of 45 ms."""
 STEPS = ((0.0025, 0.013), (0.005, 0.013), (0.005, 0.026), (0.005, 0.05), (0.0101, 0.026))
 
 
@@ -67,32 +76,44 @@ def sweep(name: str, choices: list[dict]) -> list[tuple]:
     return rows
 
 
-def draw(densities: list[tuple], lags: list[tuple]) -> None:
-    """Error against jerk density and against smoothing lag."""
-    figure, axes = plt.subplots(1, 2, figsize=(12, 5), sharey=True)
-    for axis, values, rows, label, default in (
-        (axes[0], DENSITIES, densities, "jerk density, m$^2$/s$^5$ (lag 45 ms)", 4e-4),
-        (axes[1], LAGS, lags, "smoothing lag, s (jerk density 4e-4 m$^2$/s$^5$)", 0.045),
-    ):
-        both, lag = np.array(rows).T
-        axis.loglog(values, both, "o-", color="#0072b2", label="sensors with noise")
-        axis.loglog(values, lag, "s--", color="#d55e00", label="true strokes: lag alone")
-        axis.axvline(default, color="0.5", lw=1)
-        axis.text(default, 0.0105, " default", color="0.4")
-        axis.set_ylim(0.01, 0.6)
-        axis.axhline(0.45, color="0.7", lw=1, ls=":")
-        axis.set_xlabel(label)
+def binned(values: np.ndarray) -> np.ndarray:
+    """Root mean square of vectors (k, 2), 200 a second, over each `BIN`."""
+    size = round(200.0 * BIN)
+    count = len(values) // size
+    return np.sqrt((values[: count * size] ** 2).sum(axis=1).reshape(count, size).mean(axis=1))
+
+
+def draw() -> None:
+    """Errors of the tip's acceleration at rest, in a sweep and after stops, of this filter and of the one before."""
+    before = np.genfromtxt(BEFORE, delimiter=",", names=True)
+    figure, axes = plt.subplots(len(SHOWN), 1, figsize=(12, 9), sharex=True)
+    for axis, name in zip(axes, SHOWN, strict=True):
+        session = measured(name)
+        left = binned(followed(session)[1].tip_acceleration - session.acceleration)
+        times = BIN * (np.arange(len(left)) + 0.5)
+        axis.semilogy(times, binned(session.acceleration), color="0.75", lw=3, label="the acceleration itself")
+        axis.semilogy(times, before[name], color="#d55e00", label="error, filter of 0.1.0")
+        axis.semilogy(times, left, color="#0072b2", label="error")
+        axis.set_ylim(0.02, 60.0)
+        axis.set_ylabel(f"{name}: m/s$^2$ rms")
         axis.grid(True, which="both", alpha=0.2)
-    axes[0].set_ylabel("tip acceleration error, m/s$^2$ rms")
-    axes[0].legend()
-    figure.suptitle("Estimator: noise against lag (bundled session, synthetic)")
+    axes[0].legend(loc="upper right", ncols=3)
+    axes[-1].set_xlabel("s")
+    figure.suptitle("Tip acceleration predicted from strokes with noise, 200 Hz (synthetic)")
     figure.tight_layout()
     figure.savefig(ROOT / "docs" / "estimator.png", dpi=110, metadata={"Software": None})
 
 
+def compare_rates() -> None:
+    """Errors of the motions at every sample rate, printed as a table."""
+    print("\n| motion | " + " | ".join(f"{rate:g} Hz" for rate in RATES) + " |\n|---|" + "---|" * len(RATES))
+    for name in SHOWN:
+        print(f"| {name} | " + " | ".join(f"{error(name, rate):.3f}" for rate in RATES) + " |", flush=True)
+
+
 if __name__ == "__main__":
     Twin(load_scene()).warm_up()
-    by_density = sweep("jerk density", [{"jerk_density": value} for value in DENSITIES])
-    by_lag = sweep("lag", [{"lag": value} for value in LAGS])
+    sweep("agility", [{"stroke_agility": value} for value in AGILITIES])
     sweep("steps", [{"step": step, "look_step": look} for step, look in STEPS])
-    draw(by_density, by_lag)
+    compare_rates()
+    draw()

@@ -12,10 +12,11 @@ from scipy.linalg import expm
 
 from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import settle
-from boom_twin.analysis.modal import joint_increments, stroke_noise
+from boom_twin.analysis.modal import StrokeSpectrum, joint_increments, stroke_noise
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import Settings
 from boom_twin.estimation.sensor_model import Mounting, Reading
+from boom_twin.estimation.stroke_filter import corners
 from boom_twin.health.inference.innovation_filter import (
     HIGHEST,
     KEEPS_STEP,
@@ -48,7 +49,9 @@ def boom():
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes_of_posture(scene, "arch"), posture_angles(scene, "arch"))
-    noise = stroke_noise(plan, state, work, settings.stroke_variance, 0.005, settings.jerk_density)
+    variance, quiet = settings.stroke_variance, np.tile([1.0, 0.0, 0.0], (plan.joints, 1))
+    spectrum = StrokeSpectrum(variance, 0.005, corners(variance, 0.005, 1.0), quiet, np.zeros(plan.joints))
+    noise = stroke_noise(plan, state, work, spectrum)
     reading = Reading(plan, Mounting(plan, 0.0, (None,) * plan.joints))
     return noise, plan, state, work, reading, BLOCK
 

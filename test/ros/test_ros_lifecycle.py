@@ -50,30 +50,31 @@ def test_transitions_by_service(idle: Any, remote: Any) -> None:
 
 
 def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote: Any) -> None:
-    request = DescribeParameters.Request(names=["rho", "lag"])
-    rho, lag = remote.call(DescribeParameters, "describe_parameters", request).descriptors
+    request = DescribeParameters.Request(names=["rho", "look_step"])
+    rho, look_step = remote.call(DescribeParameters, "describe_parameters", request).descriptors
     assert (rho.floating_point_range[0].from_value, rho.floating_point_range[0].to_value) == (0.0, 1.0)
     words = "fixed while the node is configured"
-    assert (rho.description, lag.additional_constraints) == (Settings.model_fields["rho"].description, f"lag > 0.0; {words}")
+    assert rho.description == Settings.model_fields["rho"].description
+    assert look_step.additional_constraints == f"look_step > 0.0; {words}"
     for name, value in [
         ("rho", 1.5),
         ("rho", 1.0),
-        ("lag", 0.0),
-        ("lag", -1.0),
+        ("look_step", 0.0),
+        ("look_step", -1.0),
         ("gap", float("nan")),
         ("gap", "long"),
     ]:
         assert not remote.set(name, value).successful, (name, value)
-    assert remote.set("lag", 0.08).successful
+    assert remote.set("look_step", 0.03).successful
     assert remote.change(Transition.TRANSITION_CONFIGURE), idle.said()
-    for name, value in [("lag", 0.05), ("scene", "other.yaml")]:
+    for name, value in [("look_step", 0.05), ("scene", "other.yaml")]:
         refused = remote.set(name, value)
         assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
     assert not any(remote.set("gap", absurd).successful for absurd in (1e308, 5e-324))
     assert remote.set("gap", 0.2).successful
     assert not remote.set("payload", -2.0).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)
-    assert remote.set("lag", 0.05).successful
+    assert remote.set("look_step", 0.05).successful
 
 
 def test_a_scene_that_cannot_be_used_can_be_replaced(idle: Any, remote: Any, tmp_path: Path) -> None:
@@ -99,7 +100,8 @@ def test_a_bad_scene_ends_the_node_with_its_fault(spawn_node: Callable[..., Any]
     [
         (["--badly"], "--badly"),
         (["-p", "rho:=1.5"], "rho"),
-        (["-p", "lag:=0.0"], "lag"),
+        (["-p", "look_step:=0.0"], "look_step"),
+        (["-p", "lag:=0.045"], "lag: the stroke filter adapts by itself: leave it out, or set stroke_agility"),
         (["-p", "gap:=1"], "1.0, not 1"),
         (["--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
     ],

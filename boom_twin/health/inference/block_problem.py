@@ -32,6 +32,8 @@ class PredictionRows(NamedTuple):
         ns.
     measured, strokes : ndarray, shape (k, n)
         Strokes as measured and as estimated, m.
+    variances : ndarray, shape (k, n)
+        Of these estimates, m^2.
     joints : ndarray, shape (k, n)
         Predicted angles, rad.
     accelerations : ndarray, shape (k, 2)
@@ -41,6 +43,7 @@ class PredictionRows(NamedTuple):
     stamps: NDArray[np.int64]
     measured: Array
     strokes: Array
+    variances: Array
     joints: Array
     accelerations: Array
 

@@ -14,7 +14,7 @@ from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ...config.settings import Settings, Table, Thresholds, checked
+from ...config.settings import RETIRED, Settings, Table, Thresholds, checked
 from ...errors import UsageError
 from ...health.baseline import Baseline, load_baseline
 from ..runtime import one_line
@@ -59,8 +59,12 @@ def declare(node: Node) -> None:
     Raises
     ------
     UsageError
-        A value given at start has the wrong type or is out of range.
+        A value given at start has the wrong type or is out of range, or is of a parameter that there is no more.
     """
+    for name, remedy in RETIRED.items():
+        if node.declare_parameter(name, descriptor=ParameterDescriptor(dynamic_typing=True)).value is not None:
+            raise UsageError(f"{SOURCE}: {name}: {remedy}. See msg_config/twin.yaml.")
+        node.undeclare_parameter(name)
     try:
         for row in TABLE:
             node.declare_parameter(row.name, row.default, _descriptor(row))
