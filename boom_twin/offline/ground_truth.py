@@ -18,6 +18,7 @@ FILE_NAME = "truth.csv.gz"
 LARGEST = 64 * 2**20
 """Bytes of an unpacked file that are read: about an hour at 200 Hz."""
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
+LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,14 @@ class TipTruth:
         s after the start of the session.
     position, acceleration : ndarray, shape (m, 2)
         m, m/s^2; x forward, y up.
+    load : ndarray, shape (m, 2)
+        External force at the tip, N; 0 where the file has none.
     """
 
     times: Array
     position: Array
     acceleration: Array
+    load: Array
 
     def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
         """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
@@ -64,10 +68,13 @@ def load_truth(folder: Path) -> TipTruth | None:
             raise ValueError(f"more than {LARGEST} bytes unpacked")
         table = np.genfromtxt(BytesIO(text), delimiter=",", names=True)
         values = {name: table[name] for name in COLUMNS}
+        names = table.dtype.names or ()
+        loads = [table[name] if name in names else np.zeros_like(values["t_s"]) for name in LOAD_COLUMNS]
     except (OSError, ValueError, EOFError) as error:
         raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None
     return TipTruth(
         values["t_s"],
         np.column_stack([values["tip_x_m"], values["tip_y_m"]]),
         np.column_stack([values["tip_ax_m_s2"], values["tip_ay_m_s2"]]),
+        np.column_stack(loads),
     )

@@ -23,11 +23,11 @@ for name, log, message in read(session, {name: topics[stream].type for name, str
     sample = decoder.put(streams[name], stamp_of(message), message)
     found[sample.stream].append((sample.stamp, sample.values))
 stamps = np.array([stamp for stamp, _ in found[Stream.STROKES]])
-strokes, joints, imu = (np.array([values for _, values in found[stream]]) for stream in Stream)
+strokes, joints, imu = (np.array([values for _, values in found[s]]) for s in (Stream.STROKES, Stream.ANGLES, Stream.IMU))
 times = (stamps - stamps[0]) * NANO
 
 fault = parse(f"tip_imu.mount:turned:{ANGLE}@{ONSET}")
-spoilt = spoil(RigSession(stamps, strokes, joints, imu, stamps, {"t": times}), [fault], 0)
+spoilt = spoil(RigSession(stamps, strokes, joints, imu, stamps, 0.0 * joints, {"t": times}), [fault], 0)
 c, s = math.cos(ANGLE), math.sin(ANGLE)
 assert np.array_equal(spoilt.imu[times < ONSET], imu[times < ONSET]) and np.array_equal(spoilt.joints, joints)
 assert np.allclose(spoilt.imu[-1], [c * imu[-1, 0] + s * imu[-1, 1], c * imu[-1, 1] - s * imu[-1, 0]])
