@@ -210,6 +210,8 @@ class StrokeNoise:
     ----------
     joints : ndarray, shape (modes, n)
         rad^2, once the mode has been shaken for long.
+    forces : ndarray, shape (modes, n)
+        Of the cylinders, N^2, likewise.
     swing : ndarray, shape (modes, 2)
         Deviation of the tip's acceleration, as a vector along the mode's motion there, m/s^2, likewise.
     decay : ndarray, shape (modes,)
@@ -220,16 +222,17 @@ class StrokeNoise:
     """
 
     joints: Array
+    forces: Array
     swing: Array
     decay: Array
     collected: Array
     modes: tuple[Mode, ...]
 
-    def after(self, time: float, angle: float) -> tuple[Array, Array]:
-        """Variances of joint angles (n,), and of tip acceleration (2,) in axes turned by `angle`, `time` s from rest."""
+    def after(self, time: float, angle: float) -> tuple[Array, Array, Array]:
+        """Variances of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, forces (n,), `time` s from rest."""
         grown = 1.0 - np.exp(-self.decay * time)
         c, s = np.cos(angle), np.sin(angle)
-        return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2
+        return grown @ self.joints, grown @ (self.swing @ np.array([[c, -s], [s, c]])) ** 2, grown @ self.forces
 
     def of_start(self, plan: Plan, speeds: Array, sag: Array) -> Array:
         """Variances (modes,), m^2 kg, of vibration that a model lacks when it is started at rest.
@@ -278,13 +281,13 @@ class StrokeNoise:
         rows = [mode.increments[plan.tables.cylinders.z] for mode in self.modes]
         return np.array(rows).reshape(len(rows), plan.joints)
 
-    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array]:
-        """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, tip (2,)."""
+    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array, Array]:
+        """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, forces, tip (2,)."""
         share = variances / np.maximum(self.collected, TINY)
         c, s = np.cos(angle), np.sin(angle)
         swing = (self.swing @ np.array([[c, -s], [s, c]])) ** 2
         motions = np.array([mode.motion[plan.tables.tip : plan.tables.tip + 2] for mode in self.modes]).reshape(-1, 2)
-        return share @ self.joints, share @ swing, variances @ motions**2
+        return share @ self.joints, share @ swing, share @ self.forces, variances @ motions**2
 
 
 def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval: float, density: float) -> StrokeNoise:
@@ -292,21 +295,23 @@ def stroke_noise(plan: Plan, state: State, work: Work, variance: float, interval
     spectrum = variance * interval
     corner = (density / spectrum) ** (1.0 / 6.0)
     modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=BAND * corner)
-    joints, swing, decay, variances = [], [], [], []
+    joints, forces, swing, decay, variances = [], [], [], [], []
     tip = plan.tables.tip
     for mode in modes:
         omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
-        load = float(np.sum(mode.increments[plan.tables.cylinders.z] ** 2))
+        loads2 = mode.increments[plan.tables.cylinders.z] ** 2
         gain = 1.0 / (1.0 + (omega / corner) ** 6)
-        collected = load / omega**4 * spectrum * omega / (4.0 * max(zeta, 1e-6)) * gain**2
+        collected = float(np.sum(loads2)) / omega**4 * spectrum * omega / (4.0 * max(zeta, 1e-6)) * gain**2
         joints.append(collected * joint_increments(plan, state, work, mode) ** 2)
+        forces.append(collected * loads2)
         swing.append(np.sqrt(collected) * omega**2 * mode.motion[tip : tip + 2])
         decay.append(2.0 * zeta * omega)
         variances.append(collected)
     n = plan.joints
     return StrokeNoise(
-        np.array(joints).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay), np.array(variances), modes
-    )
+        np.array(joints).reshape(-1, n), np.array(forces).reshape(-1, n), np.array(swing).reshape(-1, 2), np.array(decay),
+        np.array(variances), modes,
+    )  # fmt: skip
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

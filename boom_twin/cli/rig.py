@@ -7,8 +7,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .. import __version__
+from ..errors import UsageError
 from .main import add_scene, tell
 
+SENSORS = ("angles", "imu", "forces")
 ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 
 
@@ -33,7 +35,17 @@ def add_arguments(parser: ArgumentParser) -> None:
         "wind:DEVIATION[:TIME_SCALE] (N, s; gusts, horizontal), with @ONSET (s), for instance pump:0.43:130; may be repeated"
     )
     parser.add_argument("--load", action="append", default=[], metavar="KIND:NUMBERS[@ONSET]", help=load)
+    sensors = "what is recorded beside strokes, of angles, imu and forces, with commas between them (default angles,imu)"
+    parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
     parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
+
+
+def _recorded(text: str) -> set[str]:
+    """The sensors that are named in a list; UsageError if there are no such."""
+    found = {name.strip() for name in text.split(",") if name.strip()}
+    if unknown := sorted(found - set(SENSORS)):
+        raise UsageError(f"--sensors {text}: {', '.join(unknown)} is no sensor of the rig. Give some of {', '.join(SENSORS)}.")
+    return found
 
 
 def run(args: Namespace) -> int:
@@ -51,6 +63,7 @@ def run(args: Namespace) -> int:
     tell(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
+    recorded = _recorded(args.sensors)
     rate = RATE if args.rate is None else args.rate
     sensors = noise_free(rate) if args.clean else Sensors(rate)
     wrong = [faults.parse(text) for text in args.fault]
@@ -69,12 +82,15 @@ def run(args: Namespace) -> int:
         notes["loads"] = f"at the tip, wind seed {args.seed}: " + ", ".join(map(str, pushing))
     if args.rate is not None:
         notes["rate"] = f"{args.rate:g} Hz"
+    if "forces" in recorded and not args.clean:
+        notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, [Path(args.scene)] if args.scene else []) as building:
         print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
         session = record_session(boom, programme, duration, sensors, args.seed, load=load, changes=changes)
         session = faults.spoil(session, wrong, args.seed)
-        arrays = session.stamps, session.strokes, session.joints, session.imu
-        write_session(building.folder, *arrays, notes, session.angle_stamps)
+        readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
+        joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
+        write_session(building.folder, session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces)
         # not the boom that was simulated: what a twin is to assume
         SessionSheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
         session.save_truth(building.folder / FILE_NAME)

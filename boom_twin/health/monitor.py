@@ -17,7 +17,7 @@ from .residual_monitor import ResidualMonitor
 from .sensor_monitor import SensorCheck, SensorMonitor, sensor_ranges
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
-CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.is_smooth)
+CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 
 
@@ -49,7 +49,7 @@ class HealthMonitor:
         self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
-        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream].unit) for stream in CHECKED}
+        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()

@@ -14,7 +14,7 @@ from ..estimation.sensor_model import specific_force
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, State
-from ..types import NANO, Array, Prediction, Stream
+from ..types import NANO, SENSORS, Array, Prediction, Stream
 from .blocks import CODES
 from .state import NONE, SEEN, TwinState
 
@@ -87,7 +87,7 @@ class Deviations:
         return found * np.exp(-self.noise.decay * max(0.0, (stamp - self._since) * NANO))
 
     def refresh(self, prediction: Prediction, interval: float, live: State, angles: Array) -> None:
-        """Follow the posture: variances of joint angles (rad^2) and deviations of the specific force (m/s^2) into the state.
+        """Follow the posture: what is expected of joint angles, specific force and cylinder forces goes into the state.
 
         Parameters
         ----------
@@ -111,12 +111,13 @@ class Deviations:
             self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
             self._speeds, self._state.clock[SEEN] = None, prediction.stamp
         time = (prediction.stamp - self._epoch) * NANO
-        joints, acceleration = self.noise.after(time, prediction.tip_angle)
+        joints, acceleration, forces = self.noise.after(time, prediction.tip_angle)
         if len(self._unknown):
-            more, swing, tip = self.noise.of(self._left(prediction.stamp), self._plan, prediction.tip_angle)
-            joints, acceleration, self.tip = joints + more, acceleration + swing, np.sqrt(tip)
+            more, swing, pull, tip = self.noise.of(self._left(prediction.stamp), self._plan, prediction.tip_angle)
+            joints, acceleration, forces, self.tip = joints + more, acceleration + swing, forces + pull, np.sqrt(tip)
         self._state.joints2[:] = self._settings.angle_variance + joints
         self._state.force[:] = np.sqrt(self._settings.imu_sigma**2 + acceleration)
+        self._state.cylinder_forces[:] = np.sqrt(self._settings.variance(SENSORS[Stream.FORCES]) + forces)
 
     def _propagate(self, live: State, interval: float) -> StrokeNoise:
         probe, work = self._plan.state(), self._plan.work()
@@ -125,7 +126,7 @@ class Deviations:
         return stroke_noise(self._plan, probe, work, tuned.stroke_variance, interval, tuned.jerk_density)
 
 
-IMU = CODES[Stream.IMU]
+IMU, FORCES = CODES[Stream.IMU], CODES[Stream.FORCES]
 
 
 @inner
@@ -140,10 +141,11 @@ def write_expected(limits, state, live, results, estimates, values, sigmas):
     results, estimates : Results, Estimates
         See `boom_twin.kernels.result_row`.
     values, sigmas : ndarray, shape (measured channels,)
-        In the order of the streams: angles (rad), then the tip IMU's x and z (m/s^2).
+        In the order of the streams: angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
     """
     write_angles(limits, state, live, results, estimates, values, sigmas)
     write_specific_force(limits, state, results, values, sigmas)
+    write_cylinder_forces(limits, state, results, values, sigmas)
 
 
 @inner
@@ -171,6 +173,14 @@ def write_specific_force(limits, state, results, values, sigmas):
     x, y = results.tip[2, 0] - limits.gravity[0], results.tip[2, 1] - limits.gravity[1]
     values[at], values[at + 1] = specific_force(x, y, math.cos(angle), math.sin(angle))
     sigmas[at], sigmas[at + 1] = state.force[0], state.force[1]
+
+
+@inner
+def write_cylinder_forces(limits, state, results, values, sigmas):
+    """Between barrel and rod, positive in tension."""
+    at = limits.first[FORCES]
+    for i in range(results.cylinder_forces.shape[0]):
+        values[at + i], sigmas[at + i] = results.cylinder_forces[i], state.cylinder_forces[i]
 
 
 def tip_specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:

@@ -52,7 +52,8 @@ class TwinState(NamedTuple):
     waiting : measured samples that wait for a stroke, by stamp and stream.
     recent : measured less expected, without any zero.
     zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
-    joints2, slopes2, force : (n,), (n,), (2,) of the deviations, see `boom_twin.twin.expected_readings.Deviations`.
+    joints2, slopes2, force, cylinder_forces : (n,), (n,), (2,), (n,) of the deviations, see
+        `boom_twin.twin.expected_readings.Deviations`.
     """
 
     clock: Integers
@@ -71,6 +72,7 @@ class TwinState(NamedTuple):
     joints2: Array
     slopes2: Array
     force: Array
+    cylinder_forces: Array
 
 
 class Limits(NamedTuple):
@@ -152,7 +154,7 @@ def new_state(joints: int, channels: Integers) -> TwinState:
         strokes=np.zeros(joints), taken=np.zeros(joints),
         past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
         zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
-        joints2=np.zeros(joints), slopes2=np.zeros(joints), force=np.zeros(2),
+        joints2=np.zeros(joints), slopes2=np.zeros(joints), force=np.zeros(2), cylinder_forces=np.zeros(joints),
     )  # fmt: skip
 
 

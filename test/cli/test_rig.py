@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 
 pytest.importorskip("exudyn")
 
-from boom_twin.bag.reader import scan
+from boom_twin.bag.reader import read, scan
 from boom_twin.cli.main import main
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.scene.load import default_text
@@ -42,11 +42,16 @@ def made(scene: Path, out: Path, *more: str) -> Path:
     return out
 
 
-def replayed(scene: Path, bag: Path) -> dict[str, Any]:
-    """What replay says of it."""
+def replayed_folder(scene: Path, bag: Path) -> Path:
+    """What replay makes of it."""
     out = bag.with_name(f"{bag.name}_out")
     assert main(["replay", str(bag), "--scene", str(scene), "--out", str(out)]) == 0
-    return dict(json.loads((out / "summary.json").read_text()))
+    return out
+
+
+def replayed(scene: Path, bag: Path) -> dict[str, Any]:
+    """What replay says of it."""
+    return dict(json.loads((replayed_folder(scene, bag) / "summary.json").read_text()))
 
 
 def test_faulty_sessions_replay(scene: Path, tmp_path: Path) -> None:
@@ -84,11 +89,23 @@ def test_a_load_that_no_twin_knows(scene: Path, tmp_path: Path) -> None:
     assert shaken["joint_residual_rms_rad"][0] > 3.0 * calm["joint_residual_rms_rad"][0]
 
 
+def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> None:
+    bag = made(scene, tmp_path / "forces", "--sensors", "forces,angles")
+    assert [topic.name for topic in scan(bag).topics] == ["/cylinder_forces", "/cylinder_strokes", "/joint_angles"]
+    assert scan(bag).notes["forces"] == "noise 100 N, resolution 20 N"
+    rows = json.loads((replayed_folder(scene, bag) / "summary.json").read_text())
+    assert rows["alarms"] == [] and rows["dropped"] == 0
+    kept = read(scan(bag.with_name("forces_out") / "bag"), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
+    ratios = [msg.velocity[0] for _, _, msg in kept if msg.name == ["cylinder_force_1"]]
+    assert len(ratios) == 600 and 0.7 < np.std(ratios) < 1.4
+
+
 @pytest.mark.parametrize(
     "option, told",
     [
         (["--load", "pump:9:130"], "load pump:9:130:0.1: frequency = 9, must be from 0.05 to 2 Hz. Write pump:"),
         (["--load", "wind:15@3"], "load wind:15:5@3: begins at 3 s, must be before the end at 3 s."),
+        (["--sensors", "angles,gps"], "--sensors angles,gps: gps is no sensor of the rig. Give some of angles, imu, forces."),
         (["--rate", "20"], "rate = 20, must be from 50 to 1000 Hz"),
     ],
 )
