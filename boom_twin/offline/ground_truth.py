@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
@@ -42,18 +43,26 @@ class TipTruth:
 
     def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
         """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
-        times = (predictions.stamps[rows] - predictions.stamps[0]) * NANO + self.times[0]
+        stamps, first = predictions.stamps[rows], int(predictions.stamps[0])
         return {
-            "tip_error_rms_m": _rms(predictions.tip_position[rows] - self._at(times, self.position)),
-            "tip_acceleration_error_rms_m_s2": _rms(predictions.tip_acceleration[rows] - self._at(times, self.acceleration)),
+            "tip_error_rms_m": self.position_error(stamps, first, predictions.tip_position[rows]),
+            "tip_acceleration_error_rms_m_s2": self.acceleration_error(stamps, first, predictions.tip_acceleration[rows]),
         }
+
+    def position_error(self, stamps: NDArray[np.int64], first: int, position: Array) -> float:
+        """Root mean square of the distance to `position` (k, 2), m, told at `stamps` (ns); the truth begins at `first` (ns)."""
+        return self._rms_off(stamps, first, position, self.position)
+
+    def acceleration_error(self, stamps: NDArray[np.int64], first: int, acceleration: Array) -> float:
+        """As `position_error`, of an acceleration (k, 2), m/s^2."""
+        return self._rms_off(stamps, first, acceleration, self.acceleration)
+
+    def _rms_off(self, stamps: NDArray[np.int64], first: int, told: Array, true: Array) -> float:
+        times = (stamps - first) * NANO + self.times[0]
+        return float(np.sqrt(np.mean(np.sum((told - self._at(times, true)) ** 2, axis=1))))
 
     def _at(self, times: Array, values: Array) -> Array:
         return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])
-
-
-def _rms(vectors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
 
 
 def load_truth(folder: Path) -> TipTruth | None:
