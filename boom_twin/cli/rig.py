@@ -48,6 +48,15 @@ def _recorded(text: str) -> set[str]:
     return found
 
 
+def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
+    """UsageError if a fault is of a sensor that is not recorded."""
+    for cause in causes:
+        for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
+            if cause.startswith(stem) and sensors not in recorded:
+                enough = ",".join(sorted([*recorded, sensors]))
+                raise UsageError(f"fault {cause}: {sensors} are not recorded. Give --sensors {enough}.")
+
+
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
     from ..bag.session_files import write_session
@@ -68,6 +77,7 @@ def run(args: Namespace) -> int:
     sensors = noise_free(rate) if args.clean else Sensors(rate)
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
+    _refuse_unrecorded([fault.cause for fault in wrong], recorded)
     boom, changes = faulty_boom.changes(faulty_boom.wrong_by(scene, args.wrong, args.rig_seed), wrong)
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)

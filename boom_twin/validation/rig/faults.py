@@ -99,7 +99,7 @@ class RigFault:
             raise UsageError(f"fault {self}: onset = {self.onset:g} s, must be finite and at least 0.")
         if not 0.0 <= self.ramp < math.inf:
             raise UsageError(f"fault {self}: ramp = {self.ramp:g} s, must be finite and at least 0.")
-        if not (self.onset + self.ramp < self.end or math.isnan(self.end)):
+        if not self.onset + self.ramp < self.end:
             whole = self.onset + self.ramp
             raise UsageError(f"fault {self}: end = {self.end:g} s, must be after {whole:g} s, when it is there in full.")
         if self.ramp and self.kind in _WITHOUT_RAMP:

@@ -43,6 +43,7 @@ def test_text_and_back(text, fault):
         ("tip.payload:more:20@5+x", "size, onset, ramp and end must be numbers. Write CAUSE:KIND"),
         ("tip.payload:more:20@5+-1", "ramp = -1 s, must be finite and at least 0"),
         ("tip.payload:more:20@5+2..7", "end = 7 s, must be after 7 s, when it is there in full"),
+        ("tip.payload:more:20@5..nan", "end = nan s, must be after 5 s"),
         ("joint_1.sensor:drift:1@5+2", "drift does not come on over a time. Leave out \\+2"),
         ("cylinder_1.rod.clearance:play:0.0005@5", "play from the start to the end. Leave out what follows @"),
         ("joint_1.sensor:bias:1@-1", "onset = -1 s, must be finite and at least 0"),

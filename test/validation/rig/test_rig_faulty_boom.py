@@ -79,6 +79,20 @@ def test_a_fault_that_ends_is_there_at_first():
     assert share(np.array([0.0, 3.9, 4.0, 9.0])).tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
+def test_a_boom_that_was_loaded_and_changed_moves_as_before():
+    """A boom at rest may be moved from there any number of times."""
+    scene, fault = load_scene(), parse("cylinder_2.k:softer:0.4@0.1+0.1")
+    start, changing = changes(scene, [fault])
+    strokes = strokes_of_posture(scene, "arch")
+    programme, resting = Programme(tuple(strokes), (Move(0, 0.1, 0.3, strokes[0] + 0.01),)), at_rest(start, strokes, 4)
+    plain, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
+    push = {"load": lambda times: np.outer(np.minimum(times, 1.0), [0.0, 1000.0]), "changes": changing}
+    changed, _ = move(resting, programme, 0.5, 5e-3, 5e-3, **push)
+    again, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
+    assert again["tip_y_m"] == pytest.approx(plain["tip_y_m"], abs=1e-7)
+    assert np.abs(changed["tip_y_m"] - plain["tip_y_m"]).max() > 1e-3
+
+
 def test_a_lumped_boom_does_not_change(one_rigid):
     scene = Scene.model_validate(one_rigid)
     start, changing = changes(scene, [parse("cylinder_1.k:softer:0.4@1")])

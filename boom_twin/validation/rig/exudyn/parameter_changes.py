@@ -71,6 +71,11 @@ class ParameterChanges:
                     values[name] += share * value
             _set(self._system, number, values, {name for more in self._more[number] for name in more})
 
+    def restore(self) -> None:
+        """Give all changed objects their parameters at rest."""
+        for number, old in self._healthy.items():
+            _set(self._system, number, old, {name for more in self._more[number] for name in more})
+
 
 def _objects(boom: Boom) -> list[dict[str, float]]:
     """Parameters of all objects, such that those of two changes add up; of a body the first moments instead of the centre."""

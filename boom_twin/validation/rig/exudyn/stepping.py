@@ -8,6 +8,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ....errors import SolverError
 from ....types import Array
 from .module import exudyn
@@ -80,7 +82,7 @@ class Course:
 
 
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
-    """From the boom's equilibrium through a course."""
+    """From the boom's equilibrium through a course; then load and parameters are again those of the equilibrium."""
     count = len(course.strokes) - 1
     feeding = _feed(boom, course, step)
     settings = _settings(count, step, output_step, scheme)
@@ -92,6 +94,9 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
         raise SolverError(
             f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
         ) from failure
+    finally:
+        boom.push(np.zeros(2))
+        course.changes.restore()
     seconds = time.process_time() - begun
     counted = boom.system.sys["dynamicSolver"].it
     return Effort(seconds, feeding[0], int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
