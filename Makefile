@@ -17,14 +17,14 @@ PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures docs clean
 
 help:
-	@echo "make demo        play a recorded session through the live node, show what it predicted"
+	@echo "make demo        play two recorded sessions, a quiet one and one with pump and wind, through the live node, show what it predicted"
 	@echo "make demo-live   the same in a browser: node, recorder and monitor, until Ctrl-C"
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make soak        10 minutes of the live node, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
 	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
-	@echo "make session     make the bundled session anew on the virtual rig, into out/arch_session"
+	@echo "make session     make the bundled sessions anew on the virtual rig, into out/arch_session and out/pump_session"
 	@echo "make figures     make the pictures of the documentation anew"
 	@echo "make docs        the documentation as a site with the API reference, into out/site"
 
@@ -43,6 +43,7 @@ warm: $(READY)
 
 demo: warm
 	$(BIN)/python -P -m boom_twin.ros.demo.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
+	$(BIN)/python -P -m boom_twin.ros.demo.demo --bag bags/pump_session --out out/demo_pump $(if $(DOMAIN),--domain $(DOMAIN))
 
 demo-live: warm
 	$(BIN)/python -P -m boom_twin.ros.demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
@@ -101,7 +102,9 @@ client:
 # Never over the one that is there: compare the two, then exchange them by hand.
 session: $(READY)
 	$(BIN)/boom_twin rig --out out/arch_session
-	@cmp out/arch_session/session_0.mcap bags/arch_session/session_0.mcap && echo "the bundled session is the same"
+	$(BIN)/boom_twin rig --out out/pump_session --random arch --duration 40 --seed 3 --load pump:0.43:130@5 --load wind:15 \
+		--sensors angles,imu,forces
+	@for name in arch pump; do cmp out/$${name}_session/session_0.mcap bags/$${name}_session/session_0.mcap && echo "$$name is the same"; done
 
 figures: $(READY)
 	$(BIN)/python docs/figures.py

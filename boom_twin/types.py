@@ -36,6 +36,7 @@ class Stream(Enum):
     STROKES = "cylinder_strokes"
     ANGLES = "joint_angles"
     IMU = "tip_imu"
+    FORCES = "cylinder_forces"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
@@ -53,8 +54,8 @@ class SensorKind:
     title : str
         What people call them.
     message : str
-        Type of its messages: a JointState, whose ``position`` is read by names, or an Imu, whose ``linear_acceleration`` is
-        read by axes.
+        Type of its messages: a JointState, whose `field` is read by names, or an Imu, whose ``linear_acceleration`` is read by
+        axes.
     stem : str
         Of the names of its channels: ``joint`` gives ``joint_1`` .. ``joint_n``.
     ends : tuple of str
@@ -64,12 +65,16 @@ class SensorKind:
     noise, resolution : str
         The fields of `boom_twin.config.settings.Settings` that have them; an empty one stands for 0.
     lack : str
-        What there is not without these sensors.
+        What there is not without these sensors; empty where few rigs have them, and nobody misses them.
+    field : str
+        Of a JointState: ``position`` or ``effort``.
+    part : str
+        The stem of the names in messages, where it is another: a force is that of ``cylinder_1``.
     shown : str
         The unit, one of `units`, in which pictures and the live page show residuals; by default the SI unit.
-    is_smooth : bool
-        Whether what is measured changes little from one reading to the next, so that jumps, spikes and more noise than stated
-        are the sensor's own: then they give an alarm.
+    alarms : tuple of str
+        What gives an alarm of a single sensor. Jumps, spikes and more noise than stated are the sensor's own only if what it
+        measures changes little from one reading to the next.
     """
 
     title: str
@@ -80,13 +85,20 @@ class SensorKind:
     noise: str
     resolution: str
     lack: str
+    field: str = "position"
+    part: str = ""
     shown: str = ""
-    is_smooth: bool = True
+    alarms: tuple[str, ...] = ("stuck", "dropout", "range", "jump", "spikes", "noise")
 
     @property
     def is_imu(self) -> bool:
         """Whether its messages are read by axes."""
         return self.message == "sensor_msgs/msg/Imu"
+
+    @property
+    def named(self) -> str:
+        """The stem of the names in messages."""
+        return self.part or self.stem
 
     @property
     def unit(self) -> str:
@@ -140,7 +152,20 @@ SENSORS: dict[Stream, SensorKind] = {
         noise="imu_sigma",
         resolution="",
         lack="there are no residuals of the tip's acceleration (optional)",
-        is_smooth=False,
+        alarms=(),
+    ),
+    Stream.FORCES: SensorKind(
+        title="cylinder forces",
+        message="sensor_msgs/msg/JointState",
+        stem="cylinder_force",
+        ends=(),
+        units={"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216152605},
+        noise="force_sigma",
+        resolution="force_resolution",
+        lack="",
+        field="effort",
+        part="cylinder",
+        alarms=("stuck", "dropout"),
     ),
 }
 """What they should read is in `boom_twin.twin.expected_readings.write_expected`, their topics are in ``topics.yaml``."""
@@ -171,8 +196,8 @@ def sensor_kind(channel: str) -> SensorKind:
     return SENSORS[stream]
 
 
-LIMIT = 1e6
-"""Largest magnitude that is taken for a reading: no stroke (m), angle (rad) or acceleration (m/s^2) comes near it."""
+LIMIT = 1e7
+"""Largest magnitude that is taken for a reading: no stroke (m), angle (rad), acceleration (m/s^2) or force (N) is near it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +211,7 @@ class Sample:
         Nanoseconds, `header.stamp` of the message.
     values : ndarray
         ``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific
-        force along x and z of the tip.
+        force along x and z of the tip. ``FORCES``: (n,) N, of the cylinders, positive in tension.
         NaN where the message had no value; beyond `LIMIT` is taken for none.
     """
 
@@ -277,7 +302,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Measured minus predicted at the stamp of one angle or IMU sample.
+    """Measured minus predicted at the stamp of one sample of angles, accelerations or forces.
 
     Attributes
     ----------
@@ -285,7 +310,7 @@ class Residuals:
     stamp : int
         Nanoseconds.
     names : tuple of str
-        One per channel: ``joint_1``, .. or ``tip_imu_x``, ``tip_imu_z``.
+        One per channel: ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``, or ``cylinder_force_1``, ..
     values, sigmas : ndarray, shape (len(names),)
         The residual in the unit of the sensor, and the standard deviation expected of it. NaN where not measured.
     """
@@ -315,7 +340,8 @@ class Change:
     settings : dict of str to float
         All that can change while the twin runs, see `boom_twin.config.settings.Settings`.
     zeros : dict of str to float
-        What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2); 0 if not named.
+        What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2, ``cylinder_force_1``
+        N); 0 if not named.
     """
 
     stamp: int

@@ -317,10 +317,11 @@ class StrokeNoise:
         rows = [mode.increments[plan.tables.cylinders.z] for mode in self.modes]
         return np.array(rows).reshape(len(rows), plan.joints)
 
-    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array]:
-        """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, tip (2,)."""
+    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array, Array]:
+        """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, forces (n,), tip."""
         swing = self._omegas()[:, None] ** 2 * self._tip_motions(plan, angle)
-        return variances @ self.joints, variances @ swing**2, variances @ self._tip_motions(plan) ** 2
+        tip, forces = variances @ self._tip_motions(plan) ** 2, variances @ self._loads(plan) ** 2
+        return variances @ self.joints, variances @ swing**2, forces, tip
 
 
 def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum) -> StrokeNoise:

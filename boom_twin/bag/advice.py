@@ -64,13 +64,15 @@ def missing(info: BagInfo, joints: int, scene: str = "") -> list[str]:
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
     found = list(other_names(topics, names, joints, scene))
     for stream, topic in topics.inputs.items():
+        if not SENSORS[stream].lack and info.session.find(topic.name) is None:
+            continue
         try:
             name = check_topic(info.session, topic.name, topic.type).name
             for file in info.session.files:
                 check_encoding(file, {name})
         except BagError as error:
             reason = str(error).removeprefix(f"{info.session.path}: ")
-            found.append(f"{reason} Without it {SENSORS[stream].lack}.")
+            found.append(f"{reason} Without it {SENSORS[stream].lack}." if SENSORS[stream].lack else reason)
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)

@@ -13,7 +13,7 @@ from .reader import Session, read
 WINDOW = 5_000_000_000
 """Log time (ns) from the first message of strokes or angles on, in which all names are looked at."""
 
-KINDS = {stream: kind.stem for stream, kind in SENSORS.items() if not kind.ends}
+KINDS = {stream: kind.named for stream, kind in SENSORS.items() if not kind.ends}
 MOST = 12
 """Names that a sentence lists."""
 

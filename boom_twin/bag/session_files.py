@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..messages.message_fields import FRAME, fill_header
 from ..messages.topic_table import load_topics
 from ..messages.type_store import new_message
-from ..types import SENSORS, Array, Sample, Stream
+from ..types import SENSORS, Array, Sample, Stream, channels_of
 from .writer import SessionWriter
 
 IMU_FRAME = "tip"
@@ -25,10 +25,11 @@ def write_session(
     directory: Path,
     stamps_ns: NDArray[np.int64],
     strokes: Array,
-    joints: Array,
+    joints: Array | None,
     imu: Array | None,
     description: Mapping[str, str],
     angle_stamps_ns: NDArray[np.int64] | None = None,
+    forces: Array | None = None,
 ) -> None:
     """Write the bag of one session in the order of its stamps, which are the log times.
 
@@ -38,14 +39,18 @@ def write_session(
         New or empty.
     stamps_ns : ndarray of int, shape (k,)
         Nanoseconds.
-    strokes, joints : ndarray, shape (k, n)
-        m; rad.
+    strokes : ndarray, shape (k, n)
+        m.
+    joints : ndarray, shape (k, n), optional
+        rad.
     imu : ndarray, shape (k, 2), optional
         Specific force along x and z of the tip, m/s^2.
     description : dict of str to str
         Kept as notes of the bag: say here what the session is, and that it is synthetic if it is.
     angle_stamps_ns : ndarray of int, shape (k,), optional
         Of the joint angles, where they are not those of the strokes.
+    forces : ndarray, shape (k, n), optional
+        Of the cylinders, N, positive in tension.
 
     Raises
     ------
@@ -54,9 +59,10 @@ def write_session(
     BagError
         If `directory` holds anything.
     """
-    _check_shapes(stamps_ns, strokes, joints, imu)
-    streams = (Stream.STROKES, Stream.ANGLES) if imu is None else (Stream.STROKES, Stream.ANGLES, Stream.IMU)
-    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns), streams, description)
+    values = {Stream.STROKES: strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces}
+    there = {stream: rows for stream, rows in values.items() if rows is not None}
+    _check_shapes(len(stamps_ns), strokes.shape[-1], there)
+    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns, forces), there, description)
 
 
 def write_samples(
@@ -72,22 +78,28 @@ def write_samples(
 def samples_of(
     stamps_ns: NDArray[np.int64],
     strokes: Array,
-    joints: Array,
+    joints: Array | None,
     imu: Array | None,
     angle_stamps_ns: NDArray[np.int64] | None = None,
+    forces: Array | None = None,
 ) -> list[Sample]:
     """The samples of a session in the order of their stamps, of one stamp strokes first; arrays as in `write_session`.
 
     Where a row has no value at all, there is no sample.
     """
     angle_stamps = stamps_ns if angle_stamps_ns is None else angle_stamps_ns
-    streams = [(Stream.STROKES, stamps_ns, strokes), (Stream.ANGLES, angle_stamps, joints)]
-    streams += [] if imu is None else [(Stream.IMU, stamps_ns, imu)]
+    streams: list[tuple[Stream, NDArray[np.int64], Array | None]] = [
+        (Stream.STROKES, stamps_ns, strokes),
+        (Stream.ANGLES, angle_stamps, joints),
+        (Stream.IMU, stamps_ns, imu),
+        (Stream.FORCES, stamps_ns, forces),
+    ]
     samples = [
         Sample(stream, stamp, row)
         for stream, stamps, values in streams
-        for stamp, row, there in zip(stamps.tolist(), values, ~np.isnan(values).all(axis=1), strict=True)
-        if there
+        if values is not None
+        for stamp, row in zip(stamps.tolist(), values, strict=True)
+        if not np.isnan(row).all()
     ]
     return sorted(samples, key=lambda sample: sample.stamp)
 
@@ -103,17 +115,14 @@ def sensor_message(sample: Sample) -> Any:
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
         return msg
     fill_header(msg.header, sample.stamp, FRAME)
-    msg.name, msg.position = list(kind.channels(len(sample.values))), np.array(sample.values, dtype=float)
+    msg.name = [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + len(sample.values))]
+    setattr(msg, kind.field, np.array(sample.values, dtype=float))
     return msg
 
 
-def _check_shapes(stamps: NDArray[np.int64], strokes: Array, joints: Array, imu: Array | None) -> None:
-    rows = len(stamps)
-    expected: Sequence[tuple[str, Array | None, tuple[int, ...]]] = (
-        ("strokes", strokes, (rows, strokes.shape[-1])),
-        ("joints", joints, (rows, strokes.shape[-1])),
-        ("imu", imu, (rows, 2)),
-    )
-    for name, values, shape in expected:
-        if values is not None and values.shape != shape:
-            raise UsageError(f"{name} has shape {values.shape}, not {shape}. Give one row for each of {rows} stamps.")
+def _check_shapes(rows: int, joints: int, values: Mapping[Stream, Array]) -> None:
+    for stream, names in channels_of(joints).items():
+        shape = rows, len(names)
+        if stream in values and values[stream].shape != shape:
+            found = f"{SENSORS[stream].title}: shape {values[stream].shape}, not {shape}"
+            raise UsageError(f"{found}. Give one row for each of {rows} stamps.")

@@ -125,7 +125,7 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
     for stream in NEEDED:
         if stream not in series:
             raise BagError(
-                f"{session.path}: no usable value of {SENSORS[stream].stem}_1..{joints} (met: {_told(samples)}). "
+                f"{session.path}: no usable value of {SENSORS[stream].named}_1..{joints} (met: {_told(samples)}). "
                 "Is it a session of this boom? If its sensors have other names, give a mapping."
             )
     lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > MISSING)]

@@ -12,7 +12,7 @@ from ..scene.kinematics import strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Stream
 
-NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU}
+NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -7,8 +7,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from .. import __version__
+from ..errors import UsageError
 from .main import add_scene, tell
 
+SENSORS = ("angles", "imu", "forces")
 ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 
 
@@ -23,8 +25,36 @@ def add_arguments(parser: ArgumentParser) -> None:
     share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %%"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
     parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each")
-    fault = "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); may be repeated"
-    parser.add_argument("--fault", action="append", default=[], metavar="CAUSE:KIND[:SIZE][@ONSET]", help=fault)
+    fault = (
+        "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); @20+5..40: from 20 s on, "
+        "over 5 s, until 40 s; may be repeated"
+    )
+    parser.add_argument("--fault", action="append", default=[], metavar="CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]", help=fault)
+    load = (
+        "a load at the tip that no twin knows of: pump:FREQUENCY:HEIGHT[:CHANGE_OVER] (Hz, N, s; pulses, upward) or "
+        "wind:DEVIATION[:TIME_SCALE] (N, s; gusts, horizontal), with @ONSET (s), for instance pump:0.43:130; may be repeated"
+    )
+    parser.add_argument("--load", action="append", default=[], metavar="KIND:NUMBERS[@ONSET]", help=load)
+    sensors = "what is recorded beside strokes, of angles, imu and forces, with commas between them (default angles,imu)"
+    parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
+    parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
+
+
+def _recorded(text: str) -> set[str]:
+    """The sensors that are named in a list; UsageError if there are no such."""
+    found = {name.strip() for name in text.split(",") if name.strip()}
+    if unknown := sorted(found - set(SENSORS)):
+        raise UsageError(f"--sensors {text}: {', '.join(unknown)} is no sensor of the rig. Give some of {', '.join(SENSORS)}.")
+    return found
+
+
+def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
+    """UsageError if a fault is of a sensor that is not recorded."""
+    for cause in causes:
+        for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
+            if cause.startswith(stem) and sensors not in recorded:
+                enough = ",".join(sorted([*recorded, sensors]))
+                raise UsageError(f"fault {cause}: {sensors} are not recorded. Give --sensors {enough}.")
 
 
 def run(args: Namespace) -> int:
@@ -34,28 +64,43 @@ def run(args: Namespace) -> int:
     from ..bag.session_sheet import SessionSheet
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
-    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, noise_free, random_programme, record
-    from ..validation.rig.faults import check, parse, spoil, with_faults, wrong_by
+    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, faulty_boom, loads, noise_free, random_programme
+    from ..validation.rig import record as record_session
+    from ..validation.rig.sensors import RATE
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
-    faults = [parse(text) for text in args.fault]
-    check(faults, scene, duration)
-    boom = with_faults(wrong_by(scene, args.wrong, args.rig_seed), faults)
+    recorded = _recorded(args.sensors)
+    rate = RATE if args.rate is None else args.rate
+    sensors = noise_free(rate) if args.clean else Sensors(rate)
+    wrong = [faults.parse(text) for text in args.fault]
+    faults.check(wrong, scene, duration)
+    _refuse_unrecorded([fault.cause for fault in wrong], recorded)
+    boom, changes = faulty_boom.changes(faulty_boom.wrong_by(scene, args.wrong, args.rig_seed), wrong)
+    pushing = [loads.parse(text) for text in args.load]
+    loads.check(pushing, duration)
+    load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None
     programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
-    sensors = noise_free() if args.clean else Sensors()
     notes = {"origin": ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
     if args.wrong:
         notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
-    if faults:
-        notes["faults"] = ", ".join(map(str, faults))
+    if wrong:
+        notes["faults"] = ", ".join(map(str, wrong))
+    if pushing:
+        notes["loads"] = f"at the tip, wind seed {args.seed}: " + ", ".join(map(str, pushing))
+    if args.rate is not None:
+        notes["rate"] = f"{args.rate:g} Hz"
+    if "forces" in recorded and not args.clean:
+        notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, [Path(args.scene)] if args.scene else []) as building:
         print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
-        session = spoil(record(boom, programme, duration, sensors, args.seed), faults, args.seed)
-        arrays = session.stamps, session.strokes, session.joints, session.imu
-        write_session(building.folder, *arrays, notes, session.angle_stamps)
+        session = record_session(boom, programme, duration, sensors, args.seed, load=load, changes=changes)
+        session = faults.spoil(session, wrong, args.seed)
+        readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
+        joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
+        write_session(building.folder, session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces)
         # not the boom that was simulated: what a twin is to assume
         SessionSheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
         session.save_truth(building.folder / FILE_NAME)

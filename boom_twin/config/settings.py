@@ -109,6 +109,8 @@ class Settings(BaseModel):
     angle_sigma: NotNegative = Field(default=1.745e-4, description="noise of a joint encoder, rad")
     angle_resolution: Positive = Field(default=8.727e-5, description="resolution of a joint encoder, rad")
     imu_sigma: Positive = Field(default=0.05, description="noise of the tip IMU, m/s^2")
+    force_sigma: Positive = Field(default=100.0, description="noise of a cylinder's force, N")
+    force_resolution: NotNegative = Field(default=20.0, description="resolution of a cylinder's force, N")
     section_deviation: NotNegative = Field(
         default=0.0, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
     )

@@ -31,6 +31,7 @@ from .tip_estimate import (
     WIDTH,
     advance_estimate,
     take_angles,
+    take_forces,
     take_imu,
     write_estimate,
 )
@@ -114,4 +115,6 @@ def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, ze
             take_angles(f, zeros, 0, k * span)
         for _ in range(counts[2]):
             take_imu(f, zeros, size[0], k * span)
+        for _ in range(counts[3]):
+            take_forces(f, zeros, size[0] + 2, k * span)
     write_estimate(f, results, estimates, out)

@@ -22,7 +22,7 @@ UNCERTAIN = 2.0
 SHAKEN = 3.0
 """Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
 looks like noise in strokes may be motion."""
-CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.is_smooth)
+CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 
 
@@ -54,7 +54,7 @@ class HealthMonitor:
         self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
-        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream].unit) for stream in CHECKED}
+        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Mount, Stream, channels_of
+from ..types import Alarm, Array, Mount, SensorKind, Stream, channels_of
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -255,12 +255,12 @@ class SensorMonitor:
     ----------
     names : tuple of str
         Of its channels.
-    unit : str
-        Of its readings.
+    kind : SensorKind
+        Says which findings give an alarm.
     """
 
-    def __init__(self, names: tuple[str, ...], unit: str) -> None:
-        self._names, self._unit = names, unit
+    def __init__(self, names: tuple[str, ...], kind: SensorKind) -> None:
+        self._names, self._sensors = names, kind
         self._faults: dict[tuple[int, str], _Fault] = {}
 
     @property
@@ -280,6 +280,8 @@ class SensorMonitor:
         """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended."""
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
+            if kind not in self._sensors.alarms:
+                continue
             for channel in np.flatnonzero(flags).tolist():
                 if kind == "jump" and self._is_wild(channel):
                     continue
@@ -305,6 +307,6 @@ class SensorMonitor:
             fault.seen = end
             return []
         name = self._names[channel]
-        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._unit}" if size else "")
+        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._sensors.unit}" if size else "")
         self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size)
         return [self._faults[key].alarm]

@@ -165,7 +165,7 @@ class BlockDecoder:
         except BagError:
             return None  # raised when it is its turn
         data, streams = block.data(row), self._streams[block.sources[row]]
-        layout = layout_of(data, TYPES[streams[0]])
+        layout = layout_of(data, TYPES[streams[0]], SENSORS[streams[0]].field)
         if layout is None:
             return None
         columns, oddities = [], []

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -72,15 +73,17 @@ def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
 
 
 _LITTLE = b"\x00\x01"
+_POSITION = "position"
 _TIME = 8  # bytes of a stamp
 _BEFORE_FORCE = 25  # doubles of an Imu before its linear acceleration
 
 
 class Joints(NamedTuple):
-    """What is read of a sensor_msgs/JointState."""
+    """What is read of a sensor_msgs/JointState: its names and one of the arrays."""
 
     name: tuple[str, ...]
-    position: tuple[float, ...]
+    position: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
 
 
 class Vector(NamedTuple):
@@ -146,10 +149,12 @@ class CdrDecoder:
         ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
     decode : callable, optional
         Decodes a message that is laid out in another way than the one before.
+    field : str
+        Of a JointState: which array is read, ``position`` or ``effort``.
     """
 
-    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode) -> None:
-        self._type, self._decode = type_name, decode
+    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _POSITION) -> None:
+        self._type, self._decode, self._field = type_name, decode, field
         self._layout: Layout | None = None
 
     def read(self, data: bytes) -> tuple[int, Any]:
@@ -165,35 +170,36 @@ class CdrDecoder:
             msg: Any = layout.read(data)
         else:
             msg = self._decode(data, self._type)
-            self._layout = layout_of(data, self._type)
+            self._layout = layout_of(data, self._type, self._field)
         stamp = stamp_in(data)
         if stamp is None:
             raise ValueError("the message is too short for a header")
         return stamp, msg
 
 
-def layout_of(data: bytes, type_name: str) -> Layout | None:
+def layout_of(data: bytes, type_name: str, field: str) -> Layout | None:
     """How a message is laid out that could be decoded, of a type that `CdrDecoder` reads; None if it is big-endian."""
     if data[:2] != _LITTLE:
         return None
-    return _force_layout(data) if type_name == TYPES[Stream.IMU] else _joints_layout(data)
+    return _force_layout(data) if type_name == TYPES[Stream.IMU] else _joints_layout(data, field)
 
 
-def _joints_layout(data: bytes) -> Layout:
-    """Of a JointState: header, names, and the number of positions come before these."""
+def _joints_layout(data: bytes, field: str) -> Layout:
+    """Of a JointState: header, names, and the number of positions come before these, then velocities and efforts alike."""
     names, place = names_in(data)
-    end = place + -(place - _ORIGIN) % 4 + 4
-    count = int.from_bytes(data[end - 4 : end], "little")
-    at = end + -(end - _ORIGIN) % 8
-    later, place = [], (at + 8 * count) if count else end
-    for _ in ("velocity", "effort"):
+    place += -(place - _ORIGIN) % 4
+    end, lengths, found = place + 4, [], {}
+    for each in (_POSITION, "velocity", "effort"):
         length = data[place : place + 4]
-        later.append((place, length))
-        size = int.from_bytes(length, "little")
+        lengths.append((place, length))
+        count = int.from_bytes(length, "little")
         place += 4
-        place += -(place - _ORIGIN) % 8 + 8 * size if size else 0
-    head, numbers = data[_ORIGIN + _TIME : end], struct.Struct(f"<{count}d")
-    return Layout(len(data), head, end, at, numbers, tuple(later), lambda row: Joints(names, row))
+        at = place + (-(place - _ORIGIN) % 8 if count else 0)
+        found[each] = at, struct.Struct(f"<{count}d")
+        place = at + 8 * count
+    at, numbers = found[field]
+    head, make = data[_ORIGIN + _TIME : end], partial(Joints, names) if field == _POSITION else partial(Joints, names, ())
+    return Layout(len(data), head, end, at, numbers, tuple(lengths[1:]), make)
 
 
 def _force_layout(data: bytes) -> Layout:

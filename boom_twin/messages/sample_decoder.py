@@ -76,7 +76,7 @@ class SampleDecoder:
         How often each of these was met:
 
         ``unequal arrays``
-            ``position`` shorter or longer than ``name``; the values that have a name are used.
+            ``position`` (of forces ``effort``) shorter or longer than ``name``; the values that have a name are used.
         ``missing names``
             Some of the scene's channels are not in the message; they are NaN.
         ``unknown names only``
@@ -135,7 +135,7 @@ class SampleDecoder:
         if not 0 < stamp_ns < LATEST:
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw = self._force(msg, stream) if stream in self._by_axis else self._positions(msg, stream)
+        raw = self._force(msg, stream) if stream in self._by_axis else self._by_name(msg, stream)
         if raw is None:
             return None
         quantities = self._channels[stream].quantities(raw)
@@ -148,20 +148,20 @@ class SampleDecoder:
     def places(self, stream: Stream, msg: Any) -> tuple[list[int] | None, list[str]]:
         """Where the channels of a stream stand among the readings of a message, and what is odd about that.
 
-        Any other message with these names and as many positions gives the same.
+        Any other message with these names and as many readings gives the same.
 
         Returns
         -------
         list of int, or None
-            Places in ``position``, or in x, y, z of ``linear_acceleration``; -1 for a channel without a reading. None if
-            the message is not of this stream.
+            Places in ``position`` or ``effort``, or in x, y, z of ``linear_acceleration``; -1 for a channel without a reading.
+            None if the message is not of this stream.
         list of str
             Keys of `oddities`.
         """
         channels = self._channels[stream]
         if stream in self._by_axis:
             return [AXES.index(name) for name in channels.names], []
-        names, end = msg.name, len(msg.position)
+        names, end = msg.name, len(getattr(msg, SENSORS[stream].field))
         if len(names) > LONGEST:
             return None, ["too many names"]
         places = channels.places(names)
@@ -181,13 +181,13 @@ class SampleDecoder:
         """What is taken off a reading, and by what it is then multiplied, shape (2, channels)."""
         return np.array(self._channels[stream].scales).T
 
-    def _positions(self, msg: Any, stream: Stream) -> list[float] | None:
+    def _by_name(self, msg: Any, stream: Stream) -> list[float] | None:
         """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
         places, odd = self.places(stream, msg)
         for name in odd:
             self.oddities[name] += 1
-        positions = msg.position
-        return None if places is None else [float(positions[place]) if place >= 0 else _ABSENT for place in places]
+        found = getattr(msg, SENSORS[stream].field)
+        return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places]
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:
         """Specific force along the axes that are taken for the tip's x and z."""

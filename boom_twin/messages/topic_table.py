@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from functools import cache
@@ -12,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Mount, Stream, channels_of, sensor_kind, stream_of
+from ..types import NUMBER, SENSORS, Mount, Stream, channels_of, sensor_kind
 
 AXES = ("x", "y", "z")
 
@@ -31,14 +32,14 @@ class Sensor(BaseModel):
 
 
 def number_of(channel: str) -> int:
-    """Of a channel ``cylinder_i`` or ``joint_i``: i."""
+    """Of a channel, or of a name, ``cylinder_i`` or ``joint_i``: i."""
     return int(channel.rpartition("_")[2])
 
 
 def usual(channel: str) -> dict[str, Any]:
     """Name and unit of a channel that no mapping names."""
-    kind = sensor_kind(channel)
-    return {"name": channel.rpartition("_")[2] if kind.is_imu else channel, "unit": kind.unit}
+    kind, end = sensor_kind(channel), channel.rpartition("_")[2]
+    return {"name": end if kind.is_imu else f"{kind.named}_{end}", "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
@@ -71,7 +72,7 @@ def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterat
     known = channels_of(joints)
     for channel in names:
         if not any(channel in group for group in known.values()):
-            bound = f"the scene has {joints} joints, so channels end at {channel.split('_')[0]}_{joints}"
+            bound = f"the scene has {joints} joints, so channels end at {sensor_kind(channel).stem}_{joints}"
             yield Fault(f"sensors.{channel}", channel, bound, "Remove it, or use the scene that this mapping is for.")
     first, second, *others = known.values()
     for group in [first + second, *others] if is_shared else known.values():
@@ -196,7 +197,8 @@ class Topics(_Entry):
         if kind.ends or all(channel in self.sensors for channel in kind.channels(joints)):
             return []
         used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
-        return [name for name in names if stream_of(name) is stream and number_of(name) > joints and name not in used]
+        numbered = re.compile(rf"{kind.named}_{NUMBER.pattern}")
+        return [name for name in names if numbered.fullmatch(name) and number_of(name) > joints and name not in used]
 
     def mounts(self, joints: int) -> list[Mount | None]:
         """Where the inclinometers of a boom sit, one entry for each joint; None is an encoder."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 WINDOW = 6.0  # s shown enlarged
-TRUTH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 4))}
+TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
 AXES = (("x (forward)", BLUE), ("y (up)", ORANGE))
 
 
@@ -28,15 +29,16 @@ def tip_picture(path: Path, session: str, history: History, truth: Truth | None,
         upper = figure.add_subplot(grid[0, :])
         middle = figure.add_subplot(grid[1, :], sharex=upper)
         lower = [figure.add_subplot(grid[2, i]) for i in range(2)]
-        _displacement(upper, history, truth)
-        _acceleration(middle, history, truth)
+        beside = _beside(truth)
+        _displacement(upper, history, beside)
+        _acceleration(middle, history, beside)
         _mark(middle, window)
         upper.tick_params(labelbottom=False)
         middle.set_xlabel("time since first sample, s")
         if history.imu is not None:
             _imu(lower, history.imu, history, window)
         else:
-            _enlarged(lower, history, truth, window)
+            _enlarged(lower, history, beside, window)
 
 
 def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
@@ -61,15 +63,29 @@ def _at(stamps: Array, at: Array, values: Array) -> Array:
     return np.stack([np.interp(stamps, at, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
 
 
-def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
+@dataclass(frozen=True)
+class _Beside:
+    """Motion of the tip by another source than the prediction, drawn beside it: as `Truth`, its name and how it is drawn."""
+
+    name: str
+    motion: Truth
+    style: dict[str, Any]
+
+
+def _beside(truth: Truth | None) -> list[_Beside]:
+    return [] if truth is None else [_Beside("truth", truth, TRUTH)]
+
+
+def _displacement(axes: Axes, history: History, beside: list[_Beside]) -> None:
     shown = 1e3 * history.tip_displacement
     _lines(axes, history, shown, "predicted ")
     arrays = [shown]
-    if truth is not None:
+    for each in beside:
+        stamps, position = each.motion.stamps_s, each.motion.tip_position
         rigid = history.tip_position - history.tip_displacement
-        real = 1e3 * (_at(history.stamps_s, truth.stamps_s, truth.tip_position) - rigid)
-        error = 1e3 * rms_difference(history, history.tip_position, truth.stamps_s, truth.tip_position)
-        _truth_lines(axes, history.stamps_s, real, f"truth (tip apart by {error:.2g} mm rms)")
+        real = 1e3 * (_at(history.stamps_s, stamps, position) - rigid)
+        error = 1e3 * rms_difference(history, history.tip_position, stamps, position)
+        _other_lines(axes, history.stamps_s, real, each, f"{each.name} (tip apart by {error:.2g} mm rms)")
         arrays.append(real)
     axes.set_ylim(*limits(*arrays))
     axes.set_ylabel("displacement, mm")
@@ -77,13 +93,14 @@ def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
     _finish(axes, history)
 
 
-def _acceleration(axes: Axes, history: History, truth: Truth | None) -> None:
+def _acceleration(axes: Axes, history: History, beside: list[_Beside]) -> None:
     _lines(axes, history, history.tip_acceleration, "predicted ")
     arrays = [history.tip_acceleration]
-    if truth is not None:
-        error = rms_difference(history, history.tip_acceleration, truth.stamps_s, truth.tip_acceleration)
-        _truth_lines(axes, truth.stamps_s, truth.tip_acceleration, f"truth (apart by {error:.2g} m/s² rms)")
-        arrays.append(truth.tip_acceleration)
+    for each in beside:
+        stamps, acceleration = each.motion.stamps_s, each.motion.tip_acceleration
+        error = rms_difference(history, history.tip_acceleration, stamps, acceleration)
+        _other_lines(axes, stamps, acceleration, each, f"{each.name} (apart by {error:.2g} m/s² rms)")
+        arrays.append(acceleration)
     axes.set_ylim(*limits(*arrays, around=0.0))
     axes.set_ylabel("acceleration, m/s²")
     axes.set_title("Tip acceleration (of the point, without gravity)")
@@ -96,9 +113,9 @@ def _lines(axes: Axes, history: History, values: Array, prefix: str) -> None:
         axes.plot(stamps, drawn[:, i], color=colour, label=prefix + name)
 
 
-def _truth_lines(axes: Axes, stamps: Array, values: Array, label: str) -> None:
+def _other_lines(axes: Axes, stamps: Array, values: Array, each: _Beside, label: str) -> None:
     for i in range(2):
-        axes.plot(stamps, values[:, i], color=INK, **TRUTH, label="" if i else label)
+        axes.plot(stamps, values[:, i], **each.style, label="" if i else label)
 
 
 def _finish(axes: Axes, history: History) -> None:
@@ -133,15 +150,16 @@ def _imu(panels: list[Axes], imu: ImuTrace, history: History, window: tuple[floa
         _window(axes, history, window)
 
 
-def _enlarged(panels: list[Axes], history: History, truth: Truth | None, window: tuple[float, float]) -> None:
+def _enlarged(panels: list[Axes], history: History, beside: list[_Beside], window: tuple[float, float]) -> None:
     inside = (history.stamps_s >= window[0]) & (history.stamps_s <= window[1])
     for i, (axes, (name, colour)) in enumerate(zip(panels, AXES, strict=True)):
         shown = [history.tip_acceleration[inside, i]]
         axes.plot(history.stamps_s[inside], shown[0], color=colour, label="predicted")
-        if truth is not None:
-            there = (truth.stamps_s >= window[0]) & (truth.stamps_s <= window[1])
-            shown.append(truth.tip_acceleration[there, i])
-            axes.plot(truth.stamps_s[there], shown[1], color=INK, **TRUTH, label="truth")
+        for each in beside:
+            stamps = each.motion.stamps_s
+            there = (stamps >= window[0]) & (stamps <= window[1])
+            shown.append(each.motion.tip_acceleration[there, i])
+            axes.plot(stamps[there], shown[-1], **each.style, label=each.name)
         axes.set_ylim(*limits(*shown))
         axes.set_title(f"Tip acceleration {name}")
         axes.set_ylabel("acceleration, m/s²")

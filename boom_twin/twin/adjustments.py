@@ -27,7 +27,7 @@ class SensorZeros:
     Attributes
     ----------
     values : dict of str to float
-        The newest ones, by channel: m, rad, m/s^2.
+        The newest ones, by channel: m, rad, m/s^2, N.
     """
 
     def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]]) -> None:
@@ -90,8 +90,8 @@ class ResidualBuffer:
         Parameters
         ----------
         sensor : str
-            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m): the zero that explains the residual of
-            ``joint_i``.
+            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), ``cylinder_force_i`` (N), or ``cylinder_i`` (m): the zero that
+            explains the residual of ``joint_i``.
         now : int
         zeros : dict of str to float
             Those that hold.
@@ -105,11 +105,11 @@ class ResidualBuffer:
         """
         if sensor in WHOLE:
             return {name: self._mean(name, now) for name in WHOLE[sensor]}
-        kind, _, number = sensor.partition("_")
+        if self._places[sensor][0] != STROKES:
+            return {sensor: self._mean(sensor, now)}
+        number = sensor.rpartition("_")[2]
         joint = f"joint_{number}"
         mean = self._mean(joint, now)
-        if kind == "joint":
-            return {joint: mean}
         return {sensor: zeros.get(sensor, 0.0) - (mean - zeros.get(joint, 0.0)) * slope(int(number) - 1)}
 
     def _mean(self, channel: str, now: int) -> float:

@@ -16,7 +16,7 @@ from ..estimation.stroke_filter import corners
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, State
-from ..types import NANO, Array, Prediction, Stream
+from ..types import NANO, SENSORS, Array, Prediction, Stream
 from .blocks import CODES
 from .state import NONE, SEEN, TwinState
 
@@ -102,7 +102,7 @@ class Deviations:
     def refresh(
         self, prediction: Prediction, interval: float, filtered: tuple[Array, Array], live: State, angles: Array
     ) -> None:
-        """Follow the posture: variances of joint angles (rad^2) and of the specific force ((m/s^2)^2) into the state.
+        """Follow the posture: what is expected of joint angles, specific force and cylinder forces goes into the state.
 
         Parameters
         ----------
@@ -129,11 +129,12 @@ class Deviations:
             self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
             self._speeds, self._state.clock[SEEN] = None, prediction.stamp
         variances = self._shake(spectrum, prediction.stamp) + self._left(prediction.stamp)
-        joints, acceleration, tip = self.noise.of(variances, self._plan, prediction.tip_angle)
+        joints, acceleration, forces, tip = self.noise.of(variances, self._plan, prediction.tip_angle)
         self.tip = np.sqrt(tip)
         self._state.joints2[:] = self._settings.angle_variance + joints
-        self._state.forces2[:] = self._settings.imu_sigma**2 + acceleration
+        self._state.accelerations2[:] = self._settings.imu_sigma**2 + acceleration
         self._state.pushes2[:] = self.noise.pushes(self._plan, prediction.tip_angle)
+        self._state.forces2[:] = self._settings.variance(SENSORS[Stream.FORCES]) + forces
 
     def _spectrum(self, interval: float, shares: Array, excess: Array) -> StrokeSpectrum:
         variance = self._settings.stroke_variance
@@ -154,7 +155,7 @@ class Deviations:
         return self._shaken
 
 
-ANGLES, IMU = CODES[Stream.ANGLES], CODES[Stream.IMU]
+ANGLES, IMU, FORCES = CODES[Stream.ANGLES], CODES[Stream.IMU], CODES[Stream.FORCES]
 
 
 @inner
@@ -169,10 +170,11 @@ def write_expected(limits, state, live, results, estimates, values, sigmas):
     results, estimates : Results, Estimates
         See `boom_twin.kernels.result_row`.
     values, sigmas : ndarray, shape (measured channels,)
-        In the order of the streams: angles (rad), then the tip IMU's x and z (m/s^2).
+        In the order of the streams: angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
     """
     write_angles(limits, state, live, results, estimates, values, sigmas)
     write_specific_force(limits, state, results, estimates, values, sigmas)
+    write_cylinder_forces(limits, state, results, values, sigmas)
 
 
 @inner
@@ -200,10 +202,18 @@ def write_specific_force(limits, state, results, estimates, values, sigmas):
     x, y = results.tip[2, 0] - limits.gravity[0], results.tip[2, 1] - limits.gravity[1]
     values[at], values[at + 1] = specific_force(x, y, math.cos(angle), math.sin(angle))
     for axis in range(2):
-        variance = state.forces2[axis]
+        variance = state.accelerations2[axis]
         for i in range(state.pushes2.shape[0]):
             variance += state.pushes2[i, axis] * estimates.variances[i]
         sigmas[at + axis] = math.sqrt(variance)
+
+
+@inner
+def write_cylinder_forces(limits, state, results, values, sigmas):
+    """Between barrel and rod, positive in tension."""
+    at = limits.first[FORCES]
+    for i in range(results.cylinder_forces.shape[0]):
+        values[at + i], sigmas[at + i] = results.cylinder_forces[i], math.sqrt(state.forces2[i])
 
 
 def tip_specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:

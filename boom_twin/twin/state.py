@@ -53,7 +53,7 @@ class TwinState(NamedTuple):
     waiting : measured samples that wait for a stroke, by stamp and stream.
     recent : measured less expected, without any zero.
     zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
-    joints2, slopes2, forces2, pushes2 : (n,), (n,), (2,), (n, 2) of the deviations, see
+    joints2, slopes2, accelerations2, pushes2, forces2 : (n,), (n,), (2,), (n, 2), (n,) of the deviations, see
     `boom_twin.twin.expected_readings.Deviations`.
     """
 
@@ -72,8 +72,9 @@ class TwinState(NamedTuple):
     zero_sets: Integers
     joints2: Array
     slopes2: Array
-    forces2: Array
+    accelerations2: Array
     pushes2: Array
+    forces2: Array
 
 
 class Limits(NamedTuple):
@@ -157,7 +158,8 @@ def new_state(joints: int, channels: Integers) -> TwinState:
         strokes=np.zeros(joints), taken=np.zeros(joints),
         past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
         zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
-        joints2=np.zeros(joints), slopes2=np.zeros(joints), forces2=np.zeros(2), pushes2=np.zeros((joints, 2)),
+        joints2=np.zeros(joints), slopes2=np.zeros(joints), accelerations2=np.zeros(2), pushes2=np.zeros((joints, 2)),
+        forces2=np.zeros(joints),
     )  # fmt: skip
 
 

@@ -72,7 +72,7 @@ class Twin:
 
     Notes
     -----
-    Everything predicted is a function of the accepted stroke samples alone; angle and IMU samples only give residuals, each
+    Everything predicted is a function of the accepted stroke samples alone; all other samples only give residuals, each
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
@@ -120,14 +120,14 @@ class Twin:
         Parameters
         ----------
         sensor : str
-            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), or ``cylinder_i`` (m). A stroke has no residual of its own:
-            its zero becomes the one that explains the residual of ``joint_i``, which must read right for that; and the
-            model, which the strokes drive, starts again from rest.
+            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), ``cylinder_force_i`` (N), or ``cylinder_i`` (m). A stroke has no
+            residual of its own: its zero becomes the one that explains the residual of ``joint_i``, which must read right for
+            that; and the model, which the strokes drive, starts again from rest.
 
         Returns
         -------
         dict of str to float
-            What its channels read too much, rad, m or m/s^2; it holds from the next full stroke sample on.
+            What its channels read too much, rad, m, m/s^2 or N; it holds from the next full stroke sample on.
 
         Raises
         ------

@@ -13,12 +13,12 @@ import numpy as np
 
 from ..estimation.look_ahead import follow
 from ..estimation.sensor_model import TURN
-from ..estimation.tip_estimate import advance_estimate, take_angles, take_imu, write_estimate
+from ..estimation.tip_estimate import advance_estimate, take_angles, take_forces, take_imu, write_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
 from ..types import LIMIT, NANO
-from .expected_readings import ANGLES, IMU, INTERVAL, SPAN, write_expected
+from .expected_readings import ANGLES, FORCES, IMU, INTERVAL, SPAN, write_expected
 from .sample_check import SHORTEST
 from .stamp_check import SMOOTHING, STEP
 from .state import (
@@ -340,6 +340,8 @@ def correct_estimate(limits, tip, stream, stamp, residuals):
         take_angles(tip, residuals, limits.first[ANGLES], stamp)
     elif stream == IMU:
         take_imu(tip, residuals, limits.first[IMU], stamp)
+    elif stream == FORCES:
+        take_forces(tip, residuals, limits.first[FORCES], stamp)
 
 
 @kernel

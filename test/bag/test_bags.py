@@ -167,7 +167,7 @@ def test_nothing_is_overwritten(bag: Path, arrays: dict[str, Any]) -> None:
 
 
 def test_shapes_that_disagree_are_refused(tmp_path: Path, arrays: dict[str, Any]) -> None:
-    with pytest.raises(UsageError, match=r"joints has shape \(40, 2\), not \(40, 3\)"):
+    with pytest.raises(UsageError, match=r"joint angles: shape \(40, 2\), not \(40, 3\)"):
         write_session(tmp_path / "bag", **{**arrays, "joints": arrays["joints"][:, :2]}, description={})
     assert not (tmp_path / "bag").exists()
 

@@ -16,8 +16,9 @@ from ruamel.yaml import YAML
 
 pytest.importorskip("exudyn")
 
-from boom_twin.bag.reader import scan
+from boom_twin.bag.reader import read, scan
 from boom_twin.cli.main import main
+from boom_twin.offline.ground_truth import load_truth
 from boom_twin.scene.load import default_text
 
 SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
@@ -41,11 +42,16 @@ def made(scene: Path, out: Path, *more: str) -> Path:
     return out
 
 
-def replayed(scene: Path, bag: Path) -> dict[str, Any]:
-    """What replay says of it."""
+def replayed_folder(scene: Path, bag: Path) -> Path:
+    """What replay makes of it."""
     out = bag.with_name(f"{bag.name}_out")
     assert main(["replay", str(bag), "--scene", str(scene), "--out", str(out)]) == 0
-    return dict(json.loads((out / "summary.json").read_text()))
+    return out
+
+
+def replayed(scene: Path, bag: Path) -> dict[str, Any]:
+    """What replay says of it."""
+    return dict(json.loads((replayed_folder(scene, bag) / "summary.json").read_text()))
 
 
 def test_faulty_sessions_replay(scene: Path, tmp_path: Path) -> None:
@@ -66,6 +72,50 @@ def test_wrong_boom(scene: Path, tmp_path: Path) -> None:
     assert scan(bag).notes["wrong"] == "k, d, EI and masses off by 0.1, rig seed 3"
     assert "faults" not in scan(bag).notes
     assert (bag / "truth.csv.gz").is_file()
+
+
+def test_a_load_that_no_twin_knows(scene: Path, tmp_path: Path) -> None:
+    loads = ["--load", "pump:0.5:400@0.5", "--load", "wind:20"]
+    bag = made(scene, tmp_path / "shaken", *loads, "--rate", "500", "--fault", "tip.payload:more:5@1+0.5..2")
+    notes = scan(bag).notes
+    assert notes["loads"] == "at the tip, wind seed 0: pump:0.5:400:0.1@0.5, wind:20:5" and notes["rate"] == "500 Hz"
+    assert notes["faults"] == "tip.payload:more:5@1+0.5..2"
+    truth = load_truth(bag)
+    assert truth is not None and len(truth.times) == 1500
+    assert truth.load[:, 1].max() == pytest.approx(400.0, abs=1.0) and np.abs(truth.load[:, 0]).max() > 1.0
+    still = load_truth(made(scene, tmp_path / "still"))
+    assert still is not None and not still.load.any()
+    calm, shaken = replayed(scene, tmp_path / "still"), replayed(scene, bag)
+    assert shaken["joint_residual_rms_rad"][0] > 3.0 * calm["joint_residual_rms_rad"][0]
+
+
+def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> None:
+    bag = made(scene, tmp_path / "forces", "--sensors", "forces,angles")
+    assert [topic.name for topic in scan(bag).topics] == ["/cylinder_forces", "/cylinder_strokes", "/joint_angles"]
+    assert scan(bag).notes["forces"] == "noise 100 N, resolution 20 N"
+    rows = json.loads((replayed_folder(scene, bag) / "summary.json").read_text())
+    assert rows["alarms"] == [] and rows["dropped"] == 0
+    kept = read(scan(bag.with_name("forces_out") / "bag"), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
+    ratios = [msg.velocity[0] for _, _, msg in kept if msg.name == ["cylinder_force_1"]]
+    assert len(ratios) == 600 and 0.7 < np.std(ratios) < 1.4
+
+
+@pytest.mark.parametrize(
+    "option, told",
+    [
+        (["--load", "pump:9:130"], "load pump:9:130:0.1: frequency = 9, must be from 0.05 to 2 Hz. Write pump:"),
+        (["--load", "wind:15@3"], "load wind:15:5@3: begins at 3 s, must be before the end at 3 s."),
+        (["--sensors", "angles,gps"], "--sensors angles,gps: gps is no sensor of the rig. Give some of angles, imu, forces."),
+        (["--fault", "cylinder_force_1.sensor:stuck"], "forces are not recorded. Give --sensors angles,forces,imu."),
+        (["--rate", "20"], "rate = 20, must be from 50 to 1000 Hz"),
+    ],
+)
+def test_what_cannot_be_is_told_before_anything_is_simulated(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: list[str], told: str
+) -> None:
+    command = ["rig", str(scene), "--out", str(tmp_path / "none"), "--random", "up", "--duration", "3", *option]
+    assert main(command) == 1
+    assert told in capsys.readouterr().err and not (tmp_path / "none").exists()
 
 
 def test_a_bad_fault_is_told_before_anything_is_simulated(

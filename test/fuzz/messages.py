@@ -31,6 +31,7 @@ from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.types import SENSORS
 
 from .mutate import damaged, pick
 from .verdict import Kind, Verdict
@@ -64,6 +65,8 @@ def _true(random: Generator, number: int, stream: Stream) -> Sample:
         return Sample(stream, stamp, strokes + move + random.normal(0.0, 2e-5, 4))
     if stream is Stream.ANGLES:
         return Sample(stream, stamp, angles + random.normal(0.0, 2e-4, 4))
+    if stream is Stream.FORCES:
+        return Sample(stream, stamp, random.normal((-6e4, 9e4, 2e4, 2e3), 100.0, 4))
     return Sample(stream, stamp, random.normal((0.0, 9.81), 0.05, 2))
 
 
@@ -96,7 +99,7 @@ def make(random: Generator, path: Path) -> Path:
     """Write true and hostile messages in turn."""
     lines, number = [], 0
     for _ in range(LINES):
-        stream = list(Stream)[int(random.choice(3, p=(0.6, 0.25, 0.15)))]
+        stream = list(Stream)[int(random.choice(4, p=(0.55, 0.2, 0.1, 0.15)))]
         if stream is Stream.STROKES:
             number += 1
         if random.random() > HOSTILE:
@@ -174,7 +177,7 @@ class _Listener:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
         self._twin, self._decoder = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
-        self._wires = {stream: CdrDecoder(TYPES[stream]) for stream in Stream}
+        self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 
     def told(self) -> str:
@@ -209,7 +212,8 @@ class _Listener:
                 whole = decode(data, TYPES[stream])
             except PARSE_ERRORS:
                 return "read, and a full decoder refuses it"
-            if list(whole.name) != list(message.name) or not np.array_equal(whole.position, message.position, equal_nan=True):
+            found, expected = (getattr(each, SENSORS[stream].field) for each in (message, whole))
+            if list(whole.name) != list(message.name) or not np.array_equal(expected, found, equal_nan=True):
                 return "read otherwise than a full decoder reads it"
         return self._decoder.put(stream, stamp, message)
 

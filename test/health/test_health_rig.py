@@ -16,7 +16,8 @@ from boom_twin.config.settings import Settings
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import Baseline
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
-from boom_twin.validation.rig.faults import parse, with_faults, wrong_by
+from boom_twin.validation.rig.faults import parse
+from boom_twin.validation.rig.faulty_boom import with_faults, wrong_by
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)  # see test/bench/health/sessions.py
 pytestmark = pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorFindings, SensorMonitor
+from boom_twin.types import SENSORS, Stream
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
@@ -23,7 +24,7 @@ class Watched:
     """Takes block after block."""
 
     def __init__(self) -> None:
-        self.watch, self.block = SensorMonitor(NAMES, "rad"), 0
+        self.watch, self.block = SensorMonitor(NAMES, SENSORS[Stream.ANGLES]), 0
 
     def take(self, found: SensorFindings):
         self.block += 1

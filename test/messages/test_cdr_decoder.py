@@ -12,7 +12,7 @@ from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import TYPES
 from boom_twin.messages.type_store import decode, jazzy, new_message
-from boom_twin.types import Stream
+from boom_twin.types import SENSORS, Stream
 
 
 def counted(calls: list[bytes]) -> Any:
@@ -28,6 +28,13 @@ def joint_state(stamp: int, names: list[str], values: Any, frame: str = "", effo
     fill_header(msg.header, stamp, frame)
     msg.name, msg.position, msg.effort = names, np.array(values, dtype=float), np.zeros(effort)
     return bytes(jazzy().serialize_cdr(msg, TYPES[Stream.STROKES]))
+
+
+def forces(stamp: int, names: list[str], values: Any, frame: str = "", position: int = 0) -> bytes:
+    msg = new_message(TYPES[Stream.FORCES])
+    fill_header(msg.header, stamp, frame)
+    msg.name, msg.effort, msg.position = names, np.array(values, dtype=float), np.arange(float(position))
+    return bytes(jazzy().serialize_cdr(msg, TYPES[Stream.FORCES]))
 
 
 def imu(stamp: int, frame: str, covariance: float, x: float, z: float) -> bytes:
@@ -62,6 +69,19 @@ def test_strokes_of_every_layout() -> None:
                     for k in range(3):
                         same(wire, Stream.STROKES, joint_state(k, names + extra, random.normal(size=count), frame, effort))
     assert len(calls) == 3 * 3 * 3 * 2
+
+
+def test_forces_behind_positions_of_every_layout() -> None:
+    random, calls = np.random.default_rng(2), []
+    wire = CdrDecoder(TYPES[Stream.FORCES], counted(calls), SENSORS[Stream.FORCES].field)
+    names = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
+    for frame in ("", "x" * 7):
+        for extra in ([], ["a", "bb", "ccc"]):
+            for count in (0, 4, 9):
+                for position in (0, 3):
+                    for k in range(3):
+                        same(wire, Stream.FORCES, forces(k, names + extra, random.normal(size=count), frame, position))
+    assert len(calls) == 2 * 2 * 3 * 2
 
 
 def test_accelerations_of_every_frame() -> None:

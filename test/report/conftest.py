@@ -18,13 +18,15 @@ from boom_twin.messages.topic_table import load_topics
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
 
+RECORDED = (Stream.STROKES, Stream.ANGLES, Stream.IMU)
+
 
 def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
     """Stamps (k,) and values of every stream, up to `SECONDS`; all streams have the same stamps."""
     inputs, intake = load_topics().inputs, SampleDecoder(4)
-    roles = {inputs[stream].name: stream for stream in Stream}
-    found: dict[Stream, list] = {stream: [] for stream in Stream}
-    for name, _, message in read(scan(SESSION), {inputs[stream].name: inputs[stream].type for stream in Stream}):
+    roles = {inputs[stream].name: stream for stream in RECORDED}
+    found: dict[Stream, list] = {stream: [] for stream in RECORDED}
+    for name, _, message in read(scan(SESSION), {inputs[stream].name: inputs[stream].type for stream in RECORDED}):
         sample = intake.put(roles[name], stamp_of(message), message)
         found[sample.stream].append(sample)
         if sample.stamp - found[Stream.STROKES][0].stamp > SECONDS * 1e9:
@@ -39,7 +41,7 @@ def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
 def write_sessions(folder: Path) -> None:
     """``healthy`` and ``faulty`` into a folder."""
     found = samples()
-    (stamps, strokes), (_, joints), (_, imu) = (found[stream] for stream in Stream)
+    (stamps, strokes), (_, joints), (_, imu) = (found[stream] for stream in RECORDED)
     notes = {"origin": "synthetic session <of a test> & more"}
     write_session(folder / "healthy", stamps, strokes, joints, imu, notes)
     wrong = joints + WRONG_BY * np.array([0.0, 0.0, 1.0, 0.0]) * (stamps - stamps[0] > WRONG_FROM * 1e9)[:, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -21,11 +22,17 @@ from boom_twin.errors import BoomTwinError
 from boom_twin.ros.demo.processes import DemoProcesses
 from boom_twin.scene.load import default_text
 
+PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 
-def test_a_short_demonstration(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(bag), "--duration", "2", "--out", str(tmp_path / "out"))
+
+def test_a_short_demonstration(spawn: Callable[..., Any], tmp_path: Path) -> None:
+    """Of the session that has every sensor."""
+    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(PUMP), "--duration", "2", "--out", str(tmp_path / "out"))
     assert demo.end() == 0, demo.said()
-    rows = dict(line.split("  ", 1) for line in demo.said().splitlines() if line.startswith(("stroke", "pred", "equal")))
+    rows = dict(line.split("  ", 1) for line in demo.said().splitlines() if "  " in line)
+    position, acceleration = re.findall(r"[\d.]+(?= mm| m/s)", rows["tip error, prediction"])
+    assert 0.0 < float(position) < 5.0 and 0.0 < float(acceleration) < 1.0
+    assert " N rms" in rows["residual cylinder_force_4"] and " mrad rms" in rows["residual joint_1"]
     sent, arrived = int(rows["stroke samples sent"]), int(rows["predictions received"])
     assert 0.98 * sent < arrived <= sent == pytest.approx(400, abs=1)
     assert (tmp_path / "out" / "replay" / "tip.png").stat().st_size > 10_000

@@ -296,7 +296,7 @@ def test_a_shape_is_sent_after_time_was_set_back(twin, still):
     assert [shape is not None for shape in shapes] == [True, False, True, False]
 
 
-@pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e7])
+@pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e8])
 def test_what_no_sensor_reads_is_taken_for_missing(scene, twin, still, absurd):
     clean = Twin(scene)
     follow(clean, still, 100), follow(twin, still, 100)

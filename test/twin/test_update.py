@@ -17,7 +17,7 @@ START = 1_700_000_000_000 * MS
 
 
 def stream(seed: int, count: int = 900, strange: float = 0.02) -> list[Sample]:
-    """Strokes, angles and accelerations at 200 Hz of a boom that moves: late, missing, doubled, far off, of other times."""
+    """All streams at 200 Hz of a boom that moves: late, missing, doubled, far off, of other times."""
     rng, scene = np.random.default_rng(seed), load_scene()
     still = strokes_of_posture(scene, "arch")
     twin, found, shift = Twin(scene), [], 0
@@ -27,6 +27,7 @@ def stream(seed: int, count: int = 900, strange: float = 0.02) -> list[Sample]:
         prediction = twin.update(Sample(Stream.STROKES, stamp, strokes)).prediction
         joints = prediction.joints + rng.normal(size=N) * 2e-4
         own = [(Stream.STROKES, strokes), (Stream.ANGLES, joints), (Stream.IMU, rng.normal(size=2) * 0.05 + (0.0, 9.8))]
+        own.append((Stream.FORCES, prediction.cylinder_forces + 100.0 * rng.normal(size=N)))
         for kind, values in own:
             if rng.random() < strange:
                 values = values.copy()

@@ -9,8 +9,10 @@ from __future__ import annotations
 import sys
 import time
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +32,21 @@ from ...offline.replay import Replay, replay_into
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import REPLAY, result_folder
-from ...types import NANO, Array, Stream
+from ...types import NANO, Array, Stream, sensor_kind
 from ..isolation import add_domain
 from ..startup import require_rclpy
 from .processes import DemoProcesses, demo_processes
 
 Positions = dict[int, tuple[float, float]]
+
+
+TIP_SOURCES: dict[str, tuple[tuple[Output, Callable[[Any], Any]], tuple[Output, Callable[[Any], Any]]]] = {
+    "prediction": (
+        (Output.TIP_POSITION, attrgetter("point")),
+        (Output.TIP_ACCELERATION, attrgetter("accel.linear")),
+    ),
+}
+"""Who tells how the tip moves: outputs of its position and its acceleration, and where the vector is in their messages."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +61,8 @@ class DemoResult:
         Messages that arrived.
     latency_ms : ndarray, shape (2,)
         Median and 99 % quantile from the arrival of a stroke to that of its prediction, both at the recorder.
-    tip_error_rms : float or None
-        Against the truth, m; None without one.
+    tip_errors : dict of str to (float, float)
+        By source, root mean square of position (m) and acceleration (m/s^2) against the truth; empty without one.
     residual_rms : dict of str to float
         Measured minus predicted by channel, in the unit of the sensor.
     """
@@ -59,7 +70,7 @@ class DemoResult:
     positions: Positions
     residual_sets: int
     latency_ms: Array
-    tip_error_rms: float | None
+    tip_errors: dict[str, tuple[float, float]]
     residual_rms: dict[str, float]
 
     def as_text(self, session: str, sent: int, equal: int) -> list[str]:
@@ -74,12 +85,13 @@ class DemoResult:
             ("equal to a replay", f"{equal} of {arrived}, to the last bit"),
             ("latency, median / 99 %", f"{median:.1f} / {slowest:.1f} ms"),
         ]
-        if self.tip_error_rms is not None:
-            rows.append(("tip position error", f"{self.tip_error_rms * 1e3:.2f} mm rms against the rig's truth"))
+        for source, (position, acceleration) in self.tip_errors.items():
+            amount = f"{position * 1e3:.2f} mm, {acceleration:.3f} m/s^2 rms against the rig's truth"
+            rows.append((f"tip error, {source}", amount))
         for name, value in self.residual_rms.items():
-            amount = f"{value * 1e3:.3f} mrad rms" if name.startswith("joint") else f"{value:.3f} m/s^2 rms"
-            rows.append((f"residual {name}", amount))
-        return [f"{name:22s}  {value}" for name, value in rows]
+            factor, unit = sensor_kind(name).shown_unit
+            rows.append((f"residual {name}", f"{value * factor:.3f} {unit} rms"))
+        return [f"{name:25s}  {value}" for name, value in rows]
 
 
 def score(recorded: Path) -> DemoResult:
@@ -96,14 +108,13 @@ def score(recorded: Path) -> DemoResult:
     if not arrived or not strokes:
         raise BagError(f"{recorded}: the node published no prediction.")
     delays = [time - strokes[stamp_of(msg)] for time, msg in arrived if stamp_of(msg) in strokes]
-    positions = {stamp_of(msg): (msg.point.x, msg.point.z) for _, msg in arrived}
     residuals = _messages(session, topics.outputs[Output.RESIDUALS])
     truth = load_truth(recorded)
     return DemoResult(
-        positions=positions,
+        positions={stamp_of(msg): (msg.point.x, msg.point.z) for _, msg in arrived},
         residual_sets=len(residuals),
         latency_ms=np.quantile(delays, [0.5, 0.99]) * 1e-6 if delays else np.full(2, np.nan),
-        tip_error_rms=None if truth is None else _tip_error(positions, truth, min(strokes)),
+        tip_errors={} if truth is None else _tip_errors(session, truth, min(strokes)),
         residual_rms=_residual_rms([msg for _, msg in residuals]),
     )
 
@@ -116,13 +127,21 @@ def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
     return [(time, msg) for _, time, msg in read(session, {topic.absolute: topic.type})]
 
 
-def _tip_error(positions: Positions, truth: TipTruth, first: int) -> float:
-    """Root mean square distance between predicted and true tip, m; `first` is the stamp of the truth's first row."""
-    times = (np.array(list(positions)) - first) * NANO + truth.times[0]
-    x, z = np.array(list(positions.values())).T
-    true = truth.position.T
-    squares = (x - np.interp(times, truth.times, true[0])) ** 2 + (z - np.interp(times, truth.times, true[1])) ** 2
-    return float(np.sqrt(np.mean(squares)))
+def _tip_errors(session: Session, truth: TipTruth, first: int) -> dict[str, tuple[float, float]]:
+    """Of every source whose outputs were recorded; `first` is the stamp (ns) of the truth's first row."""
+    outputs, found = load_topics().outputs, {}
+    for source, roles in TIP_SOURCES.items():
+        (at, position), (when, acceleration) = (_vectors(session, outputs[role], vector_of) for role, vector_of in roles)
+        if len(at) and len(when):
+            found[source] = truth.position_error(at, first, position), truth.acceleration_error(when, first, acceleration)
+    return found
+
+
+def _vectors(session: Session, topic: Topic, vector_of: Callable[[Any], Any]) -> tuple[NDArray[np.int64], Array]:
+    """Stamps (k,), ns, and x and z (k, 2) of the vectors of an output."""
+    messages = [msg for _, msg in _messages(session, topic)]
+    vectors = [vector_of(msg) for msg in messages]
+    return np.array([stamp_of(msg) for msg in messages], np.int64), np.array([(v.x, v.z) for v in vectors]).reshape(-1, 2)
 
 
 def _residual_rms(residuals: list[Any]) -> dict[str, float]:

@@ -20,7 +20,7 @@ from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
 from ...twin.driver import drive
 from ...twin.twin import Twin
-from ...types import Stream
+from ...types import SENSORS, Stream
 from ..log import Log
 from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
@@ -100,7 +100,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for name, streams in self._topics.heard.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, CdrDecoder(topic.type)))
+            decoder = CdrDecoder(topic.type, field=SENSORS[streams[0]].field)
+            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, decoder))
             self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
         heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
         self._log.info(f"active; listening to {heard}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -14,17 +15,17 @@ from std_srvs.srv import Trigger
 from ...errors import UsageError
 from ...twin.adjustments import WHOLE
 from ...twin.twin import Twin
-from ...types import Change, Report
+from ...types import SENSORS, Change, Report
 from ..log import Log
 
 PAUSE = 1.0
 """Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
-FROM_REST = ("reset", "rezero/cylinder_")
+FROM_REST = re.compile(r"reset|rezero/cylinder_\d+")
 INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
 
 class Services:
-    """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``~/rezero/cylinder_i``, ``~/rezero/tip_imu``.
+    """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
 
     Besides, ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from. All are std_srvs/Trigger.
 
@@ -54,7 +55,8 @@ class Services:
     ) -> None:
         self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
-        sensors = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in numbers] + list(WHOLE)
+        single = [kind.stem for kind in SENSORS.values() if not kind.ends]
+        sensors = [f"{stem}_{number}" for stem in single for number in numbers] + list(WHOLE)
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
         self._called: dict[str, float] = {}
@@ -82,7 +84,7 @@ class Services:
     def _limit(self, name: str) -> None:
         """Refuse what would keep the node busy with starts from rest."""
         now = time.monotonic()
-        if name.startswith(FROM_REST):
+        if FROM_REST.fullmatch(name):
             if now - self._called.get(name, -PAUSE) < PAUSE:
                 told = f"{name} was called less than {PAUSE:g} s ago, and the model starts from rest with it"
                 raise UsageError(f"{told}. Call it again later.")

@@ -1,4 +1,4 @@
-"""Faults of the virtual rig: physical faults in its scene, random wrong parameters, sensor faults.
+"""Faults of the virtual rig: how they are written, and what those of sensors do to readings.
 
 ==============================  =========  ======================================================================
 cause                           kind       size
@@ -8,21 +8,20 @@ cause                           kind       size
 ``tip.payload``                 more       kg
 ``line_fill``                   more       kg/m
 ``cylinder_i.rod.clearance``    play       radial clearance of the rod pin, m
-``joint_i.sensor``              bias       rad (of a ``cylinder_i.sensor``: m)
-(``cylinder_i.sensor``)         drift      rad/s (m/s)
-..                              scale      share by which it reads too much
+``joint_i.sensor``              bias       rad (of a ``cylinder_i.sensor``: m, of a ``cylinder_force_i.sensor``: N)
+(``cylinder_i.sensor``,         drift      rad/s (m/s, N/s)
+``cylinder_force_i.sensor``)    scale      share by which it reads too much
 ..                              stuck      none: it repeats the last reading before the onset
 ..                              noisy      factor on the noise
-..                              spikes     rad (m), up or down, of one reading in fifty
+..                              spikes     rad (m, N), up or down, of one reading in fifty
 ..                              dropout    share of readings without a value
 ``joint_angles.delay``          late       s by which stamps come after the reading
 ``joint_angles.dropout``        missing    share of messages that are not there (``cylinder_strokes.dropout`` too)
 ==============================  =========  ======================================================================
 
-The first five are physical: they are in the scene that is simulated, from the start. The others are of sensors, from their
-onset on.
-
-They act on readings that are rounded already, as a fault behind the sensor does.
+The first five are physical: they are in the boom that is simulated, see `faulty_boom`. The others are
+of sensors, and act on readings that are rounded already, as a fault behind the sensor does. Each begins at its onset, grows
+linearly to its size over its ramp, and goes over as long a time from its end on; a pin has its play from the start.
 """
 
 from __future__ import annotations
@@ -33,11 +32,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import UsageError
-from ...scene.edit import parameter, parameter_names, scaled, with_parameters
-from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
+from ...scene.schema import Scene
 from ...types import SECOND, Array
 from .session import RigSession
 
@@ -53,36 +50,39 @@ _HOLDS = {
 }
 _SENSOR = {"bias": _ANY, "drift": _ANY, "scale": _ANY, "stuck": None, "noisy": _FACTOR, "spikes": _ANY, "dropout": _SHARE}
 _PHYSICAL = ("softer", "more", "play")
+_WITHOUT_RAMP = ("drift", "stuck", "play")
 _CAUSES: dict[str, dict[str, str | None]] = {
     r"cylinder_([1-9]\d*)\.k": {"softer": _LOSS},
     r"section_([1-9]\d*)\.EI": {"softer": _LOSS},
     r"tip\.payload": {"more": _MORE},
     r"line_fill": {"more": _MORE},
     r"cylinder_([1-9]\d*)\.rod\.clearance": {"play": _PLAY},
-    r"(?:joint|cylinder)_([1-9]\d*)\.sensor": _SENSOR,
+    r"(?:joint|cylinder|cylinder_force)_([1-9]\d*)\.sensor": _SENSOR,
     r"joint_angles\.delay": {"late": _MORE},
     r"(?:joint_angles|cylinder_strokes)\.dropout": {"missing": _SHARE},
 }
 CAUSES = (
     "cylinder_i.k, section_i.EI, tip.payload, line_fill, cylinder_i.rod.clearance, joint_i.sensor, cylinder_i.sensor, "
-    "joint_angles.delay, joint_angles.dropout, cylinder_strokes.dropout"
+    "cylinder_force_i.sensor, joint_angles.delay, joint_angles.dropout, cylinder_strokes.dropout"
 )
 
 
 @dataclass(frozen=True, slots=True)
 class RigFault:
-    """One fault: its cause, kind and size as in the table above, and its onset (s after the start).
+    """One fault: its cause, kind and size as in the table above; its onset and end (s after the start), and its ramp (s).
 
     Raises
     ------
     UsageError
-        There is no such cause, it has no such kind, or size or onset are out of bounds.
+        There is no such cause, it has no such kind, or size or times are out of bounds.
     """
 
     cause: str
     kind: str
     size: float = 0.0
     onset: float = 0.0
+    ramp: float = 0.0
+    end: float = math.inf
 
     def __post_init__(self) -> None:
         kinds = next((kinds for form, kinds in _CAUSES.items() if re.fullmatch(form, self.cause)), None)
@@ -97,17 +97,44 @@ class RigFault:
             raise UsageError(f"fault {self.cause}:{self.kind}: size = {self.size:g}, must be {bound}. Give it in SI units.")
         if not 0.0 <= self.onset < math.inf:
             raise UsageError(f"fault {self}: onset = {self.onset:g} s, must be finite and at least 0.")
-        if self.is_physical and self.onset:
-            raise UsageError(f"fault {self}: changes of the boom hold from the start of a session. Leave out @{self.onset:g}.")
+        if not 0.0 <= self.ramp < math.inf:
+            raise UsageError(f"fault {self}: ramp = {self.ramp:g} s, must be finite and at least 0.")
+        if not self.onset + self.ramp < self.end:
+            whole = self.onset + self.ramp
+            raise UsageError(f"fault {self}: end = {self.end:g} s, must be after {whole:g} s, when it is there in full.")
+        if self.ramp and self.kind in _WITHOUT_RAMP:
+            raise UsageError(f"fault {self}: {self.kind} does not come on over a time. Leave out +{self.ramp:g}.")
+        if self.kind == "play" and (self.onset or self.end < math.inf):
+            raise UsageError(f"fault {self}: a pin has its play from the start to the end. Leave out what follows @.")
 
     def __str__(self) -> str:
         size = f":{self.size:g}" if self.size else ""
-        return f"{self.cause}:{self.kind}{size}" + (f"@{self.onset:g}" if self.onset else "")
+        ramp, end = f"+{self.ramp:g}" if self.ramp else "", f"..{self.end:g}" if self.end < math.inf else ""
+        return f"{self.cause}:{self.kind}{size}" + (f"@{self.onset:g}{ramp}{end}" if self.onset or ramp or end else "")
+
+    def share(self, times: Array) -> Array:
+        """How much of it is there at `times` (m,) in s: 0 before the onset, 1 in full."""
+        return self._begun(times, self.onset) - self._begun(times, self.end)
+
+    def _begun(self, times: Array, at: float) -> Array:
+        if self.ramp == 0.0:
+            return np.where(times >= at, 1.0, 0.0)
+        return np.clip((times - at) / self.ramp, 0.0, 1.0)
+
+    @property
+    def is_there_at_first(self) -> bool:
+        """Whether it is there in full from the start."""
+        return self.onset == self.ramp == 0.0
 
     @property
     def is_physical(self) -> bool:
         """Whether it is of the boom, not of a sensor."""
         return self.kind in _PHYSICAL
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is there in full from the start to the end."""
+        return self.is_there_at_first and self.end == math.inf
 
     @property
     def number(self) -> int:
@@ -116,26 +143,35 @@ class RigFault:
         return 0 if found is None else int(found[1])
 
 
+FORM = "CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]"
+
+
 def parse(text: str) -> RigFault:
-    """The fault that is written ``CAUSE:KIND[:SIZE][@ONSET]``.
+    """The fault that is written as `FORM` says.
 
     Raises
     ------
     UsageError
         The text has not that form, or see `RigFault`.
     """
-    words, _, onset = text.partition("@")
+    words, _, when = text.partition("@")
     cause, _, rest = words.partition(":")
     kind, _, size = rest.partition(":")
+    begin, _, end = when.partition("..")
+    onset, _, ramp = begin.partition("+")
     try:
-        return RigFault(cause, kind, float(size or 0.0), float(onset or 0.0))
+        return RigFault(cause, kind, float(size or 0.0), float(onset or 0.0), float(ramp or 0.0), float(end or math.inf))
     except ValueError:
-        raise UsageError(f"fault {text}: size and onset must be numbers. Write CAUSE:KIND[:SIZE][@ONSET].") from None
+        raise UsageError(f"fault {text}: size, onset, ramp and end must be numbers. Write {FORM}.") from None
 
 
 def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
-    """UsageError if a fault is of a part that `scene` does not have, or begins after `duration` (s)."""
+    """UsageError if a fault is of a part that `scene` has not, or begins after `duration` (s), or two change one thing."""
     parts = len(scene.joints)
+    changing = [fault.cause for fault in faults if fault.is_physical and not fault.is_constant]
+    for fault in faults:
+        if fault.is_physical and not fault.is_constant and changing.count(fault.cause) > 1:
+            raise UsageError(f"fault {fault}: {fault.cause} changes by another fault too. Give one of them.")
     for fault in faults:
         if fault.number > parts:
             raise UsageError(f"fault {fault}: the boom has joints, cylinders and sections 1 to {parts}. Give one of them.")
@@ -143,80 +179,11 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
             raise UsageError(f"fault {fault}: begins at {fault.onset:g} s, must be before the end at {duration:g} s.")
 
 
-JOURNAL = 0.025  # m, radius of a pin that the scene does not list
-
-
-def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
-    """`scene` with the physical ones of `faults`; those of sensors are passed over.
-
-    A pin that the scene does not list gets a journal of 25 mm radius.
-
-    Raises
-    ------
-    UsageError
-        The scene has no such parameter, for instance no oil spring.
-    """
-    for fault in faults:
-        if fault.kind == "play":
-            scene = _worn(scene, fault.cause.removesuffix(".clearance"), fault.size)
-        elif fault.is_physical:
-            now = parameter(scene, fault.cause)
-            changed = now + fault.size if fault.kind == "more" else now * (1.0 - fault.size)
-            scene = with_parameters(scene, {fault.cause: changed})
-    return scene
-
-
-def _worn(scene: Scene, at: str, more: float) -> Scene:
-    """The pin `at` with `more` radial clearance (m) than it has."""
-    clearance = scene.clearance or Clearance()
-    pins = {pin.at: pin for pin in clearance.pins}
-    pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)
-    pins[at] = pin.model_copy(update={"radial_clearance": pin.radial_clearance + more})
-    return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
-
-
-MOST = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
-KEYS = ("k", "d", "EI", "mass")
-
-
-def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
-    """Every k, d, EI and section mass, mass of link, barrel and rod multiplied by 1 + `share` z of its own.
-
-    z is standard normal, drawn again beyond 2; masses take their inertia with them. Payload, line fill, geometry and material
-    damping stay, for they are known, or nothing is predicted from them that a sensor could tell.
-
-    Raises
-    ------
-    UsageError
-        `share` is not from 0 to 0.3.
-    """
-    if not 0.0 <= share <= MOST:
-        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST:g}, as a share of every parameter. 0.02 is 2 %.")
-    rng = np.random.default_rng([seed, 2])
-    names = [name for name in parameter_names(scene) if name.split(".")[-1] in KEYS]
-    scene = with_parameters(scene, {name: parameter(scene, name) * _factor(share, rng) for name in names})
-    return scene.model_copy(update={"joints": tuple(_joint(joint, share, rng) for joint in scene.joints)})
-
-
-def _factor(share: float, rng: np.random.Generator) -> float:
-    while abs(z := rng.standard_normal()) > 2.0:
-        pass
-    return 1.0 + share * float(z)
-
-
-def _joint(joint: Joint, share: float, rng: np.random.Generator) -> Joint:
-    links = {key: getattr(joint, key) for key in ("mL", "mR")}
-    parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in ("barrel", "rod")}
-    cylinder = {key: scaled(part, _factor(share, rng)) for key, part in parts.items() if part is not None}
-    changes = {key: mass * _factor(share, rng) for key, mass in links.items() if mass is not None}
-    return joint.model_copy(update={**changes, "cylinder": joint.cylinder.model_copy(update=cylinder)})
-
-
 SPIKE_SHARE = 0.02  # of the readings
 
 
 def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSession:
-    """The session with the sensor faults among `faults`; readings before an onset stay, bit for bit, and so does the truth.
+    """The session with the sensor faults among `faults`; readings without a fault stay, bit for bit, and so does the truth.
 
     Parameters
     ----------
@@ -230,39 +197,51 @@ def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSess
 
 
 def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) -> RigSession:
-    after = session.truth["t"] >= fault.onset
+    share = fault.share(session.truth["t"])
     if fault.kind == "late":
-        late = np.where(after, round(fault.size * SECOND), 0)
+        late = np.rint(share * round(fault.size * SECOND)).astype(np.int64)
         return replace(session, angle_stamps=session.angle_stamps + late)
-    name = "joints" if fault.cause.startswith("joint") else "strokes"
+    name = _readings(fault.cause)
     values: Array = getattr(session, name).copy()
     if fault.kind == "missing":
-        values[after & (rng.random(len(after)) < fault.size)] = np.nan
+        values[rng.random(len(share)) < share * fault.size] = np.nan
     else:
-        column = fault.number - 1
+        column, there = fault.number - 1, share > 0.0
         true = session.truth[name][:, column]
-        values[after, column] = _spoiled(fault, session.truth["t"], values[:, column], true, after, rng)[after]
-    return replace(session, joints=values) if name == "joints" else replace(session, strokes=values)
+        values[there, column] = _spoiled(fault, session.truth["t"], values[:, column], true, share, rng)[there]
+    match name:
+        case "joints":
+            return replace(session, joints=values)
+        case "forces":
+            return replace(session, forces=values)
+        case _:
+            return replace(session, strokes=values)
 
 
-def _spoiled(
-    fault: RigFault, times: Array, read: Array, true: Array, after: NDArray[np.bool_], rng: np.random.Generator
-) -> Array:
-    """Readings (m,) of the one sensor as if the fault had always been there; those before the onset are not used."""
+def _readings(cause: str) -> str:
+    """Which readings of a session a fault of a sensor is in; their truth has the same name."""
+    if cause.startswith("cylinder_force"):
+        return "forces"
+    return "joints" if cause.startswith("joint") else "strokes"
+
+
+def _spoiled(fault: RigFault, times: Array, read: Array, true: Array, share: Array, rng: np.random.Generator) -> Array:
+    """Readings (m,) of the one sensor with `share` (m,) of the fault; those with nothing of it are not used."""
+    size = share * fault.size
     match fault.kind:
         case "bias":
-            return read + fault.size
+            return read + size
         case "drift":
-            return read + fault.size * (times - fault.onset)
+            return read + size * (times - fault.onset)
         case "scale":
-            return read * (1.0 + fault.size)
+            return read * (1.0 + size)
         case "stuck":
-            last = max(0, int(np.argmax(after)) - 1)
+            last = max(0, int(np.argmax(share > 0.0)) - 1)
             return np.full_like(read, read[last])
         case "noisy":
-            return true + fault.size * (read - true)
+            return true + (1.0 + share * (fault.size - 1.0)) * (read - true)
         case "spikes":
             hit = rng.random(len(read)) < SPIKE_SHARE
-            return np.asarray(read + fault.size * hit * rng.choice([-1.0, 1.0], len(read)))
+            return np.asarray(read + size * hit * rng.choice([-1.0, 1.0], len(read)))
         case _:  # dropout
-            return np.where(rng.random(len(read)) < fault.size, np.nan, read)
+            return np.where(rng.random(len(read)) < size, np.nan, read)

@@ -6,34 +6,53 @@ A surrogate: no sensor was measured for it. The instant of sampling is the stamp
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import UsageError
 from ...scene.schema import Point
 from ...types import SECOND, Array
+
+RATE = 200.0  # Hz
+RATES = 50.0, 1000.0
+"""Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """Sampling and noise: Hz, s, m, rad, m/s^2; a resolution of zero means no rounding.
+    """Sampling and noise: Hz, s, m, rad, m/s^2, N; a resolution of zero means no rounding.
 
-    Standard deviations are those before rounding.
+    Standard deviations are those before rounding. Forces are as of load pins, or of pressures in both chambers: 100 N is a
+    thousandth of what the largest cylinder of the default scene bears.
+
+    Raises
+    ------
+    UsageError
+        The rate is not from 50 to 1000 Hz.
     """
 
-    rate: float = 200.0
+    rate: float = RATE
     jitter: float = 2e-4
     stroke_sigma: float = 2e-5
     stroke_resolution: float = 5e-6
     angle_sigma: float = math.radians(0.01)
     angle_resolution: float = math.radians(0.005)
     imu_sigma: float = 0.05
+    force_sigma: float = 100.0
+    force_resolution: float = 20.0
+
+    def __post_init__(self) -> None:
+        low, high = RATES
+        if not low <= self.rate <= high:
+            raise UsageError(f"rate = {self.rate:g}, must be from {low:g} to {high:g} Hz, at which the sensors are sampled.")
 
 
-def noise_free() -> Sensors:
+def noise_free(rate: float = RATE) -> Sensors:
     """The same sampling instants, the true values."""
-    return Sensors(stroke_sigma=0.0, stroke_resolution=0.0, angle_sigma=0.0, angle_resolution=0.0, imu_sigma=0.0)
+    exact = dict.fromkeys((field.name for field in fields(Sensors) if field.name.endswith(("_sigma", "_resolution"))), 0.0)
+    return replace(Sensors(rate), **exact)
 
 
 def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.random.Generator) -> NDArray[np.int64]:

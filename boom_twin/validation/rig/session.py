@@ -6,6 +6,7 @@ Synthetic by construction: the scene's parameters are surrogates, and no hardwar
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -17,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import SECOND, Array
-from .exudyn.solve import simulate
+from .exudyn.solve import Change, TipLoad, simulate
 from .exudyn.system import gravity_in_base
 from .motion import Programme
 from .sensors import Sensors, read, sampling_stamps, specific_force
@@ -38,9 +39,12 @@ class RigSession:
         As the transducers read them; m, rad.
     imu : ndarray, shape (m, 2)
         Specific force at the tip along its x and z; m/s^2.
+    forces : ndarray, shape (m, n)
+        Of the cylinders, positive in tension; N.
     truth : dict of ndarray
         ``t`` (m,) s after the start; ``strokes`` (m, n) m; ``joints`` (m, n) rad; ``forces`` (m, n) N; ``tip``,
-        ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad.
+        ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad; where there is one, the external force at the tip ``load``
+        (m, 2) N.
     """
 
     stamps: NDArray[np.int64]
@@ -48,6 +52,7 @@ class RigSession:
     joints: Array
     imu: Array
     angle_stamps: NDArray[np.int64]
+    forces: Array
     truth: dict[str, Array]
 
     def save_truth(self, path: Path) -> None:
@@ -63,6 +68,7 @@ class RigSession:
     def _columns(self) -> list[tuple[str, int, Array]]:
         """Name with unit, decimals and values of every column of the truth."""
         truth, number = self.truth, range(self.strokes.shape[1])
+        load = [] if "load" not in truth else [(f"tip_load_{axis}_N", 3, truth["load"][:, i]) for i, axis in enumerate("xy")]
         return [
             ("t_s", 9, truth["t"]),
             ("tip_x_m", 6, truth["tip"][:, 0]),
@@ -73,6 +79,7 @@ class RigSession:
             *((f"stroke_{i + 1}_m", 7, truth["strokes"][:, i]) for i in number),
             *((f"joint_{i + 1}_rad", 7, truth["joints"][:, i]) for i in number),
             *((f"cylinder_force_{i + 1}_N", 1, truth["forces"][:, i]) for i in number),
+            *load,
         ]
 
 
@@ -88,24 +95,31 @@ def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
     }
 
 
-def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors: Sensors, seed: int) -> RigSession:
+def observe(
+    scene: Scene,
+    programme: Programme,
+    rows: dict[str, Array],
+    sensors: Sensors,
+    seed: int,
+    load: TipLoad | None = None,
+) -> RigSession:
     """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
 
     Parameters
     ----------
     rows : dict of ndarray
-        What `simulate` gave for this programme.
+        What `simulate` gave for this programme and this load.
 
     Returns
     -------
     RigSession
         Samples of all sensors, and the truth beside them.
     """
-    clock, stroke_noise, angle_noise, imu_noise = np.random.default_rng(seed).spawn(4)
+    clock, stroke_noise, angle_noise, imu_noise, force_noise = np.random.default_rng(seed).spawn(5)
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
     truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
-    truth |= {"t": times, "strokes": programme(times)[0]}
+    truth |= {"t": times, "strokes": programme(times)[0]} | ({} if load is None else {"load": load(times)})
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
     return RigSession(
         stamps,
@@ -113,6 +127,7 @@ def observe(scene: Scene, programme: Programme, rows: dict[str, Array], sensors:
         read(truth["joints"], sensors.angle_sigma, sensors.angle_resolution, angle_noise),
         read(force, sensors.imu_sigma, 0.0, imu_noise),
         stamps,
+        read(truth["forces"], sensors.force_sigma, sensors.force_resolution, force_noise),
         truth,
     )
 
@@ -125,7 +140,9 @@ def record(
     seed: int = 0,
     step: float = 5e-4,
     elements: int = 16,
+    load: TipLoad | None = None,
+    changes: Sequence[Change] = (),
 ) -> RigSession:
-    """Simulate a programme for `duration` (s) and sample it."""
-    rows = simulate(scene, programme, duration, step, 2 * step, elements)
-    return observe(scene, programme, rows, sensors or Sensors(), seed)
+    """Simulate a programme for `duration` (s) under a load, while the boom changes, and sample it."""
+    rows = simulate(scene, programme, duration, step, 2 * step, elements, load, changes)
+    return observe(scene, programme, rows, sensors or Sensors(), seed, load)

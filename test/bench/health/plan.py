@@ -13,7 +13,8 @@ import numpy as np
 
 from boom_twin.scene import load_scene
 from boom_twin.scene.schema import Scene
-from boom_twin.validation.rig.faults import RigFault, wrong_by
+from boom_twin.validation.rig.faults import RigFault
+from boom_twin.validation.rig.faulty_boom import wrong_by
 
 WRONG = 0.02
 INSTANCES = (1, 2, 3)

@@ -26,8 +26,9 @@ from plan import INSTANCES, Job, instance, jobs
 from boom_twin.errors import SolverError
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, parameter_names
-from boom_twin.validation.rig import Programme, Scheme, Sensors, Session, at_rest, move, observe, random_programme
-from boom_twin.validation.rig.faults import spoil, with_faults
+from boom_twin.validation.rig import Programme, RigSession, Scheme, Sensors, at_rest, move, observe, random_programme
+from boom_twin.validation.rig.faults import spoil
+from boom_twin.validation.rig.faulty_boom import with_faults
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)
 STEP_OF_PLAY, SCHEME_OF_PLAY = 2e-3, Scheme(kept=0)
@@ -52,8 +53,8 @@ def spoilt(job: Job, healthy: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     kept = times < job.duration
     part = {name: values if name in ("first", "moves") else values[kept] for name, values in healthy.items()}
     truth = {name.removeprefix("true_"): values for name, values in part.items() if name.startswith("true_")}
-    names = ("stamps", "strokes", "joints", "imu", "angle_stamps")
-    session = Session(*(part[name] for name in names), truth | {"t": times[kept]})
+    names = ("stamps", "strokes", "joints", "imu", "angle_stamps", "forces")
+    session = RigSession(*(part[name] for name in names), truth | {"t": times[kept]})
     return part | _arrays(spoil(session, [job.fault], job.seed))
 
 
@@ -92,9 +93,9 @@ def _base(job: Job, folder: Path) -> dict[str, np.ndarray]:
     return stored.load(path) if path.is_file() else simulated(job)
 
 
-def _arrays(session: Session) -> dict[str, np.ndarray]:
+def _arrays(session: RigSession) -> dict[str, np.ndarray]:
     truth = {f"true_{name}": values.astype(np.float32) for name, values in session.truth.items() if name != "t"}
-    read = {name: getattr(session, name) for name in ("stamps", "angle_stamps", "strokes", "joints", "imu")}
+    read = {name: getattr(session, name) for name in ("stamps", "angle_stamps", "strokes", "joints", "imu", "forces")}
     return read | truth
 
 

@@ -15,19 +15,20 @@ from boom_twin.validation.rig.faults import parse, spoil
 from boom_twin.validation.rig.session import RigSession
 
 ANGLE, ONSET, LAST, NANO = 0.15, 4.0, 12.0, 1e-9
-session, topics, scene, found = scan(Path(sys.argv[1])), load_topics().inputs, load_scene(), {stream: [] for stream in Stream}
-streams, decoder = {f"/{topic.name}": stream for stream, topic in topics.items()}, SampleDecoder(len(scene.joints))
+RECORDED = (Stream.STROKES, Stream.ANGLES, Stream.IMU)
+session, topics, scene, found = scan(Path(sys.argv[1])), load_topics().inputs, load_scene(), {stream: [] for stream in RECORDED}
+streams, decoder = {f"/{topics[stream].name}": stream for stream in RECORDED}, SampleDecoder(len(scene.joints))
 for name, log, message in read(session, {name: topics[stream].type for name, stream in streams.items()}):
     if (log - session.start) * NANO > LAST:
         break
     sample = decoder.put(streams[name], stamp_of(message), message)
     found[sample.stream].append((sample.stamp, sample.values))
 stamps = np.array([stamp for stamp, _ in found[Stream.STROKES]])
-strokes, joints, imu = (np.array([values for _, values in found[stream]]) for stream in Stream)
+strokes, joints, imu = (np.array([values for _, values in found[s]]) for s in RECORDED)
 times = (stamps - stamps[0]) * NANO
 
 fault = parse(f"tip_imu.mount:turned:{ANGLE}@{ONSET}")
-spoilt = spoil(RigSession(stamps, strokes, joints, imu, stamps, {"t": times}), [fault], 0)
+spoilt = spoil(RigSession(stamps, strokes, joints, imu, stamps, 0.0 * joints, {"t": times}), [fault], 0)
 c, s = math.cos(ANGLE), math.sin(ANGLE)
 assert np.array_equal(spoilt.imu[times < ONSET], imu[times < ONSET]) and np.array_equal(spoilt.joints, joints)
 assert np.allclose(spoilt.imu[-1], [c * imu[-1, 0] + s * imu[-1, 1], c * imu[-1, 1] - s * imu[-1, 0]])
@@ -37,7 +38,7 @@ def alarms(readings):
     """First time (s) of every cause that was ever named, with its last estimate."""
     twin, named = Twin(scene, baseline=Baseline()), {}
     for stamp, *rows in zip(stamps.tolist(), strokes, joints, readings, strict=True):
-        for stream, values in zip(Stream, rows, strict=True):
+        for stream, values in zip(RECORDED, rows, strict=True):
             health = twin.update(Sample(stream, stamp, values)).health
             for alarm in () if health is None else health.alarms:
                 since, _ = named.get(alarm.cause, ((stamp - stamps[0]) * NANO, 0.0))

@@ -19,6 +19,10 @@ from boom_twin.validation.rig.faults import RigFault, check, parse
         ("cylinder_1.sensor:stuck@12.5", RigFault("cylinder_1.sensor", "stuck", onset=12.5)),
         ("cylinder_4.rod.clearance:play:0.0005", RigFault("cylinder_4.rod.clearance", "play", 5e-4)),
         ("joint_angles.delay:late:0.03@10", RigFault("joint_angles.delay", "late", 0.03, 10.0)),
+        ("cylinder_2.k:softer:0.4@20+5", RigFault("cylinder_2.k", "softer", 0.4, 20.0, 5.0)),
+        ("tip.payload:more:20@0+2..40", RigFault("tip.payload", "more", 20.0, 0.0, 2.0, 40.0)),
+        ("section_3.EI:softer:0.4@0..40", RigFault("section_3.EI", "softer", 0.4, end=40.0)),
+        ("cylinder_force_2.sensor:bias:500", RigFault("cylinder_force_2.sensor", "bias", 500.0)),
     ],
 )
 def test_text_and_back(text, fault):
@@ -35,8 +39,13 @@ def test_text_and_back(text, fault):
         ("joint_1.sensor:bias:inf", "size = inf, must be finite"),
         ("cylinder_2.k:softer:30", "size = 30, must be above 0 and below 1, a share"),
         ("joint_1.sensor:stuck:3", "it has no size"),
-        ("tip.payload:more:x", "size and onset must be numbers. Write CAUSE:KIND"),
-        ("tip.payload:more:20@5", "hold from the start of a session. Leave out @5"),
+        ("tip.payload:more:x", "size, onset, ramp and end must be numbers. Write CAUSE:KIND"),
+        ("tip.payload:more:20@5+x", "size, onset, ramp and end must be numbers. Write CAUSE:KIND"),
+        ("tip.payload:more:20@5+-1", "ramp = -1 s, must be finite and at least 0"),
+        ("tip.payload:more:20@5+2..7", "end = 7 s, must be after 7 s, when it is there in full"),
+        ("tip.payload:more:20@5..nan", "end = nan s, must be after 5 s"),
+        ("joint_1.sensor:drift:1@5+2", "drift does not come on over a time. Leave out \\+2"),
+        ("cylinder_1.rod.clearance:play:0.0005@5", "play from the start to the end. Leave out what follows @"),
         ("joint_1.sensor:bias:1@-1", "onset = -1 s, must be finite and at least 0"),
         ("cylinder_1.rod.clearance:play:0.2", "must be above 0 and below 0.005 m"),
     ],
@@ -51,5 +60,7 @@ def test_refused_of_a_scene():
     check([parse("joint_4.sensor:bias:1@59")], scene, 60.0)
     with pytest.raises(UsageError, match=r"cylinder_5\.k.*sections 1 to 4"):
         check([parse("cylinder_5.k:softer:0.1")], scene, 60.0)
+    with pytest.raises(UsageError, match=r"cylinder_1\.k changes by another fault too"):
+        check([parse("cylinder_1.k:softer:0.1@5"), parse("cylinder_1.k:softer:0.2@9")], scene, 60.0)
     with pytest.raises(UsageError, match="begins at 60 s, must be before the end at 60 s"):
         check([parse("joint_4.sensor:bias:1@60")], scene, 60.0)

@@ -12,9 +12,11 @@ pytest.importorskip("exudyn")
 from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, parameter_names
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Scene
-from boom_twin.validation.rig import Move, Programme, Sensors, record
-from boom_twin.validation.rig.faults import parse, with_faults, wrong_by
+from boom_twin.validation.rig import Move, Programme, Sensors, at_rest, move, record, simulate, statics
+from boom_twin.validation.rig.faults import parse
+from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by
 
 
 def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
@@ -48,6 +50,55 @@ def test_play_grows():
 def test_no_oil_spring_cannot_soften(cantilever):
     with pytest.raises(UsageError, match=r"cylinder_1\.k: the scene has no such parameter"):
         with_faults(Scene.model_validate(cantilever), [parse("cylinder_1.k:softer:0.3")])
+
+
+CAUSES = ["cylinder_2.k:softer:0.4", "section_3.EI:softer:0.4", "tip.payload:more:20", "line_fill:more:2"]
+
+
+@pytest.mark.parametrize("text", CAUSES)
+def test_changes_over_a_time_to_the_equilibrium_of_the_changed_boom_and_back(text):
+    """Slowly, with 4 elements a section; what is left is the swing that a change of some seconds leaves."""
+    scene, fault = load_scene(), parse(f"{text}@0.5+4..7")
+    strokes = strokes_of_posture(scene, "arch")
+    start, changing = changes(scene, [fault])
+    rows = simulate(start, Programme(tuple(strokes), ()), 13.0, 5e-3, 5e-3, 4, changes=changing)
+    tip, times = np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]), rows["t_s"]
+    healthy, faulty = (np.array(statics(boom, strokes, 4)["tip_m"]) for boom in (scene, with_faults(scene, [fault])))
+    assert tip[0] == pytest.approx(healthy, abs=1e-8)
+    moved = np.hypot(*(faulty - healthy))
+    for first, last, expected in ((5.0, 7.0, faulty), (11.5, 13.0, healthy)):
+        found = tip[(times > first) & (times < last)].mean(axis=0)
+        assert np.hypot(*(found - expected)) < 0.03 * moved, (first, moved)
+
+
+def test_a_fault_that_ends_is_there_at_first():
+    scene, fault = load_scene(), parse("cylinder_2.k:softer:0.4@0..4")
+    start, ((other, share),) = changes(scene, [fault, parse("tip.payload:more:5")])
+    assert start == with_faults(scene, [fault, parse("tip.payload:more:5")])
+    assert parameter(other, "cylinder_2.k") == parameter(scene, "cylinder_2.k") and other.tip.payload == 5.0
+    assert share(np.array([0.0, 3.9, 4.0, 9.0])).tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_a_boom_that_was_loaded_and_changed_moves_as_before():
+    """A boom at rest may be moved from there any number of times."""
+    scene, fault = load_scene(), parse("cylinder_2.k:softer:0.4@0.1+0.1")
+    start, changing = changes(scene, [fault])
+    strokes = strokes_of_posture(scene, "arch")
+    programme, resting = Programme(tuple(strokes), (Move(0, 0.1, 0.3, strokes[0] + 0.01),)), at_rest(start, strokes, 4)
+    plain, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
+    push = {"load": lambda times: np.outer(np.minimum(times, 1.0), [0.0, 1000.0]), "changes": changing}
+    changed, _ = move(resting, programme, 0.5, 5e-3, 5e-3, **push)
+    again, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
+    assert again["tip_y_m"] == pytest.approx(plain["tip_y_m"], abs=1e-7)
+    assert np.abs(changed["tip_y_m"] - plain["tip_y_m"]).max() > 1e-3
+
+
+def test_a_lumped_boom_does_not_change(one_rigid):
+    scene = Scene.model_validate(one_rigid)
+    start, changing = changes(scene, [parse("cylinder_1.k:softer:0.4@1")])
+    resting = at_rest(start, np.array([0.5]), 4, lumped=True)
+    with pytest.raises(UsageError, match="lumped boom cannot change"):
+        move(resting, Programme((0.5,), ()), 0.1, 1e-3, 1e-3, changes=changing)
 
 
 def test_stamps_and_noise_do_not_see_the_fault(one_rigid):

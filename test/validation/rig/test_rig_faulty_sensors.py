@@ -23,7 +23,9 @@ def healthy():
     true = {"t": times, "strokes": 0.2 + 0.01 * np.outer(times, [1, 2, 3]), "joints": 0.1 * np.outer(times, [3, 2, 1])}
     noisy = {name: true[name] + 1e-4 * rng.standard_normal((2000, 3)) for name in ("strokes", "joints")}
     stamps = EPOCH + np.rint(times * 1e9).astype(np.int64)
-    return RigSession(stamps, noisy["strokes"], noisy["joints"], rng.standard_normal((2000, 2)), stamps, true)
+    true["forces"] = 1e4 * np.outer(1.0 + times, [1, -2, 3])
+    imu, forces = rng.standard_normal((2000, 2)), true["forces"] + 100.0 * rng.standard_normal((2000, 3))
+    return RigSession(stamps, noisy["strokes"], noisy["joints"], imu, stamps, forces, true)
 
 
 def spoilt(healthy, text, seed=1):
@@ -93,6 +95,29 @@ def test_late_angles_keep_their_values(healthy):
     assert stamps == sorted(stamps) and len(samples) == 6000
     angles = [sample.stamp for sample in samples if sample.stream is Stream.ANGLES]
     assert angles == session.angle_stamps.tolist()
+
+
+@pytest.mark.parametrize("kind", ["bias:300", "drift:20", "scale:0.02", "stuck", "noisy:3", "spikes:900", "dropout:0.3"])
+def test_a_force_sensor_alone_is_wrong(healthy, kind):
+    session = spoil(healthy, [parse(f"cylinder_force_2.sensor:{kind}@{ONSET:g}")], 1)
+    assert all(np.array_equal(getattr(session, name), getattr(healthy, name)) for name in ARRAYS)
+    changed = session.forces != healthy.forces
+    assert not changed[:, [0, 2]].any() and not changed[healthy.truth["t"] < ONSET].any() and changed[:, 1].any()
+
+
+def test_faults_come_on_over_their_ramp_and_go(healthy):
+    times = healthy.truth["t"]
+    share = np.interp(times, [2.0, 4.0, 6.0, 8.0], [0.0, 1.0, 1.0, 0.0])
+    session = spoil(healthy, [parse("joint_1.sensor:bias:0.01@2+2..6")], 1)
+    assert session.joints[:, 0] - healthy.joints[:, 0] == pytest.approx(0.01 * share, abs=1e-12)
+    session = spoil(healthy, [parse("joint_1.sensor:noisy:4@2+2..6")], 1)
+    error = session.joints[:, 0] - healthy.truth["joints"][:, 0]
+    assert error == pytest.approx((1 + 3 * share) * (healthy.joints - healthy.truth["joints"])[:, 0], abs=1e-12)
+    for text in ("joint_1.sensor:drift:0.01@2..6", "joint_1.sensor:stuck@2..6", "joint_1.sensor:dropout:0.5@2+1..6"):
+        changed = spoil(healthy, [parse(text)], 1).joints[:, 0] != healthy.joints[:, 0]
+        assert changed.any() and not changed[(times < 2.0) | (times >= 7.0)].any(), text
+    late = spoil(healthy, [parse("joint_angles.delay:late:0.03@2+2..6")], 1).angle_stamps - healthy.angle_stamps
+    assert late == pytest.approx(3e7 * share, abs=1)
 
 
 @pytest.mark.parametrize("cause, stream", [("joint_angles", Stream.ANGLES), ("cylinder_strokes", Stream.STROKES)])

@@ -253,9 +253,11 @@ def build(
     frames = section_frames(scene, strokes)
     lumps = lump_masses(scene, frames, strokes) if lumped else None
     gravity = [*gravity_in_base(scene), 0.0]
-    boom = Boom(scene, container, system, gravity, ground, nodally_exact, shear_over_axial, lumps)
+    boom = Boom(scene, container, system, gravity, ground, nodally_exact, shear_over_axial, elements, lumps)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))
         add_pivot(boom, index)
         add_joint(boom, frames, index, float(strokes[index]))
+    tip = boom.point(boom.sections[-1].head, (scene.sections[-1].length, 0.0))
+    boom.tip_load = int(system.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=[0.0, 0.0, 0.0])))
     return boom

@@ -7,7 +7,7 @@ Exudyn's residual, which has everything.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,9 @@ from ....scene.schema import Scene
 from ....types import Array
 from .boom import SHEAR_OVER_AXIAL, build
 from .module import exudyn
+from .parameter_changes import ParameterChanges
 from .probes import Probes, attach, read
-from .stepping import Effort, Scheme, step_through
+from .stepping import Course, Effort, Scheme, step_through
 from .system import Boom, section_frames
 
 PASSES = 40
@@ -84,6 +85,12 @@ def _tangent(residual: Any, state: Array, moving: int) -> Array:
 Drive = Callable[[Array], tuple[Array, Array]]
 """Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s."""
 
+TipLoad = Callable[[Array], Array]
+"""Times (m,) in s -> external force at the tip (m, 2) in N, in the base's axes; 0 at t = 0."""
+
+Change = tuple[Scene, Callable[[Array], Array]]
+"""A scene that differs in stiffnesses or masses only; times (m,) in s -> share (m,) of the difference, 0 at t = 0."""
+
 
 def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
     """Equilibrium under gravity at absolute `strokes` (m), shape (n,).
@@ -110,7 +117,14 @@ def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[
 
 
 def simulate(
-    scene: Scene, drive: Drive, t_end: float, step: float = 5e-4, output_step: float = 1e-3, elements: int = 16
+    scene: Scene,
+    drive: Drive,
+    t_end: float,
+    step: float = 5e-4,
+    output_step: float = 1e-3,
+    elements: int = 16,
+    load: TipLoad | None = None,
+    changes: Sequence[Change] = (),
 ) -> dict[str, Array]:
     """Motion from rest in the equilibrium of the drive's first strokes.
 
@@ -122,6 +136,10 @@ def simulate(
         Seconds; both `t_end` and `output_step` are multiples of `step`.
     elements : int
         Finite elements per flexible section.
+    load : callable, optional
+        External force at the tip, see `TipLoad`.
+    changes : sequence of Change
+        How the boom changes meanwhile.
 
     Returns
     -------
@@ -131,7 +149,7 @@ def simulate(
         ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``; each of shape (rows,).
     """
     first = drive(np.zeros(1))[0][0]
-    return move(at_rest(scene, first, elements), drive, t_end, step, output_step)[0]
+    return move(at_rest(scene, first, elements), drive, t_end, step, output_step, None, load, changes)[0]
 
 
 @dataclass(frozen=True)
@@ -159,17 +177,31 @@ def at_rest(
 
 
 def move(
-    resting: Resting, drive: Drive, t_end: float, step: float, output_step: float, scheme: Scheme | None = None
+    resting: Resting,
+    drive: Drive,
+    t_end: float,
+    step: float,
+    output_step: float,
+    scheme: Scheme | None = None,
+    load: TipLoad | None = None,
+    changes: Sequence[Change] = (),
 ) -> tuple[dict[str, Array], Effort]:
     """`simulate` from a boom at rest by a chosen scheme, and what its stepping took."""
     every = _ratio("output_step", output_step, step)
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
     strokes, rates = drive(times)
-    effort = step_through(resting.boom, strokes, rates, step, output_step, scheme or Scheme())
+    others = [(_built_alike(resting.boom, changed, strokes[0]), share(times)) for changed, share in changes]
+    course = Course(strokes, rates, None if load is None else load(times), ParameterChanges(resting.boom, others))
+    effort = step_through(resting.boom, course, step, output_step, scheme or Scheme())
     found = read(resting.boom, resting.probes, at_rest=False)
     found["forces"][0] = resting.forces  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
     return _columns(found, strokes[::every], times[::every]), effort
+
+
+def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
+    """The boom of another scene, built as `boom` was."""
+    return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial)
 
 
 def settle(boom: Boom, strokes: Array) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from ....errors import SolverError
 from ....types import Array
 from .module import exudyn
+from .parameter_changes import ParameterChanges
 from .system import Boom
 
 STEP_FORCE = 1e-6  # N, absolute tolerance of a step
@@ -60,10 +61,30 @@ class Effort:
     tangents: int
 
 
-def step_through(boom: Boom, strokes: Array, rates: Array, step: float, output_step: float, scheme: Scheme) -> Effort:
-    """From the boom's equilibrium through `strokes` (m) and `rates` (m/s), each (count + 1, n), one row per step."""
-    count = len(strokes) - 1
-    feeding = _feed(boom, strokes, rates, step)
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What is done to a boom, count + 1 rows of it, one for the start and one for every step.
+
+    Attributes
+    ----------
+    strokes, rates : ndarray, shape (count + 1, n)
+        m, m/s.
+    load : ndarray, shape (count + 1, 2), or None
+        External force at the tip, N, in the base's axes; at the start it is 0.
+    changes : ParameterChanges
+        Of stiffnesses and masses.
+    """
+
+    strokes: Array
+    rates: Array
+    load: Array | None
+    changes: ParameterChanges
+
+
+def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
+    """From the boom's equilibrium through a course; then load and parameters are again those of the equilibrium."""
+    count = len(course.strokes) - 1
+    feeding = _feed(boom, course, step)
     settings = _settings(count, step, output_step, scheme)
     begun = time.process_time()
     try:
@@ -73,6 +94,9 @@ def step_through(boom: Boom, strokes: Array, rates: Array, step: float, output_s
         raise SolverError(
             f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
         ) from failure
+    finally:
+        boom.push(np.zeros(2))
+        course.changes.restore()
     seconds = time.process_time() - begun
     counted = boom.system.sys["dynamicSolver"].it
     return Effort(seconds, feeding[0], int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
@@ -101,13 +125,13 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
     return settings
 
 
-def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
+def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     """Before every step, hand the drives that move their lengths without force at its end; returns the seconds it takes.
 
-    All drives get those of the start at once. Pins with play note then whether they touch.
+    All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
+    those of the step's end, too.
     """
-    closed = np.array([joint.cylinder.closed_length for joint in boom.scene.joints])
-    rests = [_rests(boom, i, strokes[:, i] + closed[i], rates[:, i]) for i in range(len(boom.drives))]
+    rests = [_rests(boom, i, course) for i in range(len(boom.drives))]
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
     last = [float("nan")] * len(moving)
     spent = [0.0]
@@ -117,6 +141,9 @@ def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
             if rest[row] != last[i]:
                 last[i] = rest[row]
                 boom.system.SetObjectParameter(drive, name, rest[row])
+        if course.load is not None:
+            boom.push(course.load[row])
+        course.changes.hand_over(row)
 
     def before_step(_: Any, at: float) -> bool:
         begun = time.perf_counter()
@@ -128,14 +155,18 @@ def _feed(boom: Boom, strokes: Array, rates: Array, step: float) -> list[float]:
 
     for (drive, name), rest in zip(boom.drives, rests, strict=True):
         boom.system.SetObjectParameter(drive, name, rest[0])
+    course.changes.hand_over(0)
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
     return spent
 
 
-def _rests(boom: Boom, index: int, lengths: Array, rates: Array) -> list[float]:
+def _rests(boom: Boom, index: int, course: Course) -> list[float]:
     """Lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
     cylinder = boom.scene.joints[index].cylinder
-    lead = 0.0 if cylinder.k is None else (cylinder.d or 0.0) / cylinder.k
-    return [float(rest) for rest in lengths + lead * rates]
+    lengths: Array = course.strokes[:, index] + cylinder.closed_length
+    if cylinder.k is not None:
+        stiffness = cylinder.k + course.changes.of(boom.drives[index][0], "stiffness")
+        lengths = lengths + (cylinder.d or 0.0) / stiffness * course.rates[:, index]
+    return [float(rest) for rest in lengths]

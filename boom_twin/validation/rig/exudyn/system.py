@@ -65,12 +65,16 @@ class Boom:
         Whether a straight, lightly bent beam is exact at its nodes however few they are.
     shear_over_axial : float
         GA over EA.
+    elements : int
+        Finite elements per flexible section.
     lumps : LumpedMasses or None
         Masses of cylinders and two-force links, where these are no bodies.
     drives : list of (int, str)
         Connector of each cylinder, and the name of its length parameter.
     bushes : list of Bush
         Pins with play.
+    tip_load : int
+        The external force at the tip.
     """
 
     scene: Scene
@@ -80,10 +84,12 @@ class Boom:
     ground: int
     nodally_exact: bool
     shear_over_axial: float
+    elements: int
     lumps: LumpedMasses | None
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)
     bushes: list[Bush] = field(default_factory=list)
+    tip_load: int = -1
 
     def marker(self, body: int, local: Point) -> int:
         """A point of a rigid body, in the body's axes."""
@@ -120,9 +126,13 @@ class Boom:
         if weight is not None:
             load = [weight.mass * part for part in self.gravity]
             self.system.AddLoad(items.LoadForceVector(markerNumber=self.marker(body, weight.com), loadVector=load))
-        elif mass > 0.0:
+        else:
             self.weigh(body)
         return body
+
+    def push(self, load: Array) -> None:
+        """External force at the tip from now on, shape (2,), N, in the base's axes."""
+        self.system.SetLoadParameter(self.tip_load, "loadVector", [*load, 0.0])
 
     def weigh(self, body: int) -> None:
         """Gravity on a body or beam."""

@@ -1,0 +1,166 @@
+"""Measured cylinder forces: from a message to residual, zero, alarm, diagnostics, picture and page."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_samples
+from boom_twin.cli.main import main
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.sensor_status import sensors_of
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.diagnostics.twin_status import TwinWatch
+from boom_twin.errors import BagError, UsageError
+from boom_twin.health.baseline import Baseline, load_baseline
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.monitor.protocol import layout
+from boom_twin.offline.history import history_of
+from boom_twin.plots.residuals import residual_picture
+from boom_twin.scene.kinematics import strokes_of_posture
+
+MS, START, COUNT = 1_000_000, 1_700_000_000_000_000_000, 800
+FORCES, WRONG, SIGMA = Stream.FORCES, 1500.0, 100.0
+CHANNELS = tuple(f"cylinder_force_{i}" for i in range(1, 5))
+JOINT_STATE = "sensor_msgs/msg/JointState"
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene()
+
+
+@pytest.fixture(scope="module")
+def samples(scene):
+    """Of a gentle move; the force of cylinder 2 reads `WRONG` too much, all have a noise of `SIGMA`."""
+    still, noise, model, found = strokes_of_posture(scene, "arch"), np.random.default_rng(4), Twin(scene), []
+    for stamp in (START + 5 * MS * np.arange(COUNT)).tolist():
+        strokes = still + 0.01 * math.sin(1.5e-9 * (stamp - START)) * np.array([1.0, 0.0, 0.5, 0.0])
+        p = model.update(Sample(Stream.STROKES, stamp, strokes)).prediction
+        forces = p.cylinder_forces + SIGMA * noise.standard_normal(4) + WRONG * np.array([0.0, 1.0, 0.0, 0.0])
+        joints = p.joints + 1e-4 * noise.standard_normal(4)
+        found += [Sample(Stream.STROKES, stamp, strokes), Sample(Stream.ANGLES, stamp, joints), Sample(FORCES, stamp, forces)]
+    return found
+
+
+@pytest.fixture(scope="module")
+def bag(samples, tmp_path_factory):
+    path = tmp_path_factory.mktemp("forces") / "bag"
+    write_samples(path, samples, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
+    return path
+
+
+def test_messages_name_cylinders_and_have_efforts(bag, samples):
+    (_, _, first), *_ = read(scan(bag), {"/cylinder_forces": JOINT_STATE})
+    assert list(first.name) == [f"cylinder_{i}" for i in range(1, 5)] and len(first.position) == 0
+    assert first.effort.tolist() == next(each for each in samples if each.stream is FORCES).values.tolist()
+
+
+def test_residuals_zeros_and_diagnostics(scene, samples):
+    topics, now = load_topics(), 0.0
+    required = {stream: topic.required for stream, topic in topics.inputs.items()}
+    sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: t.name for s, t in topics.inputs.items()}
+    twin, watch, found = Twin(scene, baseline=Baseline()), TwinWatch(sensors, names, Thresholds(), lambda: now), []
+    watch.begin()
+    alarms = set()
+    for sample in samples:
+        now = (sample.stamp - START) * 1e-9
+        watch.seen(sample.stream, sample.stamp)
+        report = twin.update(sample)
+        watch.took(sample, report, 0.0)
+        found += [residuals for residuals in report.residuals if residuals.stream is FORCES]
+        alarms |= {alarm.cause for alarm in (report.health.alarms if report.health else ())}
+    assert len(found) == COUNT and {residuals.names for residuals in found} == {CHANNELS} and not alarms
+    values = np.array([residuals.values for residuals in found])
+    sigmas = np.array([residuals.sigmas for residuals in found])
+    assert values.mean(axis=0) == pytest.approx([0.0, WRONG, 0.0, 0.0], abs=20.0)
+    assert values.std(axis=0) == pytest.approx(SIGMA, rel=0.15)
+    assert np.all(sigmas >= SIGMA) and np.all(sigmas < 6.0 * SIGMA)
+    looked = watch.look({}, True, {stream: Peers(name) for stream, name in names.items()}, (), now)
+    statuses = {status.name: status.message for status in looked}
+    assert all(statuses[f"sensor {name}"] == "measuring" for name in CHANNELS)
+    assert {"cylinder_forces", *(f"residual {name}" for name in CHANNELS)} <= set(statuses)
+    assert twin.rezero("cylinder_force_2") == {"cylinder_force_2": pytest.approx(WRONG, abs=40.0)}
+
+
+def test_a_force_without_its_stamp_among_the_strokes_is_interpolated(scene, samples):
+    """Half way between two strokes it is compared with the middle of what was expected at both."""
+    twin = Twin(scene)
+    strokes = [sample for sample in samples if sample.stream is Stream.STROKES][:200]
+    before, after = [twin.update(sample).prediction for sample in strokes][-2:]
+    middle = Sample(FORCES, strokes[-2].stamp + 2_500_000, np.zeros(4))
+    (found,) = twin.update(middle).residuals
+    assert -found.values == pytest.approx(0.5 * (before.cylinder_forces + after.cylinder_forces), rel=1e-12)
+
+
+def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
+    """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
+    known = set()
+    twin = Twin(scene, baseline=load_baseline(None))
+    stuck, last = 0.0, samples[-1].stamp
+    for sample in samples:
+        if sample.stream is FORCES:
+            values = sample.values + 2e3 * math.sin(8e-9 * (sample.stamp - START)) ** 9
+            if sample.stamp < last - 2_000 * MS:
+                stuck = values[0]
+            else:
+                values[[0, 2]] = stuck, math.nan
+            sample = Sample(FORCES, sample.stamp, values)
+        health = twin.update(sample).health
+        known |= {(alarm.kind, alarm.cause) for alarm in (health.alarms if health else ())}
+    assert known == {("stuck", "cylinder_force_1.sensor"), ("dropout", "cylinder_force_3.sensor")}
+
+
+def test_replay_report_and_page(scene, bag, tmp_path, monkeypatch):
+    assert main(["replay", str(bag), "--out", str(tmp_path / "out"), "--report"]) == 0
+    kept = read(scan(tmp_path / "out" / "bag"), {"/boom_twin/residuals": JOINT_STATE})
+    kept = np.array([msg.position for _, _, msg in kept if msg.name == list(CHANNELS)])
+    assert len(kept) == COUNT and kept[:, 1].mean() == pytest.approx(WRONG, abs=20.0)
+    rows = json.loads((tmp_path / "out" / "quantities.json").read_text())["quantities"]
+    (mean,) = (row for row in rows if row["name"] == "residual_mean_cylinder_force_2")
+    assert mean["value"] == pytest.approx(WRONG, abs=20.0) and mean["unit"] == "N"
+    labels, set_ylabel = [], Axes.set_ylabel
+    monkeypatch.setattr(Axes, "set_ylabel", lambda self, text: labels.append(text) or set_ylabel(self, text))
+    recording = replay(bag, scene, tmp_path / "again", health=False).recording
+    residual_picture(tmp_path / "residuals.png", "session", history_of(recording, scene), "")
+    assert "cylinder_force_2\nN" in labels and "joint_1\nmrad" in labels
+    feed = bag_feed(bag, scene, Settings())
+    while feed.is_reading:
+        feed.poll()
+    (table,) = (each for each in layout(feed.store)["tables"] if each["name"] == FORCES.value)
+    assert table["columns"] == tuple(f"{name}_{end}" for end in ("N", "normalised") for name in CHANNELS)
+    assert table["residuals"] == {"title": "cylinder forces", "factor": 1.0, "unit": "N"}
+
+
+def test_names_signs_and_units_of_a_rig(scene, samples, bag, tmp_path):
+    mapped = [Sample(FORCES, each.stamp, -1e-3 * each.values) if each.stream is FORCES else each for each in samples]
+    write_samples(tmp_path / "rig", mapped, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
+    mapping = tmp_path / "mapping.yaml"
+    rows = "\n".join(f"  {name}: {{unit: kN, sign: -1}}" for name in CHANNELS)
+    mapping.write_text(f"sensors:\n{rows}\n")
+    usual = replay(bag, scene, tmp_path / "usual", health=False)
+    found = replay(tmp_path / "rig", scene, tmp_path / "found", mapping=mapping, health=False)
+    expected = usual.recording.of(FORCES).values
+    assert found.recording.of(FORCES).values == pytest.approx(expected, abs=1e-6) and len(expected) == COUNT
+
+
+def test_forces_of_another_boom_are_refused(scene, samples, tmp_path):
+    others = [Sample(FORCES, e.stamp, np.append(e.values, 0.0)) if e.stream is FORCES else e for e in samples[:300]]
+    write_samples(tmp_path / "bag", others, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
+    with pytest.raises(BagError, match=r"/cylinder_forces names cylinder_5; .* so this is another boom"):
+        replay(tmp_path / "bag", scene, tmp_path / "out")
+
+
+def test_a_mapping_with_a_channel_too_many(tmp_path):
+    mapping = tmp_path / "mapping.yaml"
+    mapping.write_text("sensors: {cylinder_force_5: {unit: kN}}\n")
+    with pytest.raises(UsageError, match="channels end at cylinder_force_4"):
+        load_mapping(mapping, 4)

@@ -1,0 +1,60 @@
+"""The bundled session with pump and wind, synthetic: its sensors, its truth, and what strokes alone cannot know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import Stream, replay
+from boom_twin.bag.reader import scan
+from boom_twin.offline.ground_truth import load_truth
+
+SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
+QUIET = 5.0  # s, before the pump begins
+
+
+@pytest.fixture(scope="module")
+def replayed(tmp_path_factory):
+    return replay(SESSION, None, tmp_path_factory.mktemp("replay"))
+
+
+def test_it_is_small_and_says_what_it_is():
+    assert sum(file.stat().st_size for file in SESSION.iterdir()) < 4e6
+    session = scan(SESSION)
+    assert "synthetic" in session.notes["origin"] and session.notes["loads"].endswith("pump:0.43:130:0.1@5, wind:15:5")
+    assert {topic.name: topic.count for topic in session.topics} == {
+        f"/{name}": 8000 for name in ("cylinder_strokes", "joint_angles", "tip_imu", "cylinder_forces")
+    }
+
+
+def test_its_truth_has_the_load():
+    truth = load_truth(SESSION)
+    pump, wind = truth.load[:, 1], truth.load[:, 0]
+    assert not pump[truth.times < QUIET].any() and pump.max() == pytest.approx(130.0, abs=0.1)
+    begun = truth.times > QUIET
+    power = np.abs(np.fft.rfft(pump[begun] - pump[begun].mean())) ** 2
+    assert np.fft.rfftfreq(begun.sum(), 0.005)[power.argmax()] == pytest.approx(0.43, abs=0.02)
+    assert 7.0 < wind[begun].std() < 25.0
+
+
+def test_the_prediction_is_off_by_what_it_does_not_know(replayed):
+    summary = replayed.summary
+    assert summary["samples"] == 8000 and summary["dropped"] == 0
+    assert 8e-3 < summary["tip_error_rms_m"] < 13e-3
+    assert 0.5 < summary["tip_acceleration_error_rms_m_s2"] < 0.8
+    assert not [alarm for alarm in summary["alarms"] if str(alarm["cause"]).endswith(".sensor")]
+
+
+def test_residuals_tell_of_the_load(replayed):
+    """Angles and forces are farther off once the pump runs; averaged over 1 s, the force of cylinder 1 follows its load."""
+    truth, first = load_truth(SESSION), int(replayed.recording.predictions.stamps[0])
+    for stream in (Stream.ANGLES, Stream.FORCES):
+        rows = replayed.recording.of(stream)
+        times = (rows.stamps - first) * 1e-9 + truth.times[0]
+        calm, shaken = (np.sqrt(np.nanmean(rows.normalised[part] ** 2)) for part in (times < QUIET, times > QUIET))
+        assert shaken > 1.8 * calm, stream
+    load, force = np.interp(times, truth.times, truth.load[:, 1]), rows.values[:, 0]
+    slow = np.array([np.convolve(each, np.ones(200) / 200, "same") for each in (load, force)])
+    assert np.corrcoef(slow[:, times > QUIET + 1.0])[0, 1] > 0.7
