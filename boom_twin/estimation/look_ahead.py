@@ -17,7 +17,7 @@ import numpy as np
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
-from ..kernels.jit import inner, kernel
+from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
 from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe
@@ -43,6 +43,7 @@ class Tuning(NamedTuple):
     rho: float
 
 
+@by_reference
 class Track(NamedTuple):
     """What the follower remembers besides the anchor's state.
 

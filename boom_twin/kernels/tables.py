@@ -15,6 +15,7 @@ from .elements.beam import BEAM as BEAM_ROW
 from .elements.cylinder import CYLINDER, CYLINDER_PART
 from .elements.linkage import LINKAGE
 from .elements.pin_contact import CLEARANCE
+from .jit import by_reference
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
 
@@ -79,6 +80,7 @@ RECORDS = {
 """What a row of every record array of `Tables` is."""
 
 
+@by_reference
 class Tables(NamedTuple):
     """A compiled boom. Record arrays, one row an element; see the dtypes for units."""
 
@@ -113,6 +115,7 @@ class Motion(NamedTuple):
     offset: Array
 
 
+@by_reference
 class State(NamedTuple):
     """What the boom remembers from step to step.
 
@@ -136,6 +139,7 @@ class State(NamedTuple):
     pace: np.ndarray
 
 
+@by_reference
 class Condensed(NamedTuple):
     """What a sweep in condenses (`kernels.transfer.riccati_sweep.sweep_in`), for those that go on from it.
 
@@ -153,6 +157,7 @@ class Condensed(NamedTuple):
     end_free: Array
 
 
+@by_reference
 class Work(NamedTuple):
     """Scratch of one step; no meaning between steps."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..elements.pin_contact import CLOSED, Journal, pin_force
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
-from ..jit import inner, kernel
+from ..jit import inner, kernel, referenced
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
@@ -277,7 +277,7 @@ def run_each(tables, states, work, first, last, steps, counts, drives, rates, fa
     """
     for i in range(first, last):
         status, row, total, _, _ = run(
-            tables_of(tables, i), state_of(states, i), work, steps, counts, drives[i], rates[i],
+            referenced(tables_of(tables, i)), referenced(state_of(states, i)), work, steps, counts, drives[i], rates[i],
             family, parameter, tolerance, passes, None, out[i],
         )  # fmt: skip
         ends[i, 0], ends[i, 1], ends[i, 2] = status, row, total
