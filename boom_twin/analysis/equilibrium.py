@@ -284,7 +284,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
         own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
         state.history[X, plan.tables.parts.history[own] + 2] = 0.0
-    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False)
     return bool(status == OK and is_stable(loaded, state, work))
 
 

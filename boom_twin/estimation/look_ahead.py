@@ -98,7 +98,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
                 hold(track, track.x[old])
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
-                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None
+                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, False
                 )
                 track.passes[0] += count
                 if status != OK:
@@ -117,7 +117,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         for k in range(steps):
             drive_to(track, start, track.x[new], span, (k + 1) / steps)
             status, count, _ = advance(
-                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None
+                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, False
             )
             track.passes[0] += count
             if status != OK:

@@ -9,9 +9,10 @@ counting, which was nearly half of a step.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from ..errors import UsageError
@@ -85,7 +86,7 @@ class Kernel:
     """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""
 
     _cached = True
-    _pipeline: dict[str, Any] = {}
+    _pipeline: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)

@@ -107,7 +107,7 @@ class _Boom:
         """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
         drive = self.plan.closed_lengths + strokes
         status, _, _ = advance(
-            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None
+            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None, False
         )
         return self.reading.of(self.state) if status == OK else None
 
