@@ -9,10 +9,9 @@ counting, which was nearly half of a step.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 from ..errors import UsageError
@@ -86,7 +85,6 @@ class Kernel:
     """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""
 
     _cached = True
-    _pipeline: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)
@@ -97,13 +95,17 @@ class Kernel:
         """numba's object, made on first use."""
         numba = _numba()
         _register_references()
-        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._pipeline)(self.py_func)
+        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._compiler())(self.py_func)
         if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
             try:
                 dispatcher._cache = KernelCache(self.py_func, folder)
             except (ImportError, AttributeError) as error:
                 _tell_not_kept(f"numba {numba.__version__} is not the one that was tested ({error})")
         return dispatcher
+
+    def _compiler(self) -> dict[str, Any]:
+        """Which compiler, if not numba's own."""
+        return {}
 
     @property
     def _numba_type_(self) -> Any:
@@ -119,8 +121,7 @@ class Inner(Kernel):
 
     _cached = False
 
-    @cached_property
-    def _pipeline(self) -> dict[str, Any]:
+    def _compiler(self) -> dict[str, Any]:
         from .inlining import InlinedCompiler
 
         return {"pipeline_class": InlinedCompiler}

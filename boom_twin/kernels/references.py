@@ -14,17 +14,18 @@ import hashlib
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.registry import cpu_target
+from numba.core.types import NamedTuple, Type  # type: ignore[attr-defined]
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
 
 
-class Reference(types.Type):
+class Reference(Type):
     """numba's type of a named tuple by reference; `fields` is its type by value."""
 
-    def __init__(self, fields: types.NamedTuple) -> None:
+    def __init__(self, fields: Any) -> None:
         self.fields = fields
         digest = hashlib.sha256(str(fields).encode()).hexdigest()[:16]
         super().__init__(f"{fields.instance_class.__name__}_{digest}")
@@ -108,4 +109,4 @@ def register(kind: type) -> None:
 
     @typeof_impl.register(kind)
     def type_of(value: Any, c: Any) -> Reference:
-        return Reference(types.NamedTuple([typeof_impl(field, c) for field in value], kind))
+        return Reference(NamedTuple([typeof_impl(field, c) for field in value], kind))

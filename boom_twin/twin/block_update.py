@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.equilibrium import SHARE
+from ..analysis.step_choice import StepChoice
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..estimation.boom_predictor import BoomPredictor
@@ -29,12 +30,12 @@ from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> Limits:
-    """What the compiled update judges by: of a scene, compiled as `plan` with its load, and its angle sensors."""
+def limits_of(scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, mounts: Sequence[Mount | None]) -> Limits:
+    """What the compiled update judges and steps by: of a scene, compiled as `plan` with its load, and its angle sensors."""
     counts = np.array([len(names) for names in channels_of(plan.joints).values()])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
     tuning = Tuning(
-        settings.stroke_variance, settings.jerk_density, settings.lag, settings.step, settings.look_step, settings.rho
+        settings.stroke_variance, settings.jerk_density, settings.lag, steps.step, steps.look_step, settings.rho
     )
     return Limits(
         tuning=tuning,

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..analysis.step_choice import choose_steps
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
@@ -68,6 +69,8 @@ class Twin:
         stroke sample, which `Report.change` tells.
     judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
+    steps : StepChoice
+        How the boom is stepped, and how far that may be off.
 
     Notes
     -----
@@ -151,7 +154,8 @@ class Twin:
         self.judge = None
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        limits = limits_of(scene, self._boom.plan, self.settings, self.mounts)
+        self.steps = choose_steps(scene, self._boom.plan, self.settings)
+        limits = limits_of(scene, self._boom.plan, self.settings, self.steps, self.mounts)
         self._compiled = BlockUpdate(
             self._boom, limits, self._state, self._channels, self.settings.step, self.judge, self.counts
         )
@@ -164,7 +168,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.mounts)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
