@@ -19,7 +19,7 @@ from ..config.settings import Settings
 from ..errors import SolverError, UsageError
 from ..kernels.integrators import GENERALISED_ALPHA, A, X, new_weights, prepare
 from ..kernels.tables import OK, State
-from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance
+from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
 from ..types import Array
@@ -111,7 +111,7 @@ class _TestMove:
             x = min(max((start + k * step) / RISE, 0.0), 1.0)
             lengths = self._first + self._way * (x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
             rates = self._way * (30.0 * x**2 * (1.0 - x) ** 2 / RISE)
-            status, _, _ = advance(t, state, work, scheme, lengths, rates, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False)
+            status, _, _ = advance(t, state, work, scheme, lengths, rates, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
             if status != OK:
                 raise SolverError("the test move cannot be stepped")
             if k % every == 0:

@@ -20,7 +20,7 @@ from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
 from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
-from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe
+from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, observe
 from ..types import Array
 from .stroke_filter import add_node, drive_between, measure, start_node
 
@@ -98,7 +98,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
                 hold(track, track.x[old])
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
-                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, False
+                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, ANEW
                 )
                 track.passes[0] += count
                 if status != OK:
@@ -117,7 +117,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         for k in range(steps):
             drive_to(track, start, track.x[new], span, (k + 1) / steps)
             status, count, _ = advance(
-                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, False
+                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, ANEW
             )
             track.passes[0] += count
             if status != OK:

@@ -25,6 +25,7 @@ from .kept_tangent import (
 from .matrix_product import plain_pass
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
+ANEW = np.bool_(False)  # for `advance`: no tangent is kept. Typed, because numba compiles once more for every literal
 TICKS = np.int64(4096)  # of a step, the grid of its sub-steps
 MOST = np.int64(32)  # sub-steps that a step is divided into for their error; for passes that fail, down to SHORTEST
 SHORTEST = 1e-5  # s, of a sub-step
