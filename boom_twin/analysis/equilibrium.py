@@ -16,7 +16,7 @@ from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR
 from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
-from ..kernels.transfer.time_step import advance
+from ..kernels.transfer.time_step import ANEW, advance
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
@@ -284,7 +284,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
         own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
         state.history[X, plan.tables.parts.history[own] + 2] = 0.0
-    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
     return bool(status == OK and is_stable(loaded, state, work))
 
 

@@ -26,7 +26,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import spherical_jn
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
@@ -286,6 +285,8 @@ class StrokeNoise:
         at omega, less the three parts that stroke, speed and acceleration at the end tell (Legendre polynomials up to the
         second degree): N_ij^2 / omega_j^8 . q_i T (1 - sum_k (2k+1) j_k(omega_j T/2)^2), with spherical Bessel functions.
         """
+        from scipy.special import spherical_jn  # takes longer to import than all else that a twin starts with
+
         omegas = self._omegas()
         known = sum((2 * k + 1) * spherical_jn(k, 0.5 * omegas * span) ** 2 for k in range(3))
         return np.asarray(self._loads(plan) ** 2 @ densities * span * np.maximum(1.0 - known, 0.0) / omegas**8)

@@ -10,7 +10,7 @@ import numpy as np
 from ..kernels.elements import pin_contact as contact
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
-from ..kernels.tables import RECORDS, SLOTS, Condensed, State, Tables, Work
+from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Work
 from ..kernels.transfer.time_step import observe
 from ..types import Array
 
@@ -111,6 +111,7 @@ class Plan:
         rows = max(inner, shapes)
         condensed = Condensed(
             gains=np.zeros((operations, rows, SLOTS)), free=np.zeros((operations, rows)),
+            factors=np.zeros((operations, rows, rows)), order=np.zeros((operations, rows), np.int64),
             blocks=np.tile(np.eye(inner), (n, 1, 1)), ends=np.tile(np.eye(2), (pins, 1, 1)),
             end_gains=np.zeros((pins, 2, 5)), end_free=np.zeros((pins, 2)),
         )  # fmt: skip
@@ -118,11 +119,13 @@ class Plan:
             position=np.zeros(histories), velocity=np.zeros(histories), acceleration=np.zeros(histories),
             hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
             finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
-            own_g=np.zeros(5), own_h=np.zeros((5, 5)), matrix=np.zeros((inner, inner)), right=np.zeros((inner, SLOTS)),
-            condensed=condensed, block=np.zeros((shapes, shapes)), hold=np.zeros((pins, contact.HOLD_COLUMNS)),
+            own_g=np.zeros(5), own_h=np.zeros((5, 5)), right=np.zeros((inner, SLOTS)),
+            condensed=condensed, hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
-            drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), cut=np.zeros(SLOTS),
+            drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), guess=np.zeros(len(self.names)),
+            corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(3),
+            cut=np.zeros(SLOTS),
         )  # fmt: skip
 
 

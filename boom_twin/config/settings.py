@@ -115,8 +115,10 @@ class Settings(BaseModel):
         default=0.0, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
     )
     stroke_agility: Agility = Field(default=1.0, description="more follows strokes sooner, lets more noise through")
-    step: Positive = Field(default=0.005, description="longest step of the remembered boom, s")
-    look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s")
+    step: Positive = Field(default=0.005, description="longest step of the remembered boom, s; halved by its error")
+    look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s; halved by its error")
+    step_tip_error: Positive = Field(default=2.0e-4, description="error of the tip that steps may make, rms, m")
+    step_acceleration_error: Positive = Field(default=0.15, description="likewise of the tip's acceleration, m/s^2")
     rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")
     payload: Load = Field(default=-1.0, description="mass at the tip, kg; below 0: that of the scene")
     line_fill: Load = Field(default=-1.0, description="concrete in the pipe line, kg/m; below 0: that of the scene")

@@ -17,10 +17,10 @@ import numpy as np
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
-from ..kernels.jit import inner, kernel
+from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
-from ..kernels.transfer.time_step import LONGEST_INCREMENT, advance, observe
+from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, observe
 from ..types import Array
 from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, new_filter, start_filter, take_strokes
 
@@ -46,6 +46,7 @@ class Tuning(NamedTuple):
     rho: float
 
 
+@by_reference
 class Track(NamedTuple):
     """What the follower remembers besides the anchor's state.
 
@@ -101,7 +102,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
                 hold(track, nodes[old])
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
-                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None
+                    t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, ANEW
                 )
                 track.passes[0] += count
                 if status != OK:
@@ -120,7 +121,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         for k in range(steps):
             drive_to(track, start, nodes[new], span, (k + 1) / steps)
             status, count, _ = advance(
-                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None
+                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, ANEW
             )
             track.passes[0] += count
             if status != OK:

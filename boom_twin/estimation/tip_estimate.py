@@ -41,7 +41,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import inner
+from ..kernels.jit import by_reference, inner
 from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
 from ..types import NANO, Array
 
@@ -72,6 +72,7 @@ ANGLE, FELT_X, FELT_Y, STEP = range(4)
 """Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s."""
 
 
+@by_reference
 class DeviationFilter(NamedTuple):
     """The filter as kernels take it; n joints, m modes at most, s states, c measured channels, f frames, k stations.
 

@@ -15,9 +15,8 @@ from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import chdtri
 
+from ..kernels.elements.pin_contact import bisect
 from ..types import Array
 
 ALLOWANCE = 1.0  # deviations by which the mean may be off
@@ -41,7 +40,7 @@ class Detector:
     def __init__(self, channels: int, block: float, false_alarms: float) -> None:
         rate = false_alarms * block / (4.0 * channels)  # per test: two sides, and as many for the window as for the CUSUM
         self.threshold = cusum_threshold(1.0 / rate)
-        self.limit = EXCESS * float(chdtri(WINDOW, 2.0 * rate))  # scipy.stats has it too, but takes 0.3 s to import
+        self.limit = EXCESS * chi_square_exceeded(2.0 * rate)
         self._up, self._down = np.zeros(channels), np.zeros(channels)
         self._began = np.zeros((2, channels), dtype=np.int64)
         self._squares: deque[Array] = deque(maxlen=WINDOW)
@@ -94,4 +93,17 @@ def cusum_threshold(run: float) -> float:
         b = 2.0 * ALLOWANCE * (h + 1.166)
         return math.expm1(b) - b - 2.0 * ALLOWANCE**2 * run
 
-    return float(brentq(excess, 0.0, 100.0))
+    return bisect(lambda h: excess(h) < 0.0, 0.0, 100.0)
+
+
+def chi_square_exceeded(probability: float) -> float:
+    """What a chi-square of `WINDOW` degrees of freedom, an even number, exceeds with this probability.
+
+    With x half of it and m half the degrees, the probability is exp(-x) (1 + x + .. + x^(m-1)/(m-1)!). `scipy.special` has it
+    too, but takes longer to import than all else that a twin starts with.
+    """
+
+    def exceeded(x: float) -> float:
+        return math.exp(-x) * sum(x**k / math.factorial(k) for k in range(WINDOW // 2))
+
+    return 2.0 * bisect(lambda x: exceeded(x) > probability, 0.0, 500.0)

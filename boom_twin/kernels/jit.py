@@ -12,10 +12,12 @@ import logging
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import UsageError
 from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
+
+Fields = TypeVar("Fields")
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 DOCUMENTED = frozenset({"nogil", "error_model"})
@@ -23,6 +25,15 @@ COMPILING = "compiling the model, about half a minute; done once for this versio
 NOT_KEPT = "compiling the model, about half a minute each time, because compiled code is not kept: %s"
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
+
+
+_BY_REFERENCE: list[type] = []
+
+
+def by_reference(kind: type[Fields]) -> type[Fields]:
+    """Let kernels take named tuples of this class by reference, see `boom_twin.kernels.references`."""
+    _BY_REFERENCE.append(kind)
+    return kind
 
 
 @cache
@@ -53,6 +64,14 @@ def _tell_not_kept(reason: str) -> None:
     logging.getLogger("boom_twin").warning(NOT_KEPT, reason)
 
 
+def _register_references() -> None:
+    """Make the classes known that are to be taken by reference."""
+    from .references import register
+
+    while _BY_REFERENCE:
+        register(_BY_REFERENCE.pop())
+
+
 def _known(options: dict[str, Any]) -> dict[str, Any]:
     """Those options that this numba has; it can compile without the ones that are not documented, only slower code."""
     try:
@@ -75,13 +94,18 @@ class Kernel:
     def dispatcher(self) -> Any:
         """numba's object, made on first use."""
         numba = _numba()
-        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}))(self.py_func)
+        _register_references()
+        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._compiler())(self.py_func)
         if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
             try:
                 dispatcher._cache = KernelCache(self.py_func, folder)
             except (ImportError, AttributeError) as error:
                 _tell_not_kept(f"numba {numba.__version__} is not the one that was tested ({error})")
         return dispatcher
+
+    def _compiler(self) -> dict[str, Any]:
+        """Which compiler, if not numba's own."""
+        return {}
 
     @property
     def _numba_type_(self) -> Any:
@@ -97,8 +121,30 @@ class Inner(Kernel):
 
     _cached = False
 
+    def _compiler(self) -> dict[str, Any]:
+        from .inlining import InlinedCompiler
+
+        return {"pipeline_class": InlinedCompiler}
+
     def __call__(self, *arguments: Any) -> Any:
         return self.py_func(*arguments)
+
+
+class _Referenced:
+    """See `referenced`."""
+
+    def __call__(self, fields: Fields) -> Fields:
+        return fields
+
+    @property
+    def _numba_type_(self) -> Any:
+        from .references import kind_of_referenced
+
+        return kind_of_referenced()
+
+
+referenced = _Referenced()
+"""A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:

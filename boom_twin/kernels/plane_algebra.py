@@ -114,8 +114,26 @@ def condense(s, p, coupling, block, force, m, n):
 
 
 @inner
-def solve(a, b, n, columns):
-    """Solve a x = b in place by LU with row pivoting; a is (n, n), b is (n, columns) and becomes x. False if singular."""
+def condense_forces(p, coupling, block, force, m, n):
+    """What `condense` does with p and force, by the gains and the factors that it left in coupling and block."""
+    for k in range(n):
+        for j in range(m):
+            p[j] -= coupling[k, j] * force[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k):
+            force[j] -= block[k, j] * force[k]
+        force[k] /= block[k, k]
+    for k in range(n):
+        for j in range(k):
+            force[k] -= block[k, j] * force[j]
+
+
+@inner
+def factorise(a, n, order):
+    """LU with row pivoting in place of a, shape (>= n, >= n); `order` notes which row each was exchanged with.
+
+    False if singular.
+    """
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -123,11 +141,10 @@ def solve(a, b, n, columns):
                 best = i
         if not abs(a[best, k]) > SMALLEST_PIVOT:
             return False
+        order[k] = best
         if best != k:
             for j in range(k, n):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
-            for j in range(columns):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):
@@ -135,6 +152,20 @@ def solve(a, b, n, columns):
             if factor != 0.0:
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
+    return True
+
+
+@inner
+def substitute(a, order, b, n, columns):
+    """Solve with what `factorise` left in `a` and `order`: b, shape (>= n, >= columns), becomes the solution."""
+    for k in range(n):
+        best = order[k]
+        if best != k:
+            for j in range(columns):
+                b[k, j], b[best, j] = b[best, j], b[k, j]
+        for i in range(k + 1, n):
+            factor = a[i, k] * a[k, k]
+            if factor != 0.0:
                 for j in range(columns):
                     b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):
@@ -145,4 +176,12 @@ def solve(a, b, n, columns):
         inverse = a[k, k]
         for j in range(columns):
             b[k, j] *= inverse
+
+
+@inner
+def solve(a, b, n, columns, order):
+    """Solve a x = b in place by LU with row pivoting; a is (n, n), b is (n, columns) and becomes x. False if singular."""
+    if not factorise(a, n, order):
+        return False
+    substitute(a, order, b, n, columns)
     return True

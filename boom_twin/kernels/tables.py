@@ -15,8 +15,11 @@ from .elements.beam import BEAM as BEAM_ROW
 from .elements.cylinder import CYLINDER, CYLINDER_PART
 from .elements.linkage import LINKAGE
 from .elements.pin_contact import CLEARANCE
+from .jit import by_reference
 
 SLOTS = 9  # most of a cut: x, y, theta, a pin C (2), the force of cylinder 1, and three of the plain product
+
+CORRECTIONS = 3  # of a step's guess that are remembered
 
 JOINT_A, JOINT_B, OFFSET, BODY, BEAM, STATION, ROD_PIN = range(7)
 
@@ -79,6 +82,7 @@ RECORDS = {
 """What a row of every record array of `Tables` is."""
 
 
+@by_reference
 class Tables(NamedTuple):
     """A compiled boom. Record arrays, one row an element; see the dtypes for units."""
 
@@ -105,14 +109,19 @@ class Tables(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """How histories give accelerations and velocities: a = gain (x - hat), v = rate x + offset."""
+    """How histories give accelerations and velocities: a = gain (x - hat), v = rate x + offset.
+
+    renew : whether a sweep makes tangents anew, or only forces, with the tangents that `Condensed` holds.
+    """
 
     gain: float
     rate: float
     hat: Array
     offset: Array
+    renew: bool = True
 
 
+@by_reference
 class State(NamedTuple):
     """What the boom remembers from step to step.
 
@@ -136,23 +145,29 @@ class State(NamedTuple):
     pace: np.ndarray
 
 
+@by_reference
 class Condensed(NamedTuple):
     """What a sweep in condenses (`kernels.transfer.riccati_sweep.sweep_in`), for those that go on from it.
 
     gains : (operations, rows, SLOTS) decrements of the condensed unknowns by increments of the cut, and
     free : (operations, rows) those that do not depend on it.
+    factors : (operations, rows, rows) of what an operation condenses, and order : (operations, rows) of its rows, see
+    `kernels.plane_algebra`: a beam's L D L^T, a joint's L U.
     blocks : (joints, inner, inner) H_qq of what a joint condenses, inner: most unknowns of a joint.
     ends : (clearances, 2, 2) the same of the end of a cylinder. end_gains : (clearances, 2, 5), end_free : (clearances, 2).
     """
 
     gains: Array
     free: Array
+    factors: Array
+    order: np.ndarray
     blocks: Array
     ends: Array
     end_gains: Array
     end_free: Array
 
 
+@by_reference
 class Work(NamedTuple):
     """Scratch of one step; no meaning between steps."""
 
@@ -169,20 +184,22 @@ class Work(NamedTuple):
     h: Array  # (size, size)
     own_g: Array  # (5,) of a cylinder
     own_h: Array  # (5, 5)
-    matrix: Array  # (inner, inner), inner: most unknowns of a joint
-    right: Array  # (inner, SLOTS)
+    right: Array  # (inner, SLOTS), inner: most unknowns of a joint
     condensed: Condensed
-    block: Array  # (rows, rows): H_qq of a beam part
     hold: Array  # (clearances, 9) what holds a journal back, columns as named in `kernels.elements.pin_contact`
     apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
     angles: Array  # (P+1,)
-    turn: Array  # (beams, P, 4)
+    turn: Array  # (beams, P+1, 4)
     local: Array  # (P, 2)
     drive: Array  # (cylinders,) of a sub-step, m
     drive_rate: Array  # (cylinders,), m/s
     dz: Array  # (unknowns,)
+    guess: Array  # (unknowns,) without the last step's correction, see `kernels.transfer.kept_tangent`
+    corrections: Array  # (CORRECTIONS, unknowns), the newest first
+    kept_z: Array  # (unknowns,) at which tangents were made
+    kept: Array  # (3,) as named there
     cut: Array  # (SLOTS,)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -306,8 +307,21 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         "joint_residual_normalised_std": _std(normalised),
         "tip_acceleration_max_m_s2": float(acceleration.max()),
         **_pins(recording, twin),
+        **_steps(twin),
         "output_sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
         "alarms": _alarms(recording, first),
+    }
+
+
+def _steps(twin: Twin) -> dict[str, float | None]:
+    """How the boom was stepped, and how far that may be off; null where it could not be estimated."""
+    found = twin.steps
+    errors = [None if math.isnan(error) else error for error in (found.tip_error, found.acceleration_error)]
+    return {
+        "step_s": found.step,
+        "look_step_s": found.look_step,
+        "step_tip_error_m": errors[0],
+        "step_acceleration_error_m_s2": errors[1],
     }
 
 

@@ -16,6 +16,7 @@ from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
+from ..estimation.step_choice import StepChoice
 from ..estimation.stroke_filter import filter_tuning
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
@@ -31,12 +32,12 @@ from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> Limits:
-    """What the compiled update judges by: of a scene, compiled as `plan` with its load, and its angle sensors."""
+def limits_of(scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, mounts: Sequence[Mount | None]) -> Limits:
+    """What the compiled update judges and steps by: of a scene, compiled as `plan` with its load, and its angle sensors."""
     counts = np.array([len(names) for names in channels_of(plan.joints).values()])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
     strokes = filter_tuning(settings.stroke_variance, settings.stroke_agility)
-    tuning = Tuning(strokes, 0.0, settings.step, settings.look_step, settings.rho)
+    tuning = Tuning(strokes, 0.0, steps.step, steps.look_step, settings.rho)
     return Limits(
         tuning=tuning,
         patient=tuning._replace(least_lag=AFTER_PAUSE),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..estimation.look_ahead import Tuning
 from ..estimation.tip_estimate import WIDTH
-from ..kernels.jit import inner
+from ..kernels.jit import by_reference, inner
 from ..types import Array, Stream
 from .blocks import CODES
 
@@ -29,6 +29,7 @@ USUAL_STEP, STEPPED, PAUSED = range(3)  # of `pace`
 FIRST, COUNT = range(2)  # of a ring
 
 
+@by_reference
 class Ring(NamedTuple):
     """The newest rows of a table: `bounds` has the place of the oldest one, and how many there are."""
 
@@ -40,6 +41,7 @@ class Ring(NamedTuple):
     strokes: Array
 
 
+@by_reference
 class TwinState(NamedTuple):
     """What the twin remembers from sample to sample, beside the boom; s streams of up to w channels, c measured ones in all.
 
@@ -77,6 +79,7 @@ class TwinState(NamedTuple):
     forces2: Array
 
 
+@by_reference
 class Limits(NamedTuple):
     """What `update` judges and steps by.
 
@@ -108,6 +111,7 @@ class Limits(NamedTuple):
     channels: Integers
 
 
+@by_reference
 class UpdateOutput(NamedTuple):
     """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 

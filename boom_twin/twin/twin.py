@@ -13,6 +13,7 @@ from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.deviation_modes import DeviationModes
+from ..estimation.step_choice import choose_steps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
@@ -69,6 +70,8 @@ class Twin:
         stroke sample, which `Report.change` tells.
     judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
+    steps : StepChoice
+        How the boom is stepped, and how far that may be off.
 
     Notes
     -----
@@ -153,7 +156,8 @@ class Twin:
         if self.baseline is not None:
             self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
         self._modes = DeviationModes(scene, self.plan, self.settings, self.mounts)
-        limits = limits_of(scene, self.plan, self.settings, self.mounts)
+        self.steps = choose_steps(scene, self.plan, self.settings)
+        limits = limits_of(scene, self.plan, self.settings, self.steps, self.mounts)
         self._compiled = BlockUpdate(
             self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge, self.counts
         )
@@ -166,7 +170,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.mounts)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:

@@ -85,7 +85,7 @@ def counted() -> Counter[str]:
     scheme = prepare(GENERALISED_ALPHA, 0.8, 1e-3, work.weights)
     COUNTS.clear()
     drive = counting(plan.closed_lengths + strokes + 1e-6)
-    status, _, _ = advance(tables, state, work, scheme, drive, counting(np.full(4, 1e-3)), 1e-6, 1, 0.5, None)
+    status, _, _ = advance(tables, state, work, scheme, drive, counting(np.full(4, 1e-3)), 1e-6, 1, 0.5, None, False)
     assert status == 0
     return Counter(COUNTS)
 

@@ -27,7 +27,9 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
     powers, gaps, done, lost = [(0.0, 0.0)], [], 0.0, 0.0
     for k in range(1, round(duration / step) + 1):
         length, rate, _ = drive(k * step)
-        status, _, _ = advance(plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None)
+        status, _, _ = advance(
+            plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
+        )
         assert status == 0
         powers.append((energy.power_of_drives(plan, state, rate), energy.dissipation(plan, state, rate)))
         done += 0.5 * step * (powers[-1][0] + powers[-2][0])

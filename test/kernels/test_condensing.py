@@ -11,7 +11,7 @@ from boom_twin.kernels.elements.cylinder import END_C, END_R
 from boom_twin.kernels.elements.pin_contact import BARREL_END_PIN, HOLD_COLUMNS, HOLD_X, K_XX, K_XY, K_YY, ROD_END_PIN
 from boom_twin.kernels.integrators import PARK, WILSON, A, V, X, finish_step, new_weights, prepare, start_step
 from boom_twin.kernels.transfer.clearance_pins import SECTION, _turn_back, condense_ends
-from boom_twin.kernels.transfer.six_bar import _condense_loop
+from boom_twin.kernels.transfer.six_bar import _condense_loop, _condense_loop_forces
 
 STEP = 0.01
 
@@ -26,11 +26,11 @@ def test_a_condensed_loop_is_the_schur_complement(count: int, size: int) -> None
     rng, others = np.random.default_rng(size), size - count
     h, g = symmetric(rng, size), rng.normal(size=size)
     room = np.zeros
-    work = SimpleNamespace(
-        s=room((others, others)), p=room(others), g=g, h=np.tril(h), right=room((count, others + 1)),
-        matrix=room((count, count)),
+    work = SimpleNamespace(s=room((others, others)), p=room(others), g=g, h=np.tril(h), right=room((count, others + 1)))
+    found = SimpleNamespace(
+        blocks=room((1, count, count)), gains=room((1, count, others)), free=room((1, count)),
+        factors=room((1, count, count)), order=np.zeros((1, count), np.int64),
     )  # fmt: skip
-    found = SimpleNamespace(blocks=room((1, count, count)), gains=room((1, count, others)), free=room((1, count)))
     assert _condense_loop(work, found, 0, 0, count, size)
     q = np.arange(SECTION, SECTION + count)
     x = np.setdiff1d(np.arange(size), q)
@@ -40,6 +40,10 @@ def test_a_condensed_loop_is_the_schur_complement(count: int, size: int) -> None
     assert work.p == pytest.approx(g[x] - h[np.ix_(x, q)] @ free)
     parts = [np.linalg.eigvalsh(part) for part in (found.blocks[0], work.s)]
     assert np.sum(np.linalg.eigvalsh(h) < 0.0) == sum(np.sum(part < 0.0) for part in parts)
+    work.g = rng.normal(size=size)  # other forces, the same tangent
+    _condense_loop_forces(work, found, 0, count, size)
+    free = np.linalg.solve(h[np.ix_(q, q)], work.g[q])
+    assert found.free[0] == pytest.approx(free) and work.p == pytest.approx(work.g[x] - h[np.ix_(x, q)] @ free)
 
 
 @pytest.mark.parametrize("places", [(ROD_END_PIN,), (BARREL_END_PIN,), (ROD_END_PIN, BARREL_END_PIN)])

@@ -131,7 +131,7 @@ BEAM_Z = np.array([0.2, -0.1, 0.6, 0.10, -0.15, 0.05, 0.02])  # x, y, theta of t
 def placed(z, row):
     """End position (3,), all histories and the part for input end z[:3] and coordinates z[3:]."""
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
-    part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((POINTS, 4)))
+    part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((POINTS + 1, 4)))
     angles, position = np.zeros(POINTS + 1), np.zeros(COUNT + 1 + 3 * POINTS)
     angle = beam.beam_shape(row, part, SIZES, z[3:], angles)
     c, s = np.cos(z[2]), np.sin(z[2])
@@ -231,7 +231,8 @@ def test_body_forces_and_tangent():
     def swept_body(e):
         s, p, at = np.zeros((3, 3)), np.zeros(3), place(e)
         force = mass * (GAIN * (at - hat)[:2] - GRAVITY)
-        rigid.add_body(s, p, mass, inertia, *(at - e)[:2], *force, inertia * GAIN * (at - hat)[2], GAIN)
+        rigid.add_body_force(p, *(at - e)[:2], *force, inertia * GAIN * (at - hat)[2])
+        rigid.add_body_tangent(s, mass, inertia, *(at - e)[:2], *force, GAIN)
         return p, s
 
     e = np.array([0.5, 0.1, 0.7])
@@ -256,7 +257,8 @@ def test_outlet_and_offset(slots):
     s, p = np.zeros((6, 6)), np.zeros(6)
     s[:slots, :slots], p[:slots] = stiffness, force
     rigid.pull_back(s, p, slots, 0, 1, *turned(theta, *offset))
-    m = rigid.merge_outlet(s, p, slots, *turned(theta, *outlet))
+    rigid.merge_outlet(s, p, slots, *turned(theta, *outlet))
+    m = slots - 2
     zero = np.zeros(slots - 2)
     assert m == slots - 2
     assert p[:m] == pytest.approx(gradient(potential, zero), abs=1e-8)
@@ -289,7 +291,7 @@ def test_solve_pivots_and_reports_singular():
     a, b = rng.normal(size=(6, 6)), rng.normal(size=(6, 3))
     a[0, 0] = 0.0
     expected, x = np.linalg.solve(a, b), b.copy()
-    assert algebra.solve(a.copy(), x, 6, 3)
+    assert algebra.solve(a.copy(), x, 6, 3, np.zeros(6, np.int64))
     assert x == pytest.approx(expected, rel=1e-9)
     a[3] = 0.0
-    assert not algebra.solve(a, b.copy(), 6, 3)
+    assert not algebra.solve(a, b.copy(), 6, 3, np.zeros(6, np.int64))

@@ -44,7 +44,7 @@ def test_a_step_in_motion_solves_the_equations_of_all_unknowns(count):
     scheme = prepare(GENERALISED_ALPHA, RHO, STEP, work.weights)
     for drive, rate in zip(runner.drives[:STEPS], runner.rates[:STEPS], strict=True):
         hat, offset = scheme.weights[[HAT, OFFSET], OLD:] @ state.history
-        status, _, size = advance(plan.tables, state, work, scheme, drive, rate, 1e-11, np.int64(20), 0.5, None)
+        status, _, size = advance(plan.tables, state, work, scheme, drive, rate, 1e-11, np.int64(20), 0.5, None, False)
         assert status == 0
     assert size < 2e-12  # rad: increments of the last pass, all of them rounding
     motion = Motion(scheme.gain, scheme.rate, hat, offset)

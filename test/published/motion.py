@@ -49,7 +49,7 @@ def released(scene, angles):
     weights[HAT, X] = weights[X, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
     instant = Scheme(np.int64(GENERALISED_ALPHA), 0.0, 0.0, 2.0 / INSTANT**2, 0.0, weights)
     still = np.zeros(plan.joints)
-    status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None)
+    status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None, False)
     assert status == 0
     return start
 

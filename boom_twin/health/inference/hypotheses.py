@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from ...types import Array
 from .fault_catalogue import Form, Parameter, variances
@@ -176,6 +175,8 @@ class HypothesisTest:
         Verdict
             How well each fault explains the evidence, and how large it would be.
         """
+        from scipy.special import log_ndtr  # a twin that is well need not wait for it
+
         healthy = evidence.given(mean, covariance)
         matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
         spread = self._faulty / (1.0 + self._faulty * matrix)

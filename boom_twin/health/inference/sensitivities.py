@@ -14,7 +14,7 @@ from ...errors import BoomTwinError
 from ...estimation.sensor_model import Mounting, Reading
 from ...kernels.integrators import REST, X, prepare
 from ...kernels.tables import OK, State, Work
-from ...kernels.transfer.time_step import advance
+from ...kernels.transfer.time_step import ANEW, advance
 from ...scene.edit import with_parameters
 from ...scene.kinematics import joint_angles_of_strokes
 from ...scene.schema import Scene
@@ -107,7 +107,7 @@ class _Boom:
         """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
         drive = self.plan.closed_lengths + strokes
         status, _, _ = advance(
-            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None
+            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW
         )
         return self.reading.of(self.state) if status == OK else None
 

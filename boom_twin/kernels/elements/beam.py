@@ -14,13 +14,14 @@ Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.scene.notation`; 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...types import Array
 from ..jit import inner
-from ..plane_algebra import condense, cosines
+from ..plane_algebra import condense, condense_forces, cosines
 
 BEAM = np.dtype(
     [
@@ -52,7 +53,7 @@ class BeamPart(NamedTuple):
     psi : (P+1, n); the last row, as those of all that follows with P+1 rows, belongs to the output end.
     weights : (P+1, P), m. stiffness : (n, n), N m. mass, rotary : (P,), kg and kg m^2.
     rho : (P+1, 2), m. drho : (P+1, n + axial, 2), its derivatives by q.
-    turn : (P, 4) cosine, sine and their derivatives by the angle.
+    turn : (P+1, 4) cosine, sine and their derivatives by the angle; of the output end the first two.
     """
 
     psi: Array
@@ -96,11 +97,14 @@ def turn_points(row, part, sizes, z, angles):
         for k in range(sizes.bending):
             end += psi[j, k] * z[row.z + k]
         angles[j] = end
+    if row.finite:
+        cosines(angles, sizes.points + 1, turn)
+        for j in range(sizes.points):
+            turn[j, 2], turn[j, 3] = -turn[j, 1], turn[j, 0]
+        return end
     for j in range(sizes.points):
         turn[j, 0], turn[j, 1], turn[j, 2], turn[j, 3] = 1.0, angles[j], 0.0, 1.0
-    cosines(angles, row.finite, turn)
-    for j in range(row.finite):
-        turn[j, 2], turn[j, 3] = -turn[j, 1], turn[j, 0]
+    turn[sizes.points, 0], turn[sizes.points, 1] = math.cos(end), math.sin(end)
     return end
 
 
@@ -153,25 +157,44 @@ def transfer_beam(row, part, sizes, own, z, c, sn, motion, gravity, position, s,
     n = sizes.bending
     size = n + sizes.axial
     fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
-    _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m)
-    _add_points(row, part, sizes, own, c, sn, motion, gravity, position, s, p)
+    if motion.renew:
+        _pull_back_tangents(part, sizes, own, c, sn, fx, fy, s, p, m)
+    _pull_back_forces(part, sizes, own, c, sn, p)
+    _add_forces_of_points(row, part, sizes, own, c, sn, motion, gravity, position, p)
+    _add_elastic_forces(row, part, sizes, own, z, motion)
+    if not motion.renew:
+        condense_forces(p, own.coupling, own.block, own.force, m, size)
+        return 0
+    _add_tangents_of_points(row, part, sizes, own, c, sn, motion, s)
     _add_bending_of_forces(row, part, sizes, own, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n])
-    _add_stiffness(row, part, sizes, own, z, motion)
+    _add_stiffness(row, part, sizes, own, motion)
     return condense(s, p, own.coupling, own.block, own.force, m, size)
 
 
 @inner
-def _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m):
-    """Pull (s, p) at the output end back to (e_I, carried slots) in place and to q in `own`; force (fx, fy) there."""
+def _pull_back_forces(part, sizes, own, c, sn, p):
+    """Pull p at the output end back to e_I in place and to q in `own`."""
+    psi, rho, drho, n, force = part.psi[sizes.points], part.rho[sizes.points], part.drho[sizes.points], sizes.bending, own.force
+    for a in range(n + sizes.axial):
+        ax, ay = drho[a, 0], drho[a, 1]
+        bx, by = c * ax - sn * ay, sn * ax + c * ay
+        turn = psi[a] if a < n else 0.0
+        force[a] = bx * p[0] + by * p[1] + turn * p[2]
+    ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
+    p[2] += ex * p[1] - ey * p[0]
+
+
+@inner
+def _pull_back_tangents(part, sizes, own, c, sn, fx, fy, s, p, m):
+    """Pull s at the output end back to (e_I, carried slots) in place and to q in `own`; force (fx, fy) there."""
     psi, rho, drho = part.psi[sizes.points], part.rho[sizes.points], part.drho[sizes.points]
-    n, coupling, block, force = sizes.bending, own.coupling, own.block, own.force
+    n, coupling, block = sizes.bending, own.coupling, own.block
     size = n + sizes.axial
     ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
     for a in range(size):
         ax, ay = drho[a, 0], drho[a, 1]
         bx, by = c * ax - sn * ay, sn * ax + c * ay
         turn = psi[a] if a < n else 0.0
-        force[a] = bx * p[0] + by * p[1] + turn * p[2]
         for i in range(m):
             coupling[a, i] = s[i, 0] * bx + s[i, 1] * by + s[i, 2] * turn
         h0, h1, h2 = coupling[a, 0], coupling[a, 1], coupling[a, 2]
@@ -181,7 +204,6 @@ def _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m):
             block[a, b] = h0 * (c * ox - sn * oy) + h1 * (sn * ox + c * oy) + h2 * other
         coupling[a, 2] = h2 + ex * h1 - ey * h0 + fy * ax - fx * ay
     bend = ex * p[0] + ey * p[1]
-    p[2] += ex * p[1] - ey * p[0]
     for i in range(m):
         s[i, 2] += ex * s[i, 1] - ey * s[i, 0]
     for i in range(m):
@@ -190,54 +212,66 @@ def _pull_back_end(part, sizes, own, c, sn, fx, fy, s, p, m):
 
 
 @inner
-def _add_points(row, part, sizes, own, c, sn, motion, gravity, position, s, p):
-    """Add the masses at the Gauss points, save second derivatives by two coordinates; leave their forces in `own.local`.
-
-    Into s only below its diagonal.
-    """
-    psi, rho, drho, mass, rotary = part.psi, part.rho, part.drho, part.mass, part.rotary
-    coupling, block, force, local, n = own.coupling, own.block, own.force, own.local, sizes.bending
-    size = n + sizes.axial
-    total, fx_all, fy_all, moment, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def _add_forces_of_points(row, part, sizes, own, c, sn, motion, gravity, position, p):
+    """Add forces of the masses at the Gauss points; leave them in `own.local`, too."""
+    psi, rho, drho, mass, rotary, force, local = part.psi, part.rho, part.drho, part.mass, part.rotary, own.force, own.local
+    fx_all, fy_all, moment = 0.0, 0.0, 0.0
     for i in range(sizes.points):
         at = row.history + 2 * i
         inertial = mass[i] * motion.gain
         fx = inertial * (position[at] - motion.hat[at]) - mass[i] * gravity[0]
         fy = inertial * (position[at + 1] - motion.hat[at + 1]) - mass[i] * gravity[1]
-        x, y = rho[i, 0], rho[i, 1]
         ux, uy = c * fx + sn * fy, c * fy - sn * fx
         local[i, 0], local[i, 1] = ux, uy
-        total += inertial
         fx_all += fx
         fy_all += fy
-        moment += x * uy - y * ux
+        moment += rho[i, 0] * uy - rho[i, 1] * ux
+        for a in range(sizes.bending + sizes.axial):
+            force[a] += ux * drho[i, a, 0] + uy * drho[i, a, 1]
+    for i in range(row.rotary):
+        at = row.history + 2 * sizes.points + i
+        torque = rotary[i] * motion.gain * (position[at] - motion.hat[at])
+        moment += torque
+        for a in range(sizes.bending):
+            force[a] += torque * psi[i, a]
+    p[0] += fx_all
+    p[1] += fy_all
+    p[2] += moment
+
+
+@inner
+def _add_tangents_of_points(row, part, sizes, own, c, sn, motion, s):
+    """Add tangents of the masses at the Gauss points, save second derivatives by two coordinates; forces in `own.local`.
+
+    Into s only below its diagonal.
+    """
+    psi, rho, drho, mass, rotary = part.psi, part.rho, part.drho, part.mass, part.rotary
+    coupling, block, local, n = own.coupling, own.block, own.local, sizes.bending
+    size = n + sizes.axial
+    total, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0
+    for i in range(sizes.points):
+        inertial = mass[i] * motion.gain
+        x, y, ux, uy = rho[i, 0], rho[i, 1], local[i, 0], local[i, 1]
+        total += inertial
         lever_x += inertial * (c * x - sn * y)
         lever_y += inertial * (sn * x + c * y)
         turning += inertial * (x * x + y * y) - (x * ux + y * uy)
         for a in range(size):
             ax, ay = drho[i, a, 0], drho[i, a, 1]
             mx, my = inertial * ax, inertial * ay
-            force[a] += ux * ax + uy * ay
             coupling[a, 0] += c * mx - sn * my
             coupling[a, 1] += sn * mx + c * my
             coupling[a, 2] += x * my - y * mx + uy * ax - ux * ay
             for b in range(a + 1):
                 block[a, b] += mx * drho[i, b, 0] + my * drho[i, b, 1]
     for i in range(row.rotary):
-        at = row.history + 2 * sizes.points + i
         inertial = rotary[i] * motion.gain
-        torque = inertial * (position[at] - motion.hat[at])
-        moment += torque
         turning += inertial
         for a in range(n):
             share = inertial * psi[i, a]
-            force[a] += torque * psi[i, a]
             coupling[a, 2] += share
             for b in range(a + 1):
                 block[a, b] += share * psi[i, b]
-    p[0] += fx_all
-    p[1] += fy_all
-    p[2] += moment
     s[0, 0] += total
     s[1, 1] += total
     s[2, 0] -= lever_y
@@ -267,18 +301,26 @@ def _add_bending_of_forces(row, part, sizes, own, fx_end, fy_end, stretch):
 
 
 @inner
-def _add_stiffness(row, part, sizes, own, z, motion):
-    """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
-    stiffness, block, force, n = part.stiffness, own.block, own.force, sizes.bending
+def _add_stiffness(row, part, sizes, own, motion):
+    """Add tangents of `_add_elastic_forces`."""
+    stiffness, block, n = part.stiffness, own.block, sizes.bending
     lead = 1.0 + row.beta * motion.rate
     for a in range(n):
-        for b in range(n):
-            force[a] += stiffness[a, b] * z[row.z + b]
         for b in range(a + 1):
             block[a, b] += lead * stiffness[a, b]
     if sizes.axial:
-        force[n] += row.axial_stiffness * z[row.z + n]
         block[n, n] += lead * row.axial_stiffness
+
+
+@inner
+def _add_elastic_forces(row, part, sizes, own, z, motion):
+    """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
+    stiffness, force, n = part.stiffness, own.force, sizes.bending
+    for a in range(n):
+        for b in range(n):
+            force[a] += stiffness[a, b] * z[row.z + b]
+    if sizes.axial:
+        force[n] += row.axial_stiffness * z[row.z + n]
     for b in range(row.damped):
         rate = row.beta * (motion.rate * z[row.z + b] + motion.offset[row.z + b])
         if b < n:

@@ -55,9 +55,11 @@ def near(angle, other):
 def place_cylinder(row, parts, cx, cy, rx, ry, before, position):
     """Write length, centres and angles into `position`; angles next to those in `before`, positions of the last step."""
     dx, dy = rx - cx, ry - cy
-    length = math.hypot(dx, dy)
+    length, angle = math.sqrt(dx * dx + dy * dy), 0.0
     ex, ey = dx / length, dy / length
     position[row.history] = length
+    if row.parts:
+        angle = math.atan2(dy, dx)
     for k in range(row.first_part, row.first_part + row.parts):
         part = parts[k]
         x, y, along = cx, cy, part.com
@@ -65,7 +67,7 @@ def place_cylinder(row, parts, cx, cy, rx, ry, before, position):
             x, y, along = rx, ry, -part.com
         position[part.history] = x + along * ex
         position[part.history + 1] = y + along * ey
-        position[part.history + 2] = near(math.atan2(dy, dx), before[part.history + 2])
+        position[part.history + 2] = near(angle, before[part.history + 2])
 
 
 @inner
@@ -75,7 +77,7 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
     `motion` holds A, C, x_hat and D (see `boom_twin.kernels.tables.Motion`); `drive`, `drive_rate` are l_ref, l_ref'.
     """
     dx, dy = rx - cx, ry - cy
-    length = math.hypot(dx, dy)
+    length = math.sqrt(dx * dx + dy * dy)
     ex, ey = dx / length, dy / length
     nx, ny = -ey, ex
     d_n, d_nn, d_en = 0.0, force / length, 0.0  # by d: gradient along n, tangents in the axes e, n
@@ -112,13 +114,15 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
         d_en -= (f_n + torque) / (length * length)
     gx, gy = force * ex + d_n * nx, force * ey + d_n * ny
     g[END_C], g[END_C + 1], g[END_R], g[END_R + 1] = gcx - gx, gcy - gy, grx + gx, gry + gy
+    lead = 1.0 + row.lag * motion.rate
+    speed = motion.rate * length + motion.offset[row.history] - drive_rate
+    g[AXIAL] = (length - drive + row.lag * speed - row.compliance * force) / lead
+    if not motion.renew:
+        return
     _fill(h, END_C, END_C, ex, ey, cc_ee, d_en, cc_nn + d_nn)
     _fill(h, END_R, END_R, ex, ey, rr_ee, d_en, rr_nn + d_nn)
     _fill(h, END_C, END_R, ex, ey, 0.0, -d_en, cr_nn - d_nn)
     _fill(h, END_R, END_C, ex, ey, 0.0, -d_en, cr_nn - d_nn)
-    lead = 1.0 + row.lag * motion.rate
-    speed = motion.rate * length + motion.offset[row.history] - drive_rate
-    g[AXIAL] = (length - drive + row.lag * speed - row.compliance * force) / lead
     h[AXIAL, END_C], h[AXIAL, END_C + 1], h[AXIAL, END_R], h[AXIAL, END_R + 1] = -ex, -ey, ex, ey
     h[END_C, AXIAL], h[END_C + 1, AXIAL], h[END_R, AXIAL], h[END_R + 1, AXIAL] = -ex, -ey, ex, ey
     h[AXIAL, AXIAL] = -row.compliance / lead

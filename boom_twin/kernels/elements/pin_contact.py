@@ -128,7 +128,7 @@ def hunt_crossley_exact(restitution: float) -> float:
     wanted, low, high = max(restitution, LEAST_RESTITUTION), 0.0, 1.0
     while restitution_of(high) > wanted:
         low, high = high, 2.0 * high
-    return _bisect(lambda chi: restitution_of(chi) > wanted, low, high)
+    return bisect(lambda chi: restitution_of(chi) > wanted, low, high)
 
 
 LAWS = {
@@ -147,7 +147,7 @@ def restitution_of(loss: float) -> float:
     G(u) the integral of s/max(1 + chi s, `LEAST_SHARE`) from 0 to u (Gonthier, McPhee, Lange and Piedboeuf 2004).
     """
     entering = _impact(loss, 1.0)
-    return _bisect(lambda e: _impact(loss, -e) < entering, 0.0, 1.0)
+    return bisect(lambda e: _impact(loss, -e) < entering, 0.0, 1.0)
 
 
 def _impact(chi: float, u: float) -> float:
@@ -161,7 +161,7 @@ def _impact(chi: float, u: float) -> float:
     return found + beyond * (free + 0.5 * beyond) / LEAST_SHARE if beyond > 0.0 else found
 
 
-def _bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
+def bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
     """Where `is_below` turns from true to false."""
     for _ in range(60):
         middle = 0.5 * (low + high)

@@ -11,13 +11,19 @@ from ..jit import inner
 
 
 @inner
+def pull_back_force(p, x_of, y_of, bx, by):
+    """`pull_back` of forces alone."""
+    p[2] += bx * p[y_of] - by * p[x_of]
+
+
+@inner
 def pull_back(s, p, m, x_of, y_of, bx, by):
     """Let slots x_of, y_of be a point at (bx, by) from the frame in slots 0..2: add what it does to slot 2, turning.
 
     Congruence with T = 1 + (-by e_x + bx e_y) e_theta^T, and the second derivative of the point.
     """
     bend = bx * p[x_of] + by * p[y_of]
-    p[2] += bx * p[y_of] - by * p[x_of]
+    pull_back_force(p, x_of, y_of, bx, by)
     for i in range(m):
         s[i, 2] += bx * s[i, y_of] - by * s[i, x_of]
     for i in range(m):
@@ -26,12 +32,17 @@ def pull_back(s, p, m, x_of, y_of, bx, by):
 
 
 @inner
-def add_body(s, p, mass, inertia, dx, dy, fx, fy, torque, gain):
-    """Mass at (dx, dy) from the frame: force -(fx, fy) = -m (a - g) and -torque = -J alpha on it, tangents m A and J A."""
-    inertial = mass * gain
+def add_body_force(p, dx, dy, fx, fy, torque):
+    """Mass at (dx, dy) from the frame: force -(fx, fy) = -m (a - g) and -torque = -J alpha on it."""
     p[0] += fx
     p[1] += fy
     p[2] += dx * fy - dy * fx + torque
+
+
+@inner
+def add_body_tangent(s, mass, inertia, dx, dy, fx, fy, gain):
+    """Tangents m A and J A of the same mass."""
+    inertial = mass * gain
     s[0, 0] += inertial
     s[1, 1] += inertial
     s[0, 2] -= inertial * dy
@@ -42,8 +53,24 @@ def add_body(s, p, mass, inertia, dx, dy, fx, fy, torque, gain):
 
 
 @inner
+def merge_outlet_force(p, m, bx, by):
+    """`merge_outlet` of forces alone."""
+    pull_back_force(p, 3, 4, bx, by)
+    close_force_gap(p, m)
+
+
+@inner
+def close_force_gap(p, m):
+    """Add slots 3, 4 to 0, 1, and let those behind move up."""
+    p[0] += p[3]
+    p[1] += p[4]
+    for i in range(5, m):
+        p[i - 2] = p[i]
+
+
+@inner
 def merge_outlet(s, p, m, bx, by):
-    """Slots 3, 4 are a point at (bx, by) of the frame: fold them into slots 0..2 and close the gap; returns m - 2."""
+    """Slots 3, 4 are a point at (bx, by) of the frame: fold them into slots 0..2 and close the gap."""
     pull_back(s, p, m, 3, 4, bx, by)
     for i in range(m):
         s[i, 0] += s[i, 3]
@@ -51,13 +78,10 @@ def merge_outlet(s, p, m, bx, by):
     for i in range(m):
         s[0, i] += s[3, i]
         s[1, i] += s[4, i]
-    p[0] += p[3]
-    p[1] += p[4]
+    close_force_gap(p, m)
     for i in range(5, m):
-        p[i - 2] = p[i]
         for j in range(m):
             s[i - 2, j] = s[i, j]
     for i in range(5, m):
         for j in range(m - 2):
             s[j, i - 2] = s[j, i]
-    return m - 2

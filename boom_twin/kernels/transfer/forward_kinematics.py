@@ -144,7 +144,7 @@ def place(t, state, work):
                 place_beam(beam, part, sizes, work.angles, x, y, theta, c, s, position)
             bx, by = part.rho[beam.points, 0], part.rho[beam.points, 1]
             x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
-            c, s = math.cos(theta), math.sin(theta)
+            c, s = rotated(c, s, part.turn[beam.points, 0], part.turn[beam.points, 1])
         elif kind == BODY:
             body = t.bodies[row]
             at = body.history

@@ -32,7 +32,7 @@ class Product(NamedTuple):
     bounds : (k + 1,) operations at which the units start, and the end.
     u : (k, 6, 7) transfer matrices; the first unit, substructure A, has none.
     force : (k, 3) force and torque at the output of every unit, N and N m, of the pass before.
-    total, other : (6, 7), a, right, inverse : scratch.
+    total, other : (6, 7), a, right, order : scratch.
     z : (7,) state vector, its last entry 1.
     """
 
@@ -43,6 +43,7 @@ class Product(NamedTuple):
     other: Array
     a: Array
     right: Array
+    order: np.ndarray
     z: Array
 
 
@@ -57,7 +58,7 @@ def new_product(t: Tables) -> Product:
     units = len(bounds) - 1
     return Product(
         np.array(bounds, np.int64), np.zeros((units, 6, 7)), np.zeros((units, 3)), np.zeros((6, 7)), np.zeros((6, 7)),
-        np.zeros((5, 5)), np.zeros((5, 7)), np.zeros(7),
+        np.zeros((5, 5)), np.zeros((5, 7)), np.zeros(5, np.int64), np.zeros(7),
     )  # fmt: skip
 
 
@@ -72,7 +73,7 @@ def open_end(work, force):
 
 
 @inner
-def transfer_matrix(s, p, force, a, right, u):
+def transfer_matrix(s, p, force, a, right, order, u):
     """U (6, 7) of a unit from its condensed (s, p), six slots; False if its output force does not show at its input."""
     for i in range(3):
         for j in range(3):
@@ -80,7 +81,7 @@ def transfer_matrix(s, p, force, a, right, u):
             right[i, j] = -s[i, j]
             right[i, 3 + j] = 1.0 if i == j else 0.0
         right[i, 6] = -p[i]
-    if not solve(a, right, THREE, SEVEN):
+    if not solve(a, right, THREE, SEVEN, order):
         return False
     for i in range(3):
         for j in range(7):
@@ -131,7 +132,7 @@ def close_root(work, product):
                 a[2 + i, 2 + j] += weight * s[3 + k, 3 + j]
         for j in range(3):
             a[2 + i, 2 + j] += total[3 + i, 3 + j]
-    return solve(a, right, FIVE, np.int64(1))
+    return solve(a, right, FIVE, np.int64(1), product.order)
 
 
 @inner
@@ -148,7 +149,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
         if status != OK:
             return SINGULAR
         if k > 0:
-            if not transfer_matrix(work.s, work.p, force[k], product.a, product.right, u[k]):
+            if not transfer_matrix(work.s, work.p, force[k], product.a, product.right, product.order, u[k]):
                 return SINGULAR
             multiply(total, u[k], other)
             for i in range(6):

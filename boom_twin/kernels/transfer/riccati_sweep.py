@@ -6,7 +6,14 @@ import numpy as np
 
 from ..elements.beam import USUAL, BeamEquations, Sizes, is_usual, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
-from ..elements.rigid_body import add_body, merge_outlet, pull_back
+from ..elements.rigid_body import (
+    add_body_force,
+    add_body_tangent,
+    merge_outlet,
+    merge_outlet_force,
+    pull_back,
+    pull_back_force,
+)
 from ..jit import inner, kernel
 from ..tables import (
     BEAM,
@@ -41,7 +48,9 @@ def transfer_body(t, work, motion, row, c, sn):
     fx = body.mass * (gain * (position[i] - hat[i]) - t.gravity[0])
     fy = body.mass * (gain * (position[i + 1] - hat[i + 1]) - t.gravity[1])
     torque = body.inertia * gain * (position[i + 2] - hat[i + 2])
-    add_body(work.s, work.p, body.mass, body.inertia, bx, by, fx, fy, torque, gain)
+    add_body_force(work.p, bx, by, fx, fy, torque)
+    if motion.renew:
+        add_body_tangent(work.s, body.mass, body.inertia, bx, by, fx, fy, gain)
 
 
 @inner
@@ -49,7 +58,10 @@ def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
     beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
     own = BeamEquations(
-        coupling=condensed.gains[operation], block=work.block, force=condensed.free[operation], local=work.local
+        coupling=condensed.gains[operation],
+        block=condensed.factors[operation],
+        force=condensed.free[operation],
+        local=work.local,
     )
     if is_usual(beam):
         return transfer_beam(beam, part, USUAL, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
@@ -90,10 +102,19 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
             transfer_body(t, work, motion, row, c, sn)
         elif kind == OFFSET:
             bx, by = t.offsets[row].x, t.offsets[row].y
-            pull_back(s, p, m, 0, 1, c * bx - sn * by, sn * bx + c * by)
+            ex, ey = c * bx - sn * by, sn * bx + c * by
+            if motion.renew:
+                pull_back(s, p, m, 0, 1, ex, ey)
+            else:
+                pull_back_force(p, 0, 1, ex, ey)
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
-            m = merge_outlet(s, p, m, c * bx - sn * by, sn * bx + c * by)
+            ex, ey = c * bx - sn * by, sn * bx + c * by
+            if motion.renew:
+                merge_outlet(s, p, m, ex, ey)
+            else:
+                merge_outlet_force(p, m, ex, ey)
+            m -= 2
             p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:
             m = join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m)
@@ -101,7 +122,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
             if not close_loop(t, state, work, condensed, motion, drive, drive_rate, row, k, m):
                 return SINGULAR, negative, m
             m += 2
-        elif kind == JOINT_A and not close_base(t, work, condensed, k):
+        elif kind == JOINT_A and not close_base(t, work, condensed, motion.renew, k):
             return SINGULAR, negative, m
     return OK, negative, m
 

@@ -14,11 +14,13 @@ Pivots and link pins with clearance: `kernels.transfer.clearance_pins`.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.linkage import LINK_L, LINK_R
 from ..elements.pin_contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..jit import inner
-from ..plane_algebra import rotated, solve
+from ..plane_algebra import factorise, rotated, substitute
 from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_SECTION
 from .clearance_pins import (
     ALPHA_L,
@@ -41,12 +43,17 @@ from .forward_kinematics import link_frame
 
 
 @inner
-def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
-    """Add force (fx, fy) and tangent k at a point of a link: pivot + (bx, by) on body `base` + (wx, wy) on `link`."""
+def add_link_force(g, base, link, bx, by, wx, wy, fx, fy):
+    """Add force (fx, fy) at a point of a link: pivot + (bx, by) on body `base` + (wx, wy) on `link`."""
     g[0] += fx
     g[1] += fy
     g[base] += bx * fy - by * fx
     g[link] += wx * fy - wy * fx
+
+
+@inner
+def add_link_tangent(h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
+    """Add tangent k and that of a force (fx, fy) at the same point."""
     base_x, base_y = bx * kxy - by * kxx, bx * kyy - by * kxy
     link_x, link_y = wx * kxy - wy * kxx, wx * kyy - wy * kxy
     h[0, 0] += kxx
@@ -62,7 +69,7 @@ def add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, kxx, kxy, kyy):
 
 
 @inner
-def _add_closure(joint, linkage, z, turns, g, h):
+def _add_closure(joint, linkage, z, turns, renew, g, h):
     """Closure of pin Q and the forces its multiplier puts on the four bodies."""
     lx, ly = z[joint.z + Z_LAMBDA], z[joint.z + Z_LAMBDA + 1]
     for side in range(2):
@@ -76,6 +83,8 @@ def _add_closure(joint, linkage, z, turns, g, h):
         g[LAMBDA + 1] += sign * (by + uy)
         g[base] += sign * (bx * ly - by * lx)
         g[link] += sign * (ux * ly - uy * lx)
+        if not renew:
+            continue
         h[base, base] -= sign * (bx * lx + by * ly)
         h[link, link] -= sign * (ux * lx + uy * ly)
         h[LAMBDA, base] -= sign * by
@@ -100,9 +109,11 @@ def _add_link(t, joint, linkage, side, turns, motion, position, g, h):
         base, link = SECTION, ALPHA_R
         if row.side == LINK_L:
             base, link = HEAD, ALPHA_L
-        add_link_point(g, h, base, link, bx, by, wx, wy, fx, fy, inertial, 0.0, inertial)
+        add_link_force(g, base, link, bx, by, wx, wy, fx, fy)
         g[link] += row.inertia * motion.gain * (position[i + 2] - motion.hat[i + 2])
-        h[link, link] += row.inertia * motion.gain
+        if motion.renew:
+            add_link_tangent(h, base, link, bx, by, wx, wy, fx, fy, inertial, 0.0, inertial)
+            h[link, link] += row.inertia * motion.gain
 
 
 @inner
@@ -120,12 +131,18 @@ def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g
     base, link = SECTION, ALPHA_R
     if linkage.mount == LINK_L:
         base, link = HEAD, ALPHA_L
-    add_link_point(
-        g, h, base, link, bx, by, wx, wy, own_g[END_R], own_g[END_R + 1],
+    add_link_force(g, base, link, bx, by, wx, wy, own_g[END_R], own_g[END_R + 1])
+    for j in range(2):
+        g[PIN_C + j] += own_g[END_C + j]
+    g[FORCE] += own_g[AXIAL]
+    g[link] -= torque_of(t, work, cylinder, ROD_END_PIN)
+    if not motion.renew:
+        return
+    add_link_tangent(
+        h, base, link, bx, by, wx, wy, own_g[END_R], own_g[END_R + 1],
         own_h[END_R, END_R], own_h[END_R + 1, END_R], own_h[END_R + 1, END_R + 1],
     )  # fmt: skip
     for j in range(2):  # pin C against the rod pin, and itself
-        g[PIN_C + j] += own_g[END_C + j]
         h[PIN_C + j, 0] += own_h[END_R, END_C + j]
         h[PIN_C + j, 1] += own_h[END_R + 1, END_C + j]
         turn = bx * own_h[END_R + 1, END_C + j] - by * own_h[END_R, END_C + j]
@@ -137,14 +154,12 @@ def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g
         for i in range(j, 2):
             h[PIN_C + i, PIN_C + j] += own_h[END_C + i, END_C + j]
         h[FORCE, PIN_C + j] += own_h[AXIAL, END_C + j]
-    g[FORCE] += own_g[AXIAL]
     h[FORCE, FORCE] += own_h[AXIAL, AXIAL]
     ex, ey = own_h[AXIAL, END_R], own_h[AXIAL, END_R + 1]
     h[FORCE, 0] += ex
     h[FORCE, 1] += ey
     h[FORCE, base] += bx * ey - by * ex
     h[FORCE, link] += wx * ey - wy * ex
-    g[link] -= torque_of(t, work, cylinder, ROD_END_PIN)
 
 
 @inner
@@ -157,12 +172,12 @@ def _add_side(t, state, work, condensed, index, side, motion, drive, drive_rate,
 
 
 @inner
-def _add_cut(work, m, behind, g, h):
+def _add_cut(work, m, behind, renew, g, h):
     """Section i: x, y of its pivot, its angle, and what is carried already, which stands from place `behind` on."""
     for i in range(m):
         a = i if i < 2 else SECTION if i == 2 else behind + i - 3
         g[a] += work.p[i]
-        for j in range(i + 1):
+        for j in range(i + 1 if renew else 0):
             h[a, j if j < 2 else SECTION if j == 2 else behind + j - 3] += work.s[i, j]
 
 
@@ -177,23 +192,26 @@ def close_loop(t, state, work, condensed, motion, drive, drive_rate, index, oper
     size = behind + m - 3
     for i in range(size):
         g[i] = 0.0
-        for j in range(i + 1):
+        for j in range(i + 1 if motion.renew else 0):
             h[i, j] = 0.0
     if joint.clearances == 0:
         _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
         _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
-        _add_cut(work, m, behind, g, h)
-        _add_closure(joint, linkage, state.z, turns, g, h)
-        return _condense_loop(work, condensed, index, operation, INNER, size)
+        _add_cut(work, m, behind, motion.renew, g, h)
+        _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
+        if motion.renew:
+            return _condense_loop(work, condensed, index, operation, INNER, size)
+        _condense_loop_forces(work, condensed, operation, INNER, size)
+        return True
     keep_rows(work.apart, g, h, size)
     _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_L_PIN, size, g, h)
     keep_rows(work.apart, g, h, size)
     _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_R_PIN, size, g, h)
-    _add_cut(work, m, behind, g, h)
+    _add_cut(work, m, behind, motion.renew, g, h)
     take_rows(t, work, joint, PIVOT, size, g, h)
-    _add_closure(joint, linkage, state.z, turns, g, h)
+    _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
     free_pins(t, state, work, joint, g, h)
     return _condense_loop(work, condensed, index, operation, behind - SECTION, size)
 
@@ -214,7 +232,8 @@ def _condense_loop(work, condensed, index, operation, count, size):
     (Haynsworth 1968), so the blocks H_qq are kept for counting natural frequencies. Only the lower triangle of `h` is filled:
     the five others before SECTION meet q in its rows, those behind it in its columns.
     """
-    s, p, g, h, right, matrix = work.s, work.p, work.g, work.h, work.right, work.matrix
+    s, p, g, h, right = work.s, work.p, work.g, work.h, work.right
+    matrix, order = condensed.factors[operation], condensed.order[operation]
     block, gains, free, others = condensed.blocks[index], condensed.gains[operation], condensed.free[operation], size - count
     for i in range(count):
         for j in range(SECTION):
@@ -225,8 +244,9 @@ def _condense_loop(work, condensed, index, operation, count, size):
         for j in range(i + 1):
             block[i, j] = matrix[i, j] = h[SECTION + i, SECTION + j]
             block[j, i] = matrix[j, i] = h[SECTION + i, SECTION + j]
-    if not solve(matrix, right, count, others + 1):
+    if not factorise(matrix, count, order):
         return False
+    substitute(matrix, order, right, count, others + 1)
     for i in range(count):
         for j in range(others):
             gains[i, j] = right[i, j]
@@ -244,6 +264,21 @@ def _condense_loop(work, condensed, index, operation, count, size):
         for j in range(i):
             s[j, i] = s[i, j]
     return True
+
+
+@inner
+def _condense_loop_forces(work, condensed, operation, count, size):
+    """What `_condense_loop` does with forces, by the gains and the factors that it left."""
+    p, g, right, others, gains = work.p, work.g, work.right, size - count, condensed.gains[operation]
+    for i in range(others):
+        p[i] = g[i if i < SECTION else i + count]
+        for k in range(count):
+            p[i] -= gains[k, i] * g[SECTION + k]
+    for i in range(count):
+        right[i, 0] = g[SECTION + i]
+    substitute(condensed.factors[operation], condensed.order[operation], right, count, np.int64(1))
+    for i in range(count):
+        condensed.free[operation, i] = right[i, 0]
 
 
 @inner

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.pin_contact import HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, ROD_END_PIN, TORQUE, TORQUE_TURN, TORQUE_X
 from ..jit import inner
-from ..plane_algebra import solve
+from ..plane_algebra import factorise, substitute
 from .clearance_pins import condense_ends, torque_of
 
 
@@ -25,17 +25,21 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
     )  # fmt: skip
     condense_ends(t, state, work, condensed, cylinder, g, h)
     bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
+    for i in range(2):
+        p[i] += g[END_R + i]
+    p[m] = g[AXIAL]
+    p[2] += bx * g[END_R + 1] - by * g[END_R] - torque_of(t, work, cylinder, ROD_END_PIN)
+    if not motion.renew:
+        return m + 1
     for i in range(m + 1):
         s[m, i] = 0.0
         s[i, m] = 0.0
     for i in range(2):
-        p[i] += g[END_R + i]
         s[m, i] = h[AXIAL, END_R + i]
         s[i, m] = h[AXIAL, END_R + i]
-    s[m, m], p[m] = h[AXIAL, AXIAL], g[AXIAL]
+    s[m, m] = h[AXIAL, AXIAL]
     turn_x = -by * h[END_R, END_R] + bx * h[END_R, END_R + 1]  # row of the turning against x, y of the rod pin
     turn_y = -by * h[END_R + 1, END_R] + bx * h[END_R + 1, END_R + 1]
-    p[2] += bx * g[END_R + 1] - by * g[END_R] - torque_of(t, work, cylinder, ROD_END_PIN)
     for i in range(2):
         for j in range(2):
             s[i, j] += h[END_R + i, END_R + j]
@@ -50,13 +54,18 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
 
 
 @inner
-def close_base(t, work, condensed, operation):
+def close_base(t, work, condensed, renew, operation):
     """Solve increments of joint A into the gains of `operation`: theta, N, and x, y if the pivot has clearance.
 
-    False if singular.
+    renew : whether its tangent is made anew. False if singular.
     """
-    s, p, a, b, joint = work.s, work.p, work.matrix, work.right, t.joints[0]
-    size = 2 + 2 * joint.clearances
+    s, p, b, joint = work.s, work.p, work.right, t.joints[0]
+    a, order, size = condensed.factors[operation], condensed.order[operation], 2 + 2 * joint.clearances
+    if not renew:
+        b[0, 0], b[1, 0] = p[2], p[3]
+        substitute(a, order, b, size, 1)
+        condensed.free[operation, 0], condensed.free[operation, 1] = b[0, 0], b[1, 0]
+        return True
     for i in range(size):
         of = 2 + i if i < 2 else i - 2
         b[i, 0] = p[of]
@@ -78,8 +87,9 @@ def close_base(t, work, condensed, operation):
     for i in range(size):
         for j in range(size):
             condensed.blocks[0, i, j] = a[i, j]
-    if not solve(a, b, size, 1):
+    if not factorise(a, size, order):
         return False
+    substitute(a, order, b, size, 1)
     for i in range(size):
         condensed.free[operation, i] = b[i, 0]
     return True

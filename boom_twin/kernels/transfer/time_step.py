@@ -8,14 +8,24 @@ import numpy as np
 
 from ..elements.pin_contact import CLOSED, Journal, pin_force
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
-from ..jit import inner, kernel
+from ..jit import inner, kernel, referenced
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
 from .forward_kinematics import place
+from .kept_tangent import (
+    correct_guess,
+    forget_all,
+    forget_tangent,
+    is_converged,
+    keep_tangent,
+    may_keep,
+    note_correction,
+)
 from .matrix_product import plain_pass
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
+ANEW = np.bool_(False)  # for `advance`: no tangent is kept. Typed, because numba compiles once more for every literal
 TICKS = np.int64(4096)  # of a step, the grid of its sub-steps
 MOST = np.int64(32)  # sub-steps that a step is divided into for their error; for passes that fail, down to SHORTEST
 SHORTEST = 1e-5  # s, of a sub-step
@@ -24,7 +34,7 @@ LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the s
 
 
 @kernel
-def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product):
+def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
     """Step the boom to drive lengths (m) and rates (m/s), both shape (n,), at the instant that `scheme` solves for.
 
     Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Where journals with
@@ -43,6 +53,9 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         Increments are shortened so that none exceeds this (rad).
     product : Product or None
         None for the Riccati form; else room for the plain product of transfer matrices (see `kernels.transfer.matrix_product`).
+    keep : bool
+        Whether this step goes on from the last one made in `work`, whose tangent it may use: see
+        `kernels.transfer.kept_tangent`; for ideal pins in the Riccati form.
 
     Returns
     -------
@@ -60,9 +73,15 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         interpolate_drive(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
         start_step(now, history, work.hat, work.offset)
         predict(t, state, now.reach)
-        motion, status, left = Motion(now.gain, now.rate, work.hat, work.offset), NOT_CONVERGED, passes
+        if keep:
+            correct_guess(state, work)
+        status, left, before = NOT_CONVERGED, passes, 0.0
         place(t, state, work)
         while status == NOT_CONVERGED and left > 0:
+            renew = not keep or not may_keep(t, state, work, now.gain)
+            if renew and keep:
+                keep_tangent(state, work, now.gain)
+            motion = Motion(now.gain, now.rate, work.hat, work.offset, renew)
             load_pins(t, state, work, motion)
             if product is None:
                 clear_cut(work, FREE)
@@ -75,8 +94,18 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 shorten(t, state, work)
                 size = add_increments(t, state, work, longest)
                 place(t, state, work)
-            status = newton_status(work, solved, size, tolerance, passes)
             left -= 1
+            if keep:
+                status = newton_status(work, solved, size, 0.0, 0)
+                if status == NOT_CONVERGED and is_converged(t, state, work, size, before, renew, tolerance):
+                    status = OK
+                before = size
+            else:
+                status = newton_status(work, solved, size, tolerance, passes)
+        if keep:
+            note_correction(state, work)
+            if left < passes - 1:
+                forget_tangent(work)
         total += passes - left
         error = coarseness(t, state, work, condensed, now)
         if (status != OK and part > least) or (error > 1.0 and part > coarse):
@@ -229,13 +258,15 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         Sum over all steps of h^2 |a'| of the tip, m: half of `jolt` where the acceleration changes sign from step to step.
     """
     at, total, jolt, shake, a = 0, 0, 0.0, 0.0, state.history[A]
+    keep = product is None and passes > 1 and t.clearances.shape[0] == 0
+    forget_all(work)
     for row in range(steps.shape[0]):
         if row == 0 or steps[row] != steps[row - 1]:
             scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
             status, count, _ = advance(
-                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product
+                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, keep
             )
             total += count
             at += 1
@@ -277,7 +308,7 @@ def run_each(tables, states, work, first, last, steps, counts, drives, rates, fa
     """
     for i in range(first, last):
         status, row, total, _, _ = run(
-            tables_of(tables, i), state_of(states, i), work, steps, counts, drives[i], rates[i],
+            referenced(tables_of(tables, i)), referenced(state_of(states, i)), work, steps, counts, drives[i], rates[i],
             family, parameter, tolerance, passes, None, out[i],
         )  # fmt: skip
         ends[i, 0], ends[i, 1], ends[i, 2] = status, row, total

@@ -1,0 +1,104 @@
+"""Tangents that are kept from step to step: modified Newton with a monitor of its convergence.
+
+A pass with the tangent of an earlier place leaves a share of the error that it finds, about as large as the boom has turned
+and bent since (Deuflhard, Newton Methods for Nonlinear Problems, 2011, section 2.1). So the error after a pass is
+
+    share times size,    share = lead times travel,
+
+size being the pass's largest increment, travel the largest change of a coordinate since the tangent was made, both as angles,
+and `lead` a number that is raised whenever two passes of a step show more. Passes follow until that is below a tenth of the
+square of the tolerance, which is what a pass with a new tangent would leave; after a step with more than one pass the next
+begins with a new tangent, and so does a pass where the share would be above `MOST_SHARE`.
+
+That one pass nearly always suffices is because a step's guess is corrected as the last ones had to be, by the parabola through
+the corrections of three steps. Without it an error of one sign was left in every step, 1e-12 rad of which the tip collects to
+0.1 um.
+"""
+
+from __future__ import annotations
+
+from ..jit import inner
+from ..tables import CORRECTIONS
+
+LEAD = 4.0  # at first
+MOST_SHARE = 0.05  # of an error that a pass may leave
+CLOSER = 0.1  # of the square of the tolerance, that may be left
+LEAST_ERROR = 1e-15  # rad, that is asked for
+ROUNDING = 0.5  # of the increment before, that one consists of rounding above
+SEEN = 1e-7  # rad, increments from which a share is measured
+
+# Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known.
+GAIN, SHARE_LEAD, CORRECTED = range(3)
+
+
+@inner
+def forget_all(work):
+    """No tangent and no correction is kept: another boom or another motion begins."""
+    work.kept[GAIN], work.kept[SHARE_LEAD], work.kept[CORRECTED] = 0.0, LEAD, 0.0
+
+
+@inner
+def forget_tangent(work):
+    """The next step begins with a new tangent."""
+    work.kept[GAIN] = 0.0
+
+
+@inner
+def may_keep(t, state, work, gain):
+    """Whether the kept tangent is good enough for a step of a scheme with `gain`."""
+    return work.kept[GAIN] == gain and work.kept[SHARE_LEAD] * travel(t, state, work) < MOST_SHARE
+
+
+@inner
+def keep_tangent(state, work, gain):
+    """Note that tangents are made here, for `gain`."""
+    work.kept[GAIN] = gain
+    for i in range(state.z.shape[0]):
+        work.kept_z[i] = state.z[i]
+
+
+@inner
+def travel(t, state, work):
+    """Largest change of a coordinate since tangents were made, as an angle (rad)."""
+    most = 0.0
+    for i in range(state.z.shape[0]):
+        most = max(most, t.scale[i] * abs(state.z[i] - work.kept_z[i]))
+    return most
+
+
+@inner
+def is_converged(t, state, work, size, before, renewed, tolerance):
+    """Whether a pass with an increment of `size` (rad) was the last of a step.
+
+    before : increment of the pass before it in this step, or 0. renewed : whether the tangent was new, so that what is left is
+    about the square of `size`. Below the tolerance an increment that does not get smaller is rounding.
+    """
+    way = travel(t, state, work)
+    if before > SEEN and way > 0.0:
+        work.kept[SHARE_LEAD] = max(work.kept[SHARE_LEAD], size / before / way)
+    if size < tolerance and (renewed or size > ROUNDING * before > 0.0):
+        return True
+    return work.kept[SHARE_LEAD] * way * size < max(CLOSER * tolerance * tolerance, LEAST_ERROR)
+
+
+@inner
+def correct_guess(state, work):
+    """Correct the guess in `state` as the last ones had to be; before the first pass of a step."""
+    known, c = work.kept[CORRECTED], work.corrections
+    for i in range(state.z.shape[0]):
+        work.guess[i] = state.z[i]
+        if known == 1.0:
+            state.z[i] += c[0, i]
+        elif known == 2.0:
+            state.z[i] += 2.0 * c[0, i] - c[1, i]
+        elif known == 3.0:
+            state.z[i] += 3.0 * (c[0, i] - c[1, i]) + c[2, i]
+
+
+@inner
+def note_correction(state, work):
+    """Note by how much the guess was off, after the last pass of a step."""
+    for i in range(state.z.shape[0]):
+        work.corrections[2, i], work.corrections[1, i] = work.corrections[1, i], work.corrections[0, i]
+        work.corrections[0, i] = state.z[i] - work.guess[i]
+    work.kept[CORRECTED] = min(work.kept[CORRECTED] + 1.0, 1.0 * CORRECTIONS)

@@ -1,0 +1,104 @@
+"""Named tuples by reference: kernels read the fields that Python, or another kernel, put there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from boom_twin.estimation.look_ahead import Track
+from boom_twin.kernels.jit import by_reference, kernel, referenced
+from boom_twin.kernels.tables import Condensed, State, Tables, Work
+from boom_twin.twin.state import Limits, Ring, TwinState, UpdateOutput
+
+
+class Pair(NamedTuple):
+    first: float
+    second: int
+
+
+@by_reference
+class Inside(NamedTuple):
+    values: np.ndarray
+
+
+@by_reference
+class Fields(NamedTuple):
+    flag: bool
+    pair: Pair
+    inside: Inside
+    table: np.ndarray
+
+
+@kernel
+def total(fields):
+    found = 0.0
+    for i in range(fields.table.shape[0]):
+        for j in range(fields.table.shape[1]):
+            found += fields.table[i, j] * fields.inside.values[j]
+    if fields.flag:
+        found += fields.pair.first * fields.pair.second
+    return found
+
+
+@kernel
+def totals(tables, values, pair, out):
+    """`total` of tuples that are made here, another one in every turn."""
+    for i in range(out.shape[0]):
+        inside = referenced(Inside(values=values[i]))
+        out[i] = total(referenced(Fields(flag=i % 2 == 1, pair=pair, inside=inside, table=tables[i])))
+
+
+@kernel
+def other(fields):
+    return fields.nothing
+
+
+def fields(flag=True):
+    return Fields(flag, Pair(0.5, 3), Inside(np.array([1.0, 10.0])), np.arange(6.0).reshape(3, 2))
+
+
+def test_a_kernel_reads_fields_of_every_kind():
+    assert total(fields()) == 96.0 + 1.5
+    assert total(fields(flag=False)) == 96.0
+    assert total(fields()._replace(table=np.ones((1, 2)))) == 11.0 + 1.5
+
+
+def test_tuples_made_in_a_loop_are_told_apart():
+    rng = np.random.default_rng(1)
+    tables, values, out = rng.normal(size=(50, 3, 2)), rng.normal(size=(50, 2)), np.zeros(50)
+    totals(tables, values, Pair(0.5, 3), out)
+    assert out == pytest.approx(np.einsum("ijk,ik->i", tables, values) + 1.5 * (np.arange(50) % 2), rel=1e-12)
+
+
+def test_what_is_no_field_is_told():
+    with pytest.raises(Exception, match="nothing"):
+        other(fields())
+
+
+def test_a_field_of_another_kind_is_another_kernel():
+    assert total(fields()._replace(table=np.ones((1, 2), dtype=np.int64))) == 11.0 + 1.5
+
+
+@pytest.mark.parametrize("kind", [Tables, State, Work, Condensed, Track, TwinState, Ring, Limits, UpdateOutput])
+def test_what_kernels_pass_on_often_goes_by_reference(kind):
+    import numba
+
+    from boom_twin.kernels.jit import _register_references
+
+    _register_references()
+    assert type(numba.typeof(kind(*np.zeros((len(kind._fields), 1))))).__name__ == "Reference"
+
+
+def test_a_twin_starts_without_the_slow_parts_of_scipy():
+    """They took longer to import than all else."""
+    program = (
+        "import sys; from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up();"
+        "print([name for name in ('scipy.special', 'scipy.optimize', 'scipy.stats') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=os.environ, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]", done.stdout
