@@ -53,7 +53,7 @@ def main() -> None:
         busy = len(times) * mean
         span = times[-1] - times[0]
         print(f"{rigs} rigs: {len(times)} sessions a day, {busy / 3600.0:.1f} core-hours a day; one scheduler's share "
-              f"{len(times) * args.overhead / span:.0%}")  # fmt: skip
+              f"{len(times) * args.overhead / span:.1%}")  # fmt: skip
         for name, seconds in (("within the shifts", span), ("within the day", DAY)):
             cores = max(1, int(np.ceil(1.15 * busy / seconds)))
             found = waits(times, cores, service, args.overhead)
