@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from logging import CRITICAL
+from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
 from .session_task import Row, SessionTask, failed
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, LocalCluster
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 ALLOWED = 5
 """Workers that may end while they have a task, before it counts as a failed attempt."""
 AHEAD = 500
 """Tasks that are with the scheduler at once: enough for its workers to be busy, few enough for 100 000 sessions."""
+LOST = 5
+"""Seconds without a word of a worker after which another one takes its place."""
 CONNECT = 20.0
 """Seconds for a scheduler to answer."""
 
@@ -54,14 +59,37 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         with client:
             yield client
         return
-    settings = {"distributed.scheduler.allowed-failures": ALLOWED, "distributed.worker.daemon": False}
-    with dask.config.set(settings):  # a session is no part of its worker, whose memory is watched apart
-        options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "memory_limit": 0, "silence_logs": 50}
-        with (
-            LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, **options) as cluster,
-            Client(cluster, set_as_default=False) as client,
-        ):
-            yield client
+    settings = {
+        "distributed.scheduler.allowed-failures": ALLOWED,
+        "distributed.worker.daemon": False,  # a worker has children of its own
+        "distributed.deploy.lost-worker-timeout": f"{LOST}s",
+    }
+    options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "memory_limit": 0, "silence_logs": CRITICAL}
+    with (
+        dask.config.set(settings),
+        LocalCluster(n_workers=workers or os.cpu_count(), threads_per_worker=1, processes=True, **options) as cluster,
+        Client(cluster, set_as_default=False) as client,
+        _kept_up(cluster),
+    ):
+        yield client
+
+
+@contextmanager
+def _kept_up(cluster: LocalCluster) -> Iterator[None]:
+    """Replace workers that have gone for good: Dask restarts one that is killed, but not if that happens while it starts."""
+    count, ended = len(cluster.worker_spec), Event()
+
+    def watch() -> None:
+        while not ended.wait(LOST):
+            cluster.scale(count)
+
+    thread = Thread(target=watch, name="workers", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[SessionTask], Row]) -> Iterator[Row]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, a cluster on this machine"
     )
-    parser.add_argument("--workers", metavar="N", type=int, help="of the cluster on this machine; by default as many as cores")
+    parser.add_argument(
+        "--workers", metavar="N", type=at_least(1), help="of the cluster on this machine; by default as many as cores"
+    )
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=scene)
     add_params(parser)
@@ -37,8 +39,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
     parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
     parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
-    parser.add_argument("--retries", metavar="N", type=int, default=1, help="of a session that fails (1)")
+    parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="of a session that fails (1)")
     parser.add_argument("--retry-failed", action="store_true", help="go on with those too that failed in an earlier call")
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """Reads a whole number that is not below `least`."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise ArgumentTypeError(f"{text}: must be a whole number of at least {least}")
+        return int(text)
+
+    return read
 
 
 def run(args: Namespace) -> int:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -19,6 +20,8 @@ psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.pa
 pytest.importorskip("distributed")
 
 from boom_twin import replay  # noqa: E402
+from boom_twin.batch.cluster import connected, rows_of  # noqa: E402
+from boom_twin.batch.session_task import Row, SessionTask  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
 from boom_twin.system.child_process import python_command  # noqa: E402
 
@@ -57,10 +60,14 @@ def wait_for_rows(process: subprocess.Popen[str], out: Path, count: int) -> None
 
 
 def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
-    """The processes that have a replay's process as a child, which leads a session of its own."""
-    found = psutil.Process(process.pid).children(recursive=True)
-    tasks = [each for each in found if any("session_task" in word for word in each.cmdline())]
-    return [each.parent() for each in tasks]
+    """The processes of Dask's workers, as the processes of sessions have them for parents."""
+    return [each for each in psutil.Process(process.pid).children() if is_at_work(each)]
+
+
+def is_at_work(process: psutil.Process) -> bool:
+    with suppress(psutil.Error):
+        return any("session_task" in word for child in process.children() for word in child.cmdline())
+    return False
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +166,30 @@ def test_no_scheduler_answers(
     monkeypatch.setattr("boom_twin.batch.cluster.CONNECT", 0.5)
     assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "o"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
     assert "no Dask scheduler answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", [("--workers", "0"), ("--retries", "-1"), ("--timeout", "0"), ("--memory", "nan")])
+def test_numbers_out_of_bounds_are_refused(option: tuple[str, str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["batch", "x", "--out", str(tmp_path / "o"), *option])
+
+
+def nothing(task: SessionTask) -> Row:
+    """A task that does nothing."""
+    return {"key": task.key}
+
+
+@pytest.mark.slow
+def test_workers_that_are_killed_while_they_start_are_replaced() -> None:
+    tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(20)]
+    with connected(None, 1) as client:
+        for _ in range(2):  # the worker, and the next one, which has not said a word yet
+            end = time.monotonic() + PATIENCE
+            while not (workers := [each for each in psutil.Process().children() if "spawn_main" in " ".join(each.cmdline())]):
+                assert time.monotonic() < end
+                time.sleep(0.02)
+            workers[0].kill()
+        assert len(list(rows_of(client, tasks, nothing))) == 20
 
 
 def test_without_the_extra_one_line_tells_what_to_install(sessions: Path, tmp_path: Path) -> None:

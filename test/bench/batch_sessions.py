@@ -13,6 +13,7 @@ import signal
 import subprocess
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 
@@ -82,10 +83,10 @@ def kill_workers(process: subprocess.Popen[bytes], every: float, ended: Event) -
     """End a worker by force now and then, chosen at random."""
     choice = random.Random(1)
     while not ended.wait(every):
-        found = psutil.Process(process.pid).children(recursive=True)
-        busy = [each.parent() for each in found if any("session_task" in word for word in each.cmdline())]
-        if busy:
-            os.kill(choice.choice(busy).pid, signal.SIGKILL)
+        with suppress(psutil.Error):
+            busy = [each for each in psutil.Process(process.pid).children() if each.children()]
+            if busy:
+                choice.choice(busy).kill()
 
 
 def faults(sessions: Path, out: Path, every: float) -> None:
