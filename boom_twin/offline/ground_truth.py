@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from dataclasses import dataclass
 from io import BytesIO
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +44,9 @@ class TipTruth:
 
     def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
         """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
-        stamps, first = predictions.stamps[rows], int(predictions.stamps[0])
-        return {
-            "tip_error_rms_m": self.position_error(stamps, first, predictions.tip_position[rows]),
-            "tip_acceleration_error_rms_m_s2": self.acceleration_error(stamps, first, predictions.tip_acceleration[rows]),
-        }
+        found = TipErrors(self)
+        found.add(predictions, rows)
+        return found.rms
 
     def position_error(self, stamps: NDArray[np.int64], first: int, position: Array) -> float:
         """Root mean square of the distance to `position` (k, 2), m, told at `stamps` (ns); the truth begins at `first` (ns)."""
@@ -59,10 +58,39 @@ class TipTruth:
 
     def _rms_off(self, stamps: NDArray[np.int64], first: int, told: Array, true: Array) -> float:
         times = (stamps - first) * NANO + self.times[0]
-        return float(np.sqrt(np.mean(np.sum((told - self._at(times, true)) ** 2, axis=1))))
+        return float(np.sqrt(np.mean(np.sum((told - self.at(times, true)) ** 2, axis=1))))
 
-    def _at(self, times: Array, values: Array) -> Array:
+    def at(self, times: Array, values: Array) -> Array:
+        """One of the truth's arrays at other times, shape (k, 2)."""
         return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])
+
+
+class TipErrors:
+    """Root mean square errors of predictions that come in parts; the first one of all is at the truth's first time."""
+
+    def __init__(self, truth: TipTruth) -> None:
+        self._truth = truth
+        self._first: int | None = None
+        self._count, self._position, self._acceleration = 0, 0.0, 0.0
+
+    def add(self, predictions: PredictionBlock, rows: slice) -> None:
+        """Take in some rows of predictions, all by the clock of the first one."""
+        stamps, truth = predictions.stamps[rows], self._truth
+        if not len(stamps):
+            return
+        self._first = int(stamps[0]) if self._first is None else self._first
+        times = (stamps - self._first) * NANO + truth.times[0]
+        self._count += len(stamps)
+        self._position += float(np.sum((predictions.tip_position[rows] - truth.at(times, truth.position)) ** 2))
+        self._acceleration += float(np.sum((predictions.tip_acceleration[rows] - truth.at(times, truth.acceleration)) ** 2))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Of the position, m, and of the acceleration, m/s^2, by their names in ``summary.json``."""
+        return {
+            "tip_error_rms_m": sqrt(self._position / self._count),
+            "tip_acceleration_error_rms_m_s2": sqrt(self._acceleration / self._count),
+        }
 
 
 def load_truth(folder: Path) -> TipTruth | None:
