@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, ChunkIndex, Message
+from mcap.records import Chunk, Message
 
 from ..messages.message_block import MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
+from .chunk_table import ChunkPlace, ChunkTable
 from .mcap_records import (
     MESSAGE_HEAD,
     UnpackBudget,
@@ -43,7 +44,7 @@ _LOOSE, _LARGE = 256, 2**16
 """Messages outside chunks that are put into a block, and bytes of one that ends it."""
 
 
-def message_blocks(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[MessageBlock]:
+def message_blocks(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
     """All messages by log time, at equal times in the order of the file; their sources are their channels.
 
     Only chunks that overlap in time are held together, and some small ones; without an index of chunks, the whole file is.
@@ -63,7 +64,7 @@ def message_blocks(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[Message
         yield joined(waiting)
 
 
-def _groups(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[MessageBlock]:
+def _groups(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
     """The messages of chunks that overlap in time, or of the whole file, by log time."""
     if not chunks:
         yield _held(_outside_and_inside(path))
@@ -76,11 +77,11 @@ def _groups(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[MessageBlock]:
             yield _held(_inside(chunk_at(file, index), budget) for index in group)
 
 
-def _overlapping(chunks: Sequence[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
+def _overlapping(chunks: ChunkTable) -> Iterator[list[ChunkPlace]]:
     """Groups of chunks, each later than the one before; within a group in the order of the file."""
-    group: list[ChunkIndex] = []
+    group: list[ChunkPlace] = []
     end = 0
-    for index in sorted(chunks, key=attrgetter("message_start_time", "chunk_start_offset")):
+    for index in chunks.by_time():
         if group and index.message_start_time >= end:
             yield sorted(group, key=attrgetter("chunk_start_offset"))
             group = []

@@ -47,7 +47,8 @@ def compare_counts(place: Path, source: str, counts: Mapping[str, int], other: s
 BLOCK = 2**20
 """Bytes that are read at a time where a file may be of any size."""
 
-_FOOTER = struct.Struct("<BQQQI8s")
+FOOTER = struct.Struct("<BQQQI8s")
+"""The last record of a file, with the magic behind it."""
 
 
 def check_ends(path: Path, file: BinaryIO) -> None:
@@ -62,7 +63,7 @@ def check_ends(path: Path, file: BinaryIO) -> None:
     summary, is_sound = ends
     if not is_sound:
         fault = f"the checksum of the summary, from byte {summary}, does not fit"
-        if summary > size - _FOOTER.size:
+        if summary > size - FOOTER.size:
             fault = f"the summary is said to begin at byte {summary}, which is not in front of the footer of its {size} bytes"
         raise BagError(f"{path}: {fault}. {REMEDY}")
 
@@ -76,13 +77,13 @@ def summary_start(path: Path) -> int | None:
 
 def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
     """Start of the summary, and whether it is in the file and its checksum fits or is absent; None without a whole footer."""
-    file.seek(max(0, size - _FOOTER.size))
+    file.seek(max(0, size - FOOTER.size))
     tail = file.read()
-    if len(tail) < _FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
+    if len(tail) < FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
         return None
-    _, _, start, _, checksum, _ = _FOOTER.unpack(tail)
-    start = start or size - _FOOTER.size
-    if start > size - _FOOTER.size:
+    _, _, start, _, checksum, _ = FOOTER.unpack(tail)
+    start = start or size - FOOTER.size
+    if start > size - FOOTER.size:
         return start, False
     return start, checksum in (0, checksum_of(file, start, size - len(MCAP0_MAGIC) - 4))
 

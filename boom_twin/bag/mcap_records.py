@@ -5,10 +5,9 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,11 +16,12 @@ from mcap import records as mcap_records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, McapRecord, Message
+from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import StreamReader
 from zstandard import ZstdDecompressor
 
 from ..system.received_files import open_received
+from .chunk_table import ChunkPlace, ChunkTable
 from .integrity import PARSE_ERRORS
 
 LARGEST = 64 * 2**20
@@ -215,7 +215,7 @@ def outer_records(path: Path) -> Iterator[McapRecord]:
         yield from StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records
 
 
-def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, bytes]]:
+def heads(path: Path, chunks: ChunkTable) -> Iterator[tuple[int, int, bytes]]:
     """Channel, log time (ns) and encoded data of all messages in the order of the file, one chunk in memory."""
     if not chunks:
         for record in records(path):
@@ -224,14 +224,14 @@ def heads(path: Path, chunks: Sequence[ChunkIndex]) -> Iterator[tuple[int, int, 
         return
     budget = UnpackBudget()
     with open_received(path) as file:
-        for index in sorted(chunks, key=attrgetter("chunk_start_offset")):
+        for index in chunks.by_place():
             for opcode, body in parts(unpack(chunk_at(file, index), budget)):
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)
                     yield channel, log_time, body[MESSAGE_HEAD.size :]
 
 
-def chunk_at(file: BinaryIO, index: ChunkIndex) -> Chunk:
+def chunk_at(file: BinaryIO, index: ChunkPlace) -> Chunk:
     """The chunk that `index` points at."""
     if index.chunk_length > LARGEST:
         raise McapError(f"chunk of {index.chunk_length} bytes: at most {LARGEST} are read")

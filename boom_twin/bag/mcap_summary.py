@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from io import SEEK_END
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
-from mcap.summary import Summary
+from mcap.exceptions import McapError
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.stream_reader import StreamReader
 
 from ..errors import BagError
 from ..system.received_files import open_received
-from .integrity import as_bag_error, check_ends, compare_counts
+from .chunk_table import ChunkPlace, ChunkTable
+from .integrity import FOOTER, as_bag_error, check_ends, compare_counts
 from .mcap_records import LARGEST, by_topic, records
 from .recovery.chunk_head import head_at
 
@@ -36,7 +51,7 @@ class McapFile:
         Messages by channel.
     start, end : int
         First and last log time in nanoseconds; 0 without messages.
-    chunks : tuple of ChunkIndex
+    chunks : ChunkTable
         Empty when the file has no complete index and must be read as a whole.
     checked : bool
         Whether its messages are under a checksum and counted. If not, a flipped bit can pass without notice.
@@ -49,7 +64,7 @@ class McapFile:
     counts: dict[int, int]
     start: int
     end: int
-    chunks: tuple[ChunkIndex, ...]
+    chunks: ChunkTable
     checked: bool
     notes: dict[str, str]
 
@@ -69,13 +84,16 @@ def summarise(path: Path) -> McapFile:
     """
     with as_bag_error(path), open_received(path) as file:
         check_ends(path, file)
+        limit = min(LARGEST, path.stat().st_size)
         file.seek(0)
-        reader = SeekingReader(file, validate_crcs=True, record_size_limit=min(LARGEST, path.stat().st_size))
-        if (profile := reader.get_header().profile) != PROFILE:
-            raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
-        summary = reader.get_summary()
-        told = summary.statistics if summary else None
-        if summary is None or told is None or not _is_complete(summary, told):
+        header = next(StreamReader(file, record_size_limit=limit).records)
+        if not isinstance(header, Header):
+            raise McapError(f"begins with a {type(header).__name__}, not with a header")
+        if header.profile != PROFILE:
+            raise BagError(f"{path}: profile = {header.profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
+        summary = _summary(file, limit)
+        told = summary.statistics
+        if told is None or not summary.is_complete:
             return _walk(path)
         return McapFile(
             path=path,
@@ -84,23 +102,77 @@ def summarise(path: Path) -> McapFile:
             counts=dict(told.channel_message_counts),
             start=told.message_start_time,
             end=told.message_end_time,
-            chunks=tuple(summary.chunk_indexes),
-            checked=all(_has_checksum(file, index) for index in summary.chunk_indexes),
-            notes=_notes(reader.iter_metadata()),
+            chunks=summary.chunks,
+            checked=all(_has_checksum(file, place) for place in summary.chunks),
+            notes=_notes(_metadata_at(file, place, limit) for place in summary.metadata),
         )
 
 
-def _is_complete(summary: Summary, told: Statistics) -> bool:
-    """Whether the summary alone tells what is in the file and where."""
-    return (
-        0 < told.chunk_count == len(summary.chunk_indexes)
-        and told.channel_message_counts.keys() <= summary.channels.keys()
-        and {channel.schema_id for channel in summary.channels.values()} <= {0, *summary.schemas}
-    )
+@dataclass(slots=True)
+class _Summary:
+    """The summary of a file, as far as it has one; `metadata` is where records of metadata lie."""
+
+    statistics: Statistics | None = None
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    chunks: ChunkTable = field(default_factory=ChunkTable)
+    metadata: list[int] = field(default_factory=list)
+
+    def add(self, record: McapRecord) -> None:
+        """Take one record in."""
+        match record:
+            case Statistics():
+                self.statistics = record
+            case Channel():
+                self.channels[record.id] = record
+            case Schema():
+                self.schemas[record.id] = record
+            case ChunkIndex():
+                self.chunks.append(record)
+            case MetadataIndex():
+                self.metadata.append(record.offset)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it alone tells what is in the file and where."""
+        told = self.statistics
+        return (
+            told is not None
+            and 0 < told.chunk_count == len(self.chunks)
+            and told.channel_message_counts.keys() <= self.channels.keys()
+            and {channel.schema_id for channel in self.channels.values()} <= {0, *self.schemas}
+        )
 
 
-def _has_checksum(file: BinaryIO, index: ChunkIndex) -> bool:
-    head = head_at(file, index.chunk_start_offset)
+def _summary(file: BinaryIO, limit: int) -> _Summary:
+    """Read the summary record by record: the index of chunks of a day is long."""
+    found = _Summary()
+    file.seek(-FOOTER.size, SEEK_END)
+    footer = next(_records_here(file, limit))
+    if not isinstance(footer, Footer):
+        raise McapError(f"ends with a {type(footer).__name__}, not with a footer")
+    if footer.summary_start:
+        file.seek(footer.summary_start)
+        for record in _records_here(file, limit):
+            found.add(record)
+    return found
+
+
+def _records_here(file: BinaryIO, limit: int) -> Iterator[McapRecord]:
+    """Records from where the file stands up to its footer, of at most `limit` bytes each."""
+    return StreamReader(file, skip_magic=True, record_size_limit=limit).records
+
+
+def _metadata_at(file: BinaryIO, place: int, limit: int) -> Metadata:
+    file.seek(place)
+    record = next(_records_here(file, limit))
+    if not isinstance(record, Metadata):
+        raise McapError(f"no metadata at byte {place}, where the summary has some")
+    return record
+
+
+def _has_checksum(file: BinaryIO, place: ChunkPlace) -> bool:
+    head = head_at(file, place.chunk_start_offset)
     return head is not None and head.crc != 0
 
 
@@ -132,7 +204,7 @@ def _walk(path: Path) -> McapFile:
                 told = record
     start = start if counts else 0
     checked = is_summed or (chunks_summed == {True} and told is not None)
-    held = McapFile(path, channels, schemas, dict(counts), start, end, (), checked, _notes(notes))
+    held = McapFile(path, channels, schemas, dict(counts), start, end, ChunkTable(), checked, _notes(notes))
     if told is not None:
         held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
     return held

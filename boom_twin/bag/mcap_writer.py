@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import BinaryIO
 
 import numpy as np
@@ -70,7 +70,8 @@ class McapWriter:
         self._chunk = _OpenChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks = bytearray()  # the index of chunks, encoded: that of a day is long
+        self._chunk_count, self._span = 0, (2**64, 0)  # of all chunks: first and last log time, ns
         self._metadata: list[MetadataIndex] = []
         self._counts: Counter[int] = Counter()
         stream.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
@@ -138,33 +139,33 @@ class McapWriter:
         """Write the end of the file: summary, where its parts are, footer."""
         self._finish_chunk()
         self._stream.write(_encoded(DataEnd(0)))
-        start, summary, offsets = self._stream.tell(), b"", []
-        groups: tuple[tuple[Opcode, Sequence[McapRecord]], ...] = (
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
+        place = start = self._stream.tell()
+        checksum, offsets = 0, []
+        groups = (
+            (Opcode.SCHEMA, _encoded(*self._schemas)),
+            (Opcode.CHANNEL, _encoded(*self._channels)),
+            (Opcode.STATISTICS, _encoded(self._statistics())),
             (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, []),
-            (Opcode.METADATA_INDEX, self._metadata),
+            (Opcode.ATTACHMENT_INDEX, b""),
+            (Opcode.METADATA_INDEX, _encoded(*self._metadata)),
         )
         for opcode, group in groups:
-            records = _encoded(*group)
-            offsets.append(SummaryOffset(opcode, start + len(summary), len(records)))
-            summary += records
-        footer = Footer(start, start + len(summary), 0)
-        summary += _encoded(*offsets)
-        footer.summary_crc = zlib.crc32(summary + _encoded(footer)[:-4])  # of all but itself
-        self._stream.write(summary + _encoded(footer) + MCAP0_MAGIC)
+            offsets.append(SummaryOffset(opcode, place, len(group)))
+            checksum, place = zlib.crc32(group, checksum), place + len(group)
+            self._stream.write(group)
+        footer, last = Footer(start, place, 0), _encoded(*offsets)
+        footer.summary_crc = zlib.crc32(_encoded(footer)[:-4], zlib.crc32(last, checksum))  # of all but itself
+        self._stream.write(last + _encoded(footer) + MCAP0_MAGIC)
 
     def _statistics(self) -> Statistics:
         return Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
+            chunk_count=self._chunk_count,
             message_count=self._counts.total(),
-            message_end_time=max((index.message_end_time for index in self._chunks), default=0),
-            message_start_time=min((index.message_start_time for index in self._chunks), default=0),
+            message_end_time=self._span[1],
+            message_start_time=self._span[0] if self._chunk_count else 0,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
@@ -199,7 +200,9 @@ class McapWriter:
             written += b"".join(entries)
             self._counts[channel] += len(entries)
         self._stream.write(written)
-        self._chunks.append(
+        self._chunk_count += 1
+        self._span = min(self._span[0], chunk.start), max(self._span[1], chunk.end)
+        self._chunks += _encoded(
             ChunkIndex(
                 message_start_time=chunk.start,
                 message_end_time=chunk.end,

@@ -53,14 +53,15 @@ def run(args: Namespace) -> int:
 def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) -> ComparedSession:
     from ..config.settings import load_settings
     from ..offline.replay import replay_into
-    from ..report.compare import side_of, worked_out
+    from ..report.compare import side_of
+    from ..report.evaluation import Evaluator
 
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
         scene, settings = open_session_scene(session, args.scene), load_settings(args.params)
         inner = building.inner(name)
-        result = replay_into(inner, session, scene, settings, baseline=args.baseline)
-        worked_out(result, scene.scene, settings, args.baseline, inner.folder)
+        evaluator = Evaluator(scene.scene, settings, args.baseline)
+        evaluator.finish(replay_into(inner, session, scene, settings, baseline=args.baseline, take=evaluator.add), inner.folder)
         return inner.folder
 
     return side_of(path, replayed)

@@ -12,9 +12,8 @@ from .main import add_json, add_params, add_session_scene, open_session_scene, p
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
-    from ..config.settings import Settings
     from ..offline.replay import ProgressBar, Replay
-    from ..types import Array
+    from ..report.evaluation import Evaluation
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -44,6 +43,7 @@ def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
     from ..config.settings import load_settings
     from ..offline.replay import replay_into
+    from ..report.evaluation import Evaluator
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
@@ -54,8 +54,10 @@ def run(args: Namespace) -> int:
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
         options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
-        result = replay_into(building, args.bag, scene, *options)
-        files = [path.name for path in _write(args, result, scene, settings, heights, building.folder)]
+        evaluator = Evaluator(scene.scene, settings, args.baseline)
+        result = replay_into(building, args.bag, scene, *options, take=evaluator.add)
+        found = evaluator.finish(result, building.folder, heights)
+        files = [path.name for path in _write(args, result, found, scene, building.folder)]
     warn_incomplete(result.session)
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
@@ -66,20 +68,17 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _write(
-    args: Namespace, result: Replay, scene: SessionScene, settings: Settings, heights: Array | None, out: Path
-) -> list[Path]:
-    """Figures, pictures and report, as they are wanted."""
+def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionScene, out: Path) -> list[Path]:
+    """Pictures and report, as they are wanted; with the file of the figures."""
     from ..offline.history import draw
-    from ..report.compare import worked_out
     from ..report.page import Subject, write_report
 
-    history, still, path = worked_out(result, scene.scene, settings, args.baseline, out)
-    files = [path]
+    files = [found.file]
     if not args.no_pictures:
-        files += draw(result, history, out)
+        files += draw(result, found.history, out)
     if args.report:
-        files.append(write_report(Subject(result, history, scene.scene, scene.source, still, heights), out))
+        subject = Subject(result, found, scene.scene, scene.source, args.section_height is not None)
+        files.append(write_report(subject, out))
     return files
 
 

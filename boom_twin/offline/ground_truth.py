@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from dataclasses import dataclass
 from io import BytesIO
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -38,18 +39,41 @@ class TipTruth:
 
     def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
         """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
-        times = (predictions.stamps[rows] - predictions.stamps[0]) * NANO + self.times[0]
-        return {
-            "tip_error_rms_m": _rms(predictions.tip_position[rows] - self._at(times, self.position)),
-            "tip_acceleration_error_rms_m_s2": _rms(predictions.tip_acceleration[rows] - self._at(times, self.acceleration)),
-        }
+        found = TipErrors(self)
+        found.add(predictions, rows)
+        return found.rms
 
-    def _at(self, times: Array, values: Array) -> Array:
+    def at(self, times: Array, values: Array) -> Array:
+        """One of the truth's arrays at other times, shape (k, 2)."""
         return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])
 
 
-def _rms(vectors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+class TipErrors:
+    """Root mean square errors of predictions that come in parts; the first one of all is at the truth's first time."""
+
+    def __init__(self, truth: TipTruth) -> None:
+        self._truth = truth
+        self._first: int | None = None
+        self._count, self._position, self._acceleration = 0, 0.0, 0.0
+
+    def add(self, predictions: PredictionBlock, rows: slice) -> None:
+        """Take in some rows of predictions, all by the clock of the first one."""
+        stamps, truth = predictions.stamps[rows], self._truth
+        if not len(stamps):
+            return
+        self._first = int(stamps[0]) if self._first is None else self._first
+        times = (stamps - self._first) * NANO + truth.times[0]
+        self._count += len(stamps)
+        self._position += float(np.sum((predictions.tip_position[rows] - truth.at(times, truth.position)) ** 2))
+        self._acceleration += float(np.sum((predictions.tip_acceleration[rows] - truth.at(times, truth.acceleration)) ** 2))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Of the position, m, and of the acceleration, m/s^2, by their names in ``summary.json``."""
+        return {
+            "tip_error_rms_m": sqrt(self._position / self._count),
+            "tip_acceleration_error_rms_m_s2": sqrt(self._acceleration / self._count),
+        }
 
 
 def load_truth(folder: Path) -> TipTruth | None:

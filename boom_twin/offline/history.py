@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
+from ..compiler.plan import Plan
 from ..plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
+from ..plots.extreme_rows import ExtremeRows
+from ..plots.health import slow_part
 from ..plots.history import Orbits
+from ..plots.residuals import running_mean
+from ..plots.session_totals import SessionTotalsBuilder
+from ..plots.tip import WINDOW
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..twin.expected_readings import tip_specific_force
-from ..types import NANO, Array, Stream
+from ..types import NANO, Array, Stream, channels_of
 from .ground_truth import TipTruth
-from .recording import Recording, ResidualRows
+from .recording import Recording, ResidualRows, Stretch
 from .replay import Replay
 
 
@@ -28,13 +36,144 @@ def draw(result: Replay, history: History, out: Path) -> list[Path]:
 
 
 def history_of(recording: Recording, scene: Scene) -> History:
-    """Everything a replay predicted, as arrays; times from the first prediction."""
-    predictions = recording.predictions
-    first = int(predictions.stamps[0])
-    groups = {stream: recording.of(stream) for stream in Stream}
-    stamps = _seconds(predictions.stamps, first)
+    """Everything a replay predicted, as arrays, times from the first prediction; of a recording that keeps its session."""
+    builder = HistoryBuilder(scene)
+    builder.add(recording.whole)
+    return builder.history(recording)
+
+
+MOST_ROWS = 2**16
+"""Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 5.5 min at 200 Hz."""
+MOST_SHAPES = 1024
+"""Shapes of the boom that are kept, of which pictures show two dozen."""
+PREDICTED = (
+    "stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes", "moments",
+)  # fmt: skip
+
+
+class HistoryBuilder:
+    """Makes the history of a session from its stretches, in memory that does not grow with their number.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._plan = scene, compile_scene(scene)
+        self._predicted = ExtremeRows(MOST_ROWS, (1, 2, 3, 7, 8, 9))
+        self._imu, self._levels = ExtremeRows(MOST_ROWS, (1, 2)), ExtremeRows(MOST_ROWS, (1,))
+        self._residuals = {stream: ExtremeRows(MOST_ROWS, (1, 3)) for stream in Stream}
+        self._totals = SessionTotalsBuilder()
+        self._level_names: tuple[str, ...] = ()
+        self._shapes = _Shapes()
+        self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
+
+    def add(self, stretch: Stretch) -> History:
+        """Take the next stretch in; returns the history of it alone, with all its rows."""
+        own = _stretch_history(stretch, self._scene)
+        self._note_peak(own)
+        self._totals.add(own)
+        slow = np.stack([slow_part(own, i) for i in range(own.moments.shape[1])], 1) if own.moments.size else own.moments
+        pins = stretch.predictions.clearances
+        columns = *(getattr(own, name) for name in PREDICTED), slow, pins.reshape(len(pins), -1)
+        self._put(self._predicted, columns)
+        for stream, table in self._residuals.items():
+            rows = stretch.of(stream)
+            if len(rows.stamps):
+                stamps = _seconds(rows.stamps, stretch.first)
+                self._put(table, (stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)))
+        if own.imu is not None:
+            self._put(self._imu, (own.imu.stamps_s, own.imu.measured, own.imu.predicted))
+        if stretch.health:
+            self._level_names = own.level_names
+            self._put(self._levels, (own.level_stamps_s, own.levels))
+        self._shapes.add(own.shapes)
+        return own
+
+    def _note_peak(self, own: History) -> None:
+        size = np.hypot(*own.tip_acceleration.T)
+        if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
+            self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
+
+    def _put(self, table: ExtremeRows, columns: tuple[Array, ...]) -> None:
+        table.add(columns)
+        if table.is_full:
+            table.thin(self._enlarged(table))
+
+    def _enlarged(self, table: ExtremeRows) -> NDArray[np.bool_]:
+        """Rows that are shown enlarged, or may be: about the peak, and the newest."""
+        stamps = table.columns[0]
+        if table is not self._predicted and table is not self._imu:
+            return np.zeros(len(stamps), bool)
+        return np.asarray((np.abs(stamps - self._peak_at) <= WINDOW) | (stamps >= stamps[-1] - WINDOW))
+
+    def history(self, recording: Recording) -> History:
+        """The history of all stretches so far; at least one."""
+        for table in (self._predicted, self._imu, self._levels, *self._residuals.values()):
+            if table.is_thin:
+                table.thin(self._enlarged(table))  # the newest ones as those before
+        *predicted, slow, pins = self._predicted.columns
+        found = dict(zip(PREDICTED, predicted, strict=True))
+        names = channels_of(len(self._scene.joints))
+        tables = [(names[stream], table.columns) for stream, table in self._residuals.items() if table.columns]
+        groups = [_ChannelGroup(own, columns[0], columns[1:]) for own, columns in tables]
+        residuals = _channels(groups, 3)
+        level_stamps, levels = self._levels.columns or (np.zeros(0), np.zeros((0, 0)))
+        plan, stamps = self._plan, found["stamps_s"]
+        return History(
+            **found,
+            residual_stamps_s=residuals[0],
+            residual_names=tuple(name for group in groups for name in group.names),
+            residual_values=residuals[1],
+            residual_sigmas=residuals[2],
+            residual_means=residuals[3],
+            imu=ImuTrace(*self._imu.columns) if self._imu.columns else None,
+            shapes=self._shapes.kept,
+            gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
+            alarms=_alarms(recording, float(stamps[-1])),
+            orbits=_orbits(plan, stamps, pins, recording) if plan.pins else None,
+            slow_moments=slow,
+            totals=self._totals.totals,
+            level_stamps_s=level_stamps,
+            level_names=self._level_names,
+            levels=levels,
+        )
+
+
+class _Shapes:
+    """Shapes with their times: every one, then every second, fourth, ..; and the newest."""
+
+    def __init__(self) -> None:
+        self._count, self._step = 0, 1
+        self._chosen: list[tuple[int, tuple[float, Array]]] = []
+        self._newest: list[tuple[float, Array]] = []
+
+    def add(self, found: list[tuple[float, Array]]) -> None:
+        """Append some."""
+        numbered = enumerate(found, self._count)
+        self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
+        self._count += len(found)
+        self._newest = found[-1:] or self._newest
+        while len(self._chosen) > MOST_SHAPES:
+            self._step *= 2
+            self._chosen = [each for each in self._chosen if each[0] % self._step == 0]
+
+    @property
+    def kept(self) -> list[tuple[float, Array]]:
+        """Those that are left."""
+        is_last = bool(self._chosen) and self._chosen[-1][0] == self._count - 1
+        return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
+
+
+def _stretch_history(stretch: Stretch, scene: Scene) -> History:
+    """Everything predicted in a stretch, with all its rows; gaps, alarms and orbits are not in it."""
+    predictions = stretch.predictions
+    found = [rows for stream in Stream if len((rows := stretch.of(stream)).stamps)]
+    groups = [_ChannelGroup(rows.names, _seconds(rows.stamps, stretch.first), (rows.values, rows.sigmas)) for rows in found]
+    times, values, sigmas = _channels(groups, 2)
+    stamps = _seconds(predictions.stamps, stretch.first)
     felt = tip_specific_force(predictions.tip_acceleration, predictions.tip_angle, gravity_in_base(scene))
-    names, times, values, sigmas = _channels(list(groups.values()), first)
     return History(
         stamps_s=stamps,
         tip_displacement=predictions.tip_displacement,
@@ -44,55 +183,70 @@ def history_of(recording: Recording, scene: Scene) -> History:
         cylinder_forces=predictions.cylinder_forces,
         strokes=predictions.strokes,
         residual_stamps_s=times,
-        residual_names=names,
+        residual_names=tuple(name for group in groups for name in group.names),
         residual_values=values,
         residual_sigmas=sigmas,
-        imu=_imu(groups[Stream.IMU], stamps, felt, first),
-        shapes=[(float(stamps[row]), outline.shape) for row, outline in predictions.outlines.items()],
-        gaps=[((start - first) * NANO, (end - first) * NANO) for start, end in recording.gaps],
-        alarms=_alarms(recording, first),
+        imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
+        shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
-        orbits=_orbits(scene, stamps, recording),
+        level_stamps_s=np.array([(health.stamp - stretch.first) * NANO for health in stretch.health]),
+        level_names=stretch.health[0].names if stretch.health else (),
+        levels=np.array([health.levels for health in stretch.health]),
     )
 
 
-def _alarms(recording: Recording, first: int) -> list[AlarmSpan]:
-    last = int(recording.predictions.stamps[-1])
+def _running_means(stamps: Array, values: Array) -> Array:
+    """Means of residuals over a second, shape (k, channels); NaN where not measured."""
+    means = np.full_like(values, np.nan)
+    for column, mean in zip(values.T, means.T, strict=True):
+        known = np.isfinite(column)
+        mean[known] = running_mean(stamps[known], column[known])
+    return means
+
+
+def _alarms(recording: Recording, end: float) -> list[AlarmSpan]:
+    """Those of the rig's health; one that lasts does so to the `end`, s."""
+    first = recording.first
     return [
         AlarmSpan(
             alarm.channel,
             (alarm.since - first) * NANO,
-            ((last if alarm.until is None else alarm.until) - first) * NANO,
+            end if alarm.until is None else (alarm.until - first) * NANO,
             alarm.cause or alarm.kind,
         )
         for alarm in recording.alarms()
     ]
 
 
-def _orbits(scene: Scene, stamps: Array, recording: Recording) -> Orbits | None:
-    plan = compile_scene(scene)
-    if not plan.pins:
-        return None
-    return Orbits(stamps, plan.pins, plan.tables.clearances.gap, recording.predictions.clearances, recording.lost_contacts())
+def _orbits(plan: Plan, stamps: Array, pins: Array, recording: Recording) -> Orbits:
+    gaps, lost = plan.tables.clearances.gap, recording.totals.lost_contacts
+    return Orbits(stamps, plan.pins, gaps, pins.reshape(len(pins), -1, 4), lost)
 
 
 def _seconds(stamps: NDArray[np.int64], first: int) -> Array:
     return np.asarray((stamps - first) * NANO, float)
 
 
-def _channels(groups: list[ResidualRows], first: int) -> tuple[tuple[str, ...], Array, Array, Array]:
-    """Residuals of several streams in one table, a row per stamp and stream; NaN where a stream has no say."""
-    groups = [group for group in groups if len(group.stamps)]
-    names = tuple(name for group in groups for name in group.names)
-    rows = sum(len(group.stamps) for group in groups)
-    times, values, sigmas = np.empty(rows), np.full((rows, len(names)), np.nan), np.full((rows, len(names)), np.nan)
-    row, column = 0, 0
+class _ChannelGroup(NamedTuple):
+    """The channels of one stream: their names, stamps (k,) in s, and tables (k, channels)."""
+
+    names: tuple[str, ...]
+    stamps: Array
+    tables: Sequence[Array]
+
+
+def _channels(groups: Sequence[_ChannelGroup], tables: int) -> list[Array]:
+    """Stamps and so many tables of all streams as one, a row per stamp and stream; NaN where a stream has no say."""
+    stamps = np.concatenate([np.zeros(0), *(group.stamps for group in groups)])
+    width = sum(len(group.names) for group in groups)
+    found = [np.full((len(stamps), width), np.nan) for _ in range(tables)]
+    row = column = 0
     for group in groups:
-        block = (slice(row, row + len(group.stamps)), slice(column, column + len(group.names)))
-        times[block[0]] = _seconds(group.stamps, first)
-        values[block], sigmas[block] = group.values, group.sigmas
-        row, column = block[0].stop, block[1].stop
-    return names, times, values, sigmas
+        place = slice(row, row + len(group.stamps)), slice(column, column + len(group.names))
+        for table, part in zip(found, group.tables, strict=True):
+            table[place] = part
+        row, column = place[0].stop, place[1].stop
+    return [stamps, *found]
 
 
 def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrace | None:

@@ -1,16 +1,22 @@
-"""Recording of a replay: everything that was predicted, as arrays."""
+"""Recording of a replay: what was predicted, a stretch of the session at a time, and totals of all of it."""
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.column_statistics import ColumnStatistics
 from ..health.alarms import Alarms
 from ..twin.blocks import CODES, PredictionBlock, ReportBlock, joined, report_block
 from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, channels_of
+from .ground_truth import TipErrors
+
+STRETCH = 2**14
+"""Predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB."""
 
 
 class ResidualRows(NamedTuple):
@@ -37,48 +43,167 @@ class ResidualRows(NamedTuple):
         return self.values / self.sigmas
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a session on end: everything that was predicted in it.
+
+    Attributes
+    ----------
+    joints : int
+        Of the boom.
+    block : ReportBlock
+    health : list of Health
+    first : int
+        Stamp of the first prediction of the session, ns.
+    """
+
+    joints: int
+    block: ReportBlock
+    health: list[Health]
+    first: int
+
+    @property
+    def predictions(self) -> PredictionBlock:
+        """All predictions of the stretch."""
+        return self.block.predictions
+
+    def of(self, stream: Stream) -> ResidualRows:
+        """Residuals of one stream."""
+        rows, names = self.block.residuals, channels_of(self.joints)[stream]
+        own = rows.streams == CODES[stream]
+        return ResidualRows(names, rows.stamps[own], rows.values[own, : len(names)], rows.sigmas[own, : len(names)])
+
+
+class SessionTotals:
+    """Figures of all predictions and residuals of a session, of which only these are kept.
+
+    Attributes
+    ----------
+    samples : int
+        Predictions.
+    acceleration : float
+        The largest of the tip, m/s^2.
+    residuals, normalised : ColumnStatistics
+        Of the joints: rad, and over the expected deviations.
+    lost_contacts : ndarray of int, shape (c,)
+        How often each pin with clearance touched at one prediction and not at the next.
+    tip_sigmas : ndarray, shape (2,)
+        Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
+    tip_sigma : float or None
+        The largest of both together, m.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self.samples, self.acceleration = 0, 0.0
+        self.residuals, self.normalised = ColumnStatistics(joints), ColumnStatistics(joints)
+        self.lost_contacts: NDArray[np.int64] = np.zeros(0, np.int64)
+        self.tip_sigmas: Array = np.full(2, np.nan)
+        self.tip_sigma: float | None = None
+        self._touching: Array | None = None
+
+    def add(self, stretch: Stretch) -> None:
+        """Take a stretch in."""
+        angles, predictions = stretch.of(Stream.ANGLES), stretch.predictions
+        self.residuals.add(angles.values)
+        self.normalised.add(angles.normalised)
+        for health in stretch.health:
+            self._add_tip_sigmas(health.tip_sigmas)
+        if not len(predictions.stamps):
+            return
+        self.samples += len(predictions.stamps)
+        self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
+        touching = predictions.clearances[:, :, 3]
+        before = touching[:1] if self._touching is None else self._touching
+        parted = (np.diff(touching, axis=0, prepend=before) < 0.0).sum(axis=0)
+        self.lost_contacts = parted if self._touching is None else self.lost_contacts + parted
+        self._touching = touching[-1:].copy()
+
+    def _add_tip_sigmas(self, sigmas: Array) -> None:
+        self.tip_sigmas = np.fmax(self.tip_sigmas, sigmas)
+        if np.isfinite(sigmas).all():
+            self.tip_sigma = max(self.tip_sigma or 0.0, float(np.hypot(*sigmas)))
+
+
 class Recording:
-    """Everything a replay predicted, in the order of the session.
+    """What a replay predicted, in the order of the session.
 
     Parameters
     ----------
     joints : int
         Of the boom.
+    take : callable, optional
+        Is given every `Stretch` of the session, which is then let go; without it, the whole session is one, and kept.
+    errors : TipErrors, optional
+        Told of all predictions for which the truth is known.
 
     Attributes
     ----------
     gaps, clock_sets : list of (int, int)
         Stamps (ns) between which strokes paused; stamps before and after a clock was set.
-    health : list of Health
     refused : int
         Samples that were not used.
+    is_judged : bool
+        Whether the rig's health was.
+    totals : SessionTotals
+        Of all stretches that are complete.
     """
 
-    def __init__(self, joints: int) -> None:
-        self._joints = joints
+    def __init__(self, joints: int, take: Callable[[Stretch], None] | None = None, errors: TipErrors | None = None) -> None:
+        self._joints, self._take, self._errors = joints, take, errors
         self._parts: list[ReportBlock] = []
         self._single: list[Report] = []
+        self._health: list[Health] = []
+        self._alarms = Alarms()
         self._newest: int | None = None
+        self._first = 0
+        self._count = self._before = 0  # predictions so far, and those in earlier stretches
+        self._rows_by_first_clock: int | None = None
+        self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []
         self.clock_sets: list[tuple[int, int]] = []
-        self.health: list[Health] = []
         self.refused = 0
+        self.is_judged = False
+        self.totals = SessionTotals(joints)
 
     def add(self, found: ReportBlock | Report) -> None:
         """Keep what samples caused."""
         if isinstance(found, Report):
             self._add_one(found)
-            return
-        self._close_single()
-        self._parts.append(found)
-        if len(found.predictions.stamps):
-            self._newest = int(found.predictions.stamps[-1])
-        self.health += found.health.values()
+        else:
+            self._close_single()
+            self._parts.append(found)
+            stamps = found.predictions.stamps
+            if len(stamps):
+                self._note_predictions(int(stamps[0]), int(stamps[-1]), len(stamps))
+            for health in found.health.values():
+                self._add_health(health)
+        if self._take is not None and self._count - self._before >= STRETCH:
+            self._complete()
+
+    def close(self) -> None:
+        """Complete the last stretch; to be called once, after the last `add`."""
+        self._complete()
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing was predicted yet."""
         return self._newest is None
+
+    @property
+    def first(self) -> int:
+        """Stamp of the first prediction, ns."""
+        return self._first
+
+    def _note_predictions(self, first: int, last: int, count: int) -> None:
+        if self._newest is None:
+            self._first = first
+        self._newest = last
+        self._count += count
+
+    def _add_health(self, health: Health) -> None:
+        self.is_judged = True
+        self._health.append(health)
+        self._alarms.take(health)
 
     def _add_one(self, report: Report) -> None:
         self.refused -= len(report.earlier)
@@ -88,9 +213,9 @@ class Recording:
             self.refused += 1
         if report.prediction is not None:
             self._note_time(report)
-            self._newest = report.stamp
+            self._note_predictions(report.stamp, report.stamp, 1)
         if report.health is not None:
-            self.health.append(report.health)
+            self._add_health(report.health)
         self._single.append(report)
 
     def _note_time(self, report: Report) -> None:
@@ -98,51 +223,71 @@ class Recording:
         for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
             if self._newest is not None and not set(events).isdisjoint(report.events):
                 found.append((self._newest, report.stamp))
+        if self.clock_sets and self._rows_by_first_clock is None:
+            self._rows_by_first_clock = self._count
 
     def _close_single(self) -> None:
         if self._single:
             self._parts.append(report_block(self._single, self._joints))
             self._single = []
 
-    @cached_property
-    def _all(self) -> ReportBlock:
+    def _complete(self) -> None:
+        """Make a stretch of what came since the last one, add it to the totals, and give it away or keep it."""
+        stretch = self._stretch()
+        self._parts, self._health = [], []
+        if stretch is None:
+            return
+        self.totals.add(stretch)
+        if self._errors is not None:
+            self._errors.add(stretch.predictions, self._by_first_clock(self._before))
+        self._before = self._count
+        if self._take is None:
+            self._whole = stretch
+        elif len(stretch.predictions.stamps):
+            self._take(stretch)
+
+    def _stretch(self) -> Stretch | None:
         self._close_single()
-        return joined([part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)])
+        parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
+        return Stretch(self._joints, joined(parts), self._health, self._first) if parts else None
+
+    @property
+    def whole(self) -> Stretch:
+        """The whole session as one stretch, up to now; only of a recording that keeps it."""
+        found = self._whole or self._stretch()
+        if self._take is not None or found is None:
+            raise ValueError("the stretches of this recording were given away")
+        return found
 
     @property
     def predictions(self) -> PredictionBlock:
-        """All predictions, once the replay has ended."""
-        return self._all.predictions
+        """All predictions, see `whole`."""
+        return self.whole.predictions
+
+    @property
+    def health(self) -> list[Health]:
+        """All that was told of the rig's health, see `whole`."""
+        return self.whole.health
 
     def of(self, stream: Stream) -> ResidualRows:
-        """Residuals of one stream, once the replay has ended."""
-        rows, names = self._all.residuals, channels_of(self._joints)[stream]
-        own = rows.streams == CODES[stream]
-        return ResidualRows(names, rows.stamps[own], rows.values[own, : len(names)], rows.sigmas[own, : len(names)])
+        """Residuals of one stream, see `whole`."""
+        return self.whole.of(stream)
 
     @property
     def duration(self) -> float:
         """From the first prediction to the last, s, by the model's own time: without what clocks were set by."""
-        span = int(self.predictions.stamps[-1] - self.predictions.stamps[0])
+        span = (self._newest or 0) - self._first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
 
     @property
     def by_first_clock(self) -> slice:
         """Rows of the predictions before a clock was set: their stamps tell the time since the first one."""
-        if not self.clock_sets:
-            return slice(None)
-        before, after = self.clock_sets[0]
-        stamps = self.predictions.stamps
-        return slice(int(np.flatnonzero((stamps[:-1] == before) & (stamps[1:] == after))[0]) + 1)
+        return self._by_first_clock(0)
+
+    def _by_first_clock(self, before: int) -> slice:
+        """The same of a stretch with so many predictions before it."""
+        return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
     def alarms(self) -> list[Alarm]:
         """All alarms, each once, as it was told last; in the order of their beginning."""
-        found = Alarms()
-        for health in self.health:
-            found.take(health)
-        return sorted(found.all, key=lambda alarm: alarm.since)
-
-    def lost_contacts(self) -> NDArray[np.int64]:
-        """How often each pin with clearance touched at one prediction and not at the next, shape (k,)."""
-        parted = np.diff(self.predictions.clearances[:, :, 3], axis=0) < 0.0
-        return np.asarray(parted.sum(axis=0))
+        return sorted(self._alarms.all, key=lambda alarm: alarm.since)

@@ -7,7 +7,6 @@ The first and the last of them run in processes of their own (`boom_twin.offline
 from __future__ import annotations
 
 import gc
-import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -33,13 +32,14 @@ from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
+from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
-from .ground_truth import TipTruth, load_truth
+from .ground_truth import TipErrors, TipTruth, load_truth
 from .reader_process import SampleReader
-from .recording import Recording
+from .recording import Recording, Stretch
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Replay:
     summary : dict
         As in ``summary.json``.
     recording : Recording
-        Predictions, residuals, gaps and health, in the order of the session.
+        Gaps, alarms and totals; predictions, residuals and health too, unless `replay_into` gave them away.
     session : Session
         What was replayed.
     truth : TipTruth or None
@@ -146,8 +146,12 @@ def replay_into(
     changes: bool = True,
     health: bool = True,
     baseline: str | Path | None = None,
+    take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
-    """As `replay`, into a folder that is being built, for more to be added to it."""
+    """As `replay`, into a folder that is being built, for more to be added to it.
+
+    With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
+    """
     session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
     taken = scene_for(session.path, scene)
     scene, joints = taken.scene, len(taken.scene.joints)
@@ -155,7 +159,10 @@ def replay_into(
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    recording, other_boom, read = Recording(joints), OtherBoom(), np.zeros(joints, dtype=bool)
+    truth = load_truth(session.path)
+    errors = None if truth is None else TipErrors(truth)
+    taking = None if take is None else _Timed(take)
+    recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
     with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
@@ -183,7 +190,7 @@ def replay_into(
         behind.close()
         if bar is not None:
             bar.close()
-        wall = time.perf_counter() - began
+        wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
     twin.counts.update(ahead.oddities)
     if recording.is_empty:
         raise BagError(
@@ -191,7 +198,7 @@ def replay_into(
             f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
             "and stamps."
         )
-    truth = load_truth(session.path)
+    recording.close()
     SessionSheet(__version__, taken.text).write(out / "bag")
     summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
         "scene": taken.source,
@@ -201,10 +208,24 @@ def replay_into(
     }
     if session.incomplete:
         summary["session_incomplete"] = session.incomplete
-    if truth is not None:
-        summary |= truth.errors(recording.predictions, recording.by_first_clock)
+    if errors is not None:
+        summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
+
+
+class _Timed:
+    """Calls `take` and adds up how long that takes, s: it is no part of the replay."""
+
+    def __init__(self, take: Callable[[Stretch], None]) -> None:
+        self._take = take
+        self.spent = 0.0
+
+    def __call__(self, stretch: Stretch) -> None:
+        began = time.perf_counter()
+        self._take(stretch)
+        gc.collect()  # which does not run by itself, see `_unhurried_collector`
+        self.spent += time.perf_counter() - began
 
 
 def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene:
@@ -289,25 +310,22 @@ def _told(twin: Twin) -> str:
 
 def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[str, Any]:
     """The contract's numbers of a replay."""
-    predictions, duration = recording.predictions, recording.duration
-    first, angles = int(predictions.stamps[0]), recording.of(Stream.ANGLES)
-    values, normalised = angles.values, angles.normalised
-    acceleration = np.hypot(*predictions.tip_acceleration.T)
+    totals, duration = recording.totals, recording.duration
     return {
-        "samples": len(predictions.stamps),
+        "samples": totals.samples,
         "duration_s": duration,
         "wall_s": wall,
         "realtime_factor": duration / wall,
         "dropped": recording.refused,
         "outside_validity": twin.counts["deflected"],
         "events": dict(sorted(twin.counts.items())),
-        "joint_residual_rms_rad": _rms(values),
-        "joint_residual_normalised_mean": _mean(normalised),
-        "joint_residual_normalised_std": _std(normalised),
-        "tip_acceleration_max_m_s2": float(acceleration.max()),
+        "joint_residual_rms_rad": totals.residuals.rms,
+        "joint_residual_normalised_mean": totals.normalised.mean,
+        "joint_residual_normalised_std": totals.normalised.deviation,
+        "tip_acceleration_max_m_s2": totals.acceleration,
         **_pins(recording, twin),
-        "output_sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
-        "alarms": _alarms(recording, first),
+        "output_sha256": sha256_of(file),
+        "alarms": _alarms(recording, recording.first),
     }
 
 
@@ -345,16 +363,4 @@ def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
     """How often each pin with clearance lost contact from one sample to the next; nothing without such pins."""
     if not twin.plan.pins:
         return {}
-    return {"lost_contacts": dict(zip(twin.plan.pins, recording.lost_contacts().tolist(), strict=True))}
-
-
-def _rms(values: Array) -> list[float | None]:
-    return [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else None for column in values.T]
-
-
-def _mean(values: Array) -> list[float | None]:
-    return [float(np.nanmean(column)) if np.isfinite(column).any() else None for column in values.T]
-
-
-def _std(values: Array) -> list[float | None]:
-    return [float(np.nanstd(column)) if np.isfinite(column).any() else None for column in values.T]
+    return {"lost_contacts": dict(zip(twin.plan.pins, recording.totals.lost_contacts.tolist(), strict=True))}

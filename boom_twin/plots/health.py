@@ -141,4 +141,6 @@ def moment_picture(path: Path, session: str, history: History, rows: list[tuple[
 
 def slow_part(history: History, column: int) -> Array:
     """The static part of a moment (N m), shape (m,): its mean over `SLOW`."""
+    if history.slow_moments is not None:
+        return history.slow_moments[:, column]
     return running_mean(history.stamps_s, history.moments[:, column], SLOW)

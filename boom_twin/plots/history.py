@@ -77,8 +77,58 @@ class AlarmSpan:
 
 
 @dataclass(frozen=True)
+class Density:
+    """Power spectral density: frequencies (Hz) and power, shapes (f,), from so many segments of samples `interval` s apart."""
+
+    frequencies: Array
+    power: Array
+    interval: float
+    segments: int
+
+
+@dataclass(frozen=True)
+class ResidualDistribution:
+    """Of the residuals of one channel over their expected deviations.
+
+    Attributes
+    ----------
+    counts : ndarray of int, shape (b,)
+        Between `boom_twin.plots.session_totals.EDGES`.
+    mean, deviation : float or None
+        None without any.
+    reach : float
+        Largest residual that a picture is to show, in the unit of the channel; 0 without any.
+    """
+
+    counts: NDArray[np.int64]
+    mean: float | None
+    deviation: float | None
+    reach: float
+
+
+@dataclass(frozen=True)
+class SessionTotals:
+    """What is told of all rows of a session, also of those that are not in its `History`.
+
+    Attributes
+    ----------
+    residuals : dict of str to ResidualDistribution
+        By channel.
+    predicted, measured : tuple of Density
+        Specific force at the tip along x and z; without an IMU the predicted acceleration of the tip, and nothing measured.
+    """
+
+    residuals: dict[str, ResidualDistribution]
+    predicted: tuple[Density, ...]
+    measured: tuple[Density, ...] | None
+
+
+@dataclass(frozen=True)
 class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
+
+    Of a long session, rows are left out between those that hold the extremes, see `boom_twin.plots.extreme_rows`. Then
+    `residual_means`, `slow_moments` and `totals` are given, which do not follow from the rows that are left.
 
     Attributes
     ----------
@@ -103,6 +153,17 @@ class History:
         Bending moments (N m) at the stations of `boom_twin.analysis.bending_moments`.
     orbits : Orbits or None
         Of the pins with clearance, if there are any.
+    residual_means : ndarray, shape (k, c), or None
+        Means of `residual_values` over a second.
+    slow_moments : ndarray, shape (m, k), or None
+        Static part of `moments`.
+    totals : SessionTotals or None
+    level_stamps_s : ndarray, shape (h,)
+        When the rig's health was judged, s.
+    level_names : tuple of str
+        Of its channels.
+    levels : ndarray, shape (h, channels)
+        How near each was to an alarm, which is at 1.
     """
 
     stamps_s: Array
@@ -122,3 +183,9 @@ class History:
     alarms: list[AlarmSpan] = field(default_factory=list)
     moments: Array = field(default_factory=lambda: np.zeros((0, 0)))
     orbits: Orbits | None = None
+    residual_means: Array | None = None
+    slow_moments: Array | None = None
+    totals: SessionTotals | None = None
+    level_stamps_s: Array = field(default_factory=lambda: np.zeros(0))
+    level_names: tuple[str, ...] = ()
+    levels: Array = field(default_factory=lambda: np.zeros((0, 0)))

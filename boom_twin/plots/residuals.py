@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import welch
 
 from ..types import Array, sensor_kind
-from .history import History
+from .history import Density, History, ResidualDistribution
+from .session_totals import EDGES, SEGMENT, totals_of
 from .style import BLUE, GREY, INK, ORANGE, SKY, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
@@ -18,25 +18,25 @@ if TYPE_CHECKING:
 
 SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 MEAN_OVER = 1.0  # s of the running mean
-EDGES = np.linspace(-5.0, 5.0, 51)
 
 
 def residual_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``residuals.png``."""
-    channels = len(history.residual_names)
+    channels, totals = len(history.residual_names), totals_of(history).residuals
     height = max(9.0, 1.2 + 1.5 * channels)
     with picture(path, f"{session}: residuals, measured minus predicted", note, (16.0, height)) as figure:
         panels = figure.subplots(channels, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [5.0, 1.0]})
         for channel, (over_time, spread) in enumerate(panels):
-            _channel(over_time, history, channel)
-            _distribution(spread, history.residual_values[:, channel] / history.residual_sigmas[:, channel])
+            found = totals[history.residual_names[channel]]
+            _channel(over_time, history, channel, found.reach)
+            _distribution(spread, found)
         panels[-1, 0].set_xlabel("time since first sample, s")
         panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
         panels[0, 1].set_title("against the unit normal")
         legend_above(panels[0, 0], 5, handlelength=1.4, markerscale=4)
 
 
-def _channel(axes: Axes, history: History, channel: int) -> None:
+def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     name = history.residual_names[channel]
     factor, unit = sensor_kind(name).shown_unit
     measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
@@ -53,9 +53,10 @@ def _channel(axes: Axes, history: History, channel: int) -> None:
     axes.plot(stamps, values, ".", color=BLUE, markersize=2.6, alpha=0.55, markeredgewidth=0, label="residual")
     axes.plot(stamps, sigma, color=INK, linewidth=1.0, label=f"±1 {SIGMA}")
     axes.plot(stamps, -sigma, color=INK, linewidth=1.0)
-    axes.plot(stamps, running_mean(stamps, values), color=ORANGE, linewidth=1.6, label="mean over 1 s")
-    reach = max(4.2 * float(np.median(sigma)), 1.1 * float(np.quantile(np.abs(values), 0.9995)))
-    axes.set_ylim(-reach, reach)
+    means = history.residual_means
+    mean = running_mean(stamps, values) if means is None else factor * means[measured, channel]
+    axes.plot(stamps, mean, color=ORANGE, linewidth=1.6, label="mean over 1 s")
+    axes.set_ylim(-factor * reach, factor * reach)
     axes.set_xlim(extent(stamps))
 
 
@@ -67,36 +68,33 @@ def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array
     return np.asarray((total[last] - total[first]) / (last - first))
 
 
-def _distribution(axes: Axes, normalised: Array) -> None:
-    values = normalised[np.isfinite(normalised)]
+def _distribution(axes: Axes, found: ResidualDistribution) -> None:
     axes.plot(EDGES, np.exp(-0.5 * EDGES**2) / np.sqrt(2.0 * np.pi), color=INK, linewidth=1.2)
     axes.set_xlim(EDGES[0], EDGES[-1])
     axes.set_xticks([-3, 0, 3])
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
-    if values.size:
-        axes.hist(np.clip(values, EDGES[0], EDGES[-1]), EDGES.tolist(), density=True, color=SKY, alpha=0.8, linewidth=0)
-        text = f"mean {np.mean(values):+.2f}\nsd {np.std(values):.2f}"
+    if found.mean is not None:
+        middles = 0.5 * (EDGES[:-1] + EDGES[1:])
+        axes.hist(middles, EDGES.tolist(), weights=found.counts, density=True, color=SKY, alpha=0.8, linewidth=0)
+        text = f"mean {found.mean:+.2f}\nsd {found.deviation:.2f}"
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 
 
-SEGMENT = 8.0  # s; lines of the spectrum are 1/SEGMENT apart
 SHORTEST = 4.0  # s; no spectrum of less
 
 
 def spectrum_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``spectrum.png``: specific force if there is an IMU, else tip acceleration."""
-    imu = history.imu
-    stamps = history.stamps_s if imu is None else imu.stamps_s
-    quantity = "tip acceleration" if imu is None else "specific force at the tip"
-    names = ("x (forward)", "y (up)") if imu is None else ("x, along the tip", "z, across it")
+    totals = totals_of(history)
+    quantity = "tip acceleration" if totals.measured is None else "specific force at the tip"
+    names = ("x (forward)", "y (up)") if totals.measured is None else ("x, along the tip", "z, across it")
     with picture(path, f"{session}: spectrum of the {quantity}", note) as figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for i, axes in enumerate(panels):
-            predicted = history.tip_acceleration[:, i] if imu is None else imu.predicted[:, i]
-            if imu is not None:
-                axes.loglog(*density(stamps, imu.measured[:, i]), color=GREY, label="measured")
-            axes.loglog(*density(stamps, predicted), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
+            if totals.measured is not None:
+                axes.loglog(*_curve(totals.measured[i]), color=GREY, label="measured")
+            axes.loglog(*_curve(totals.predicted[i]), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
             axes.set_title(f"{quantity[0].upper()}{quantity[1:]}, {names[i]}")
             axes.set_xlabel("frequency, Hz")
             axes.legend(loc="upper right")
@@ -110,13 +108,5 @@ def has_spectrum(history: History) -> bool:
     return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= SHORTEST)
 
 
-def density(stamps: Array, values: Array) -> tuple[Array, Array]:
-    """Frequencies (Hz) and one-sided density of `values` (k,), put on even times first; what is NaN is bridged."""
-    known = np.isfinite(values)
-    if known.sum() < 16:
-        return np.array([1.0]), np.array([np.nan])
-    interval = float(np.median(np.diff(stamps[known])))
-    even = np.arange(stamps[known][0], stamps[known][-1], interval)
-    segment = min(len(even), round(SEGMENT / interval))
-    frequencies, power = welch(np.interp(even, stamps[known], values[known]), 1.0 / interval, nperseg=segment)
-    return frequencies[1:], power[1:]
+def _curve(found: Density) -> tuple[Array, Array]:
+    return found.frequencies, found.power

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,18 +9,12 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_model import baseline_of
 from ..bag.session_sheet import incompleteness
 from ..bag.writer import FILE_NAME as RESULT
-from ..config.settings import Settings
 from ..errors import BagError
-from ..offline.history import history_of
-from ..offline.replay import Replay, alarm_as_text
-from ..plots import History
-from ..scene.schema import Scene
-from ..system.received_files import holds_file, open_received
-from .quantities import Quantity, quantities, read, write
-from .vibration import HoldInterval, holds
+from ..offline.replay import alarm_as_text
+from ..system.received_files import holds_file, open_received, sha256_of
+from .quantities import Quantity, read
 
 
 @dataclass(frozen=True)
@@ -47,17 +40,6 @@ class ComparedSession:
     incomplete: str = ""
 
 
-def worked_out(
-    result: Replay, scene: Scene, settings: Settings, baseline: Path | None, folder: Path
-) -> tuple[History, list[HoldInterval], Path]:
-    """History and stretches of standing still of a replay; its figures are written into `folder`, as the path says."""
-    history = history_of(result.recording, scene)
-    still = holds(history, scene)
-    usual = baseline_of(result.session.path, baseline).baseline
-    found = quantities(result.recording, history, still, scene, settings, usual)
-    return history, still, write(folder, scene, found)
-
-
 def side_of(path: Path, replayed: Callable[[Path], Path]) -> ComparedSession:
     """One side from a replay folder, or from a session, of which `replayed` makes a replay folder.
 
@@ -78,7 +60,7 @@ def side_of(path: Path, replayed: Callable[[Path], Path]) -> ComparedSession:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
     bag = folder / "bag" / RESULT
-    if bag.is_file() and hashlib.sha256(bag.read_bytes()).hexdigest() != told:
+    if bag.is_file() and sha256_of(bag) != told:
         raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")
     return ComparedSession(path.resolve().name, scene, found, alarms, incomplete)
 

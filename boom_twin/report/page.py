@@ -17,10 +17,11 @@ from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..twin.events import EVENTS
-from ..types import NANO, SECOND, SENSORS, Alarm, Array, Stream
+from ..types import NANO, SECOND, SENSORS, Alarm, Stream
+from .evaluation import Evaluation
 from .html import heading, image, page, paragraph, table
-from .quantities import BOX, Load, loads
-from .vibration import LEAST, NEAR, HoldInterval, Vibration, course
+from .quantities import BOX, Load
+from .vibration import LEAST, NEAR, Vibration, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
@@ -35,22 +36,25 @@ class Subject:
     Attributes
     ----------
     result : Replay
-    history : History
+    evaluation : Evaluation
         Of the same replay.
     scene : Scene
     scene_name : str
         Path, or what else it is called.
-    still : list of HoldInterval
-    heights : ndarray, shape (n,), or None
-        Of the sections, m, where they are known.
+    has_heights : bool
+        Whether the heights of the sections are known.
     """
 
     result: Replay
-    history: History
+    evaluation: Evaluation
     scene: Scene
     scene_name: str
-    still: list[HoldInterval]
-    heights: Array | None
+    has_heights: bool
+
+    @property
+    def history(self) -> History:
+        """Of the replay."""
+        return self.evaluation.history
 
     @property
     def name(self) -> str:
@@ -85,7 +89,7 @@ def write_report(subject: Subject, folder: Path) -> Path:
 
 def _head(subject: Subject) -> list[str]:
     summary, recording = subject.result.summary, subject.result.recording
-    begin = datetime.fromtimestamp(int(recording.predictions.stamps[0]) // SECOND, UTC)
+    begin = datetime.fromtimestamp(recording.first // SECOND, UTC)
     rows: list[tuple[str, object]] = [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
         ("duration, s", summary["duration_s"]),
@@ -115,15 +119,14 @@ _AGAINST_TRUTH = (
 
 
 def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
-    sigmas = np.array([health.tip_sigmas for health in recording.health]).reshape(-1, 2)
-    if not np.isfinite(sigmas).any():
+    x, z = recording.totals.tip_sigmas
+    if not np.isfinite([x, z]).any():
         return []
-    x, z = np.nanmax(sigmas, axis=0)
     return [("standard deviation of the predicted tip at worst, m", f"{x:.2g} forward, {z:.2g} up")]
 
 
 def _verdict(result: Replay) -> str:
-    if not result.recording.health:
+    if not result.recording.is_judged:
         return paragraph(NO_JUDGE, "note")
     count = len(result.recording.alarms())
     if count:
@@ -142,17 +145,15 @@ def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
 
 def _alarms(subject: Subject, folder: Path) -> list[str]:
     recording, history = subject.result.recording, subject.history
-    if not recording.health:
+    if not recording.is_judged:
         return [heading("Alarms"), paragraph(NO_JUDGE)]
-    first = int(recording.predictions.stamps[0])
     gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
-    stamps = np.array([(health.stamp - first) * NANO for health in recording.health])
-    levels = np.array([health.levels for health in recording.health])
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
-    timeline_picture(path, subject.name, end, spans, stamps, recording.health[0].names, levels, subject.origin)
+    judged = history.level_stamps_s, history.level_names, history.levels
+    timeline_picture(path, subject.name, end, spans, *judged, subject.origin)
     alarms = recording.alarms()
-    found = [_alarm(alarm, first) for alarm in alarms] or [paragraph("None.")]
+    found = [_alarm(alarm, recording.first) for alarm in alarms] or [paragraph("None.")]
     note = [paragraph(SHARES, "note")] if any(alarm.ranked for alarm in alarms) else []
     return [heading("Alarms"), *found, *note, image(path, "alarms and levels over time")]
 
@@ -186,7 +187,9 @@ def _residuals(folder: Path) -> list[str]:
 
 
 def _vibration(subject: Subject, folder: Path) -> list[str]:
-    peaks = [(0.5 * (hold.start + hold.stop), each.frequency) for hold in subject.still for each in hold.measured.values()]
+    peaks = [
+        (0.5 * (hold.start + hold.stop), each.frequency) for hold in subject.evaluation.still for each in hold.measured.values()
+    ]
     path = folder / "frequencies.png"
     frequency_picture(path, subject.name, *course(subject.history, subject.scene), peaks, subject.origin)
     source = SENSORS[Stream.ANGLES if subject.history.imu is None else Stream.IMU].title
@@ -197,7 +200,7 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
     )
     rows = [
         (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))
-        for hold in subject.still
+        for hold in subject.evaluation.still
         for mode, each in sorted(hold.measured.items())
     ]
     head = ("while still", "mode", "model, Hz", "measured, Hz", "apart, %", "damping, %")
@@ -221,7 +224,7 @@ def _tip(subject: Subject, folder: Path) -> list[str]:
 
 
 def _moments(subject: Subject, folder: Path) -> list[str]:
-    title, found = heading("Bending of the sections"), loads(subject.history, subject.scene, subject.heights)
+    title, found = heading("Bending of the sections"), subject.evaluation.loads
     if not found:
         return [title, paragraph("All sections of the scene are rigid: their bending is not in the model.")]
     path = folder / "moments.png"
@@ -232,7 +235,7 @@ def _moments(subject: Subject, folder: Path) -> list[str]:
         "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M h / (2 I) of bending alone: "
         "no axial force, no notches, no welds. "
     )
-    told += ASSUMED if subject.heights is None else "Heights as given."
+    told += "Heights as given." if subject.has_heights else ASSUMED
     head = ("station", "largest moment, kN m", "at, s", "static part then, kN m", "height, m", "bending stress, MPa")
     return [title, paragraph(told, "note"), table(head, map(_load, found)), image(path, "bending moments")]
 

@@ -16,7 +16,6 @@ from ..analysis.bending_moments import Station, stations
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.baseline import Baseline, judged_channels
-from ..offline.recording import Recording
 from ..plots import History
 from ..plots.health import slow_part
 from ..scene.schema import Scene
@@ -42,43 +41,111 @@ class Quantity:
     unit: str
 
 
-def quantities(
-    recording: Recording, history: History, still: list[HoldInterval], scene: Scene, settings: Settings, baseline: Baseline
-) -> list[Quantity]:
-    """All figures of one replay."""
-    return [
-        *_residuals(history, baseline, len(scene.joints)),
-        *_frequencies(still, baseline.detuning),
-        *_tip(recording, history),
-        *_moments(history, scene),
-        *_travels(history, settings),
-    ]
+class QuantityBuilder:
+    """Adds up the stretches of a session.
 
-
-def _residuals(history: History, baseline: Baseline, joints: int) -> Iterator[Quantity]:
-    """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
-
-    Where the baseline does not have that error, it is not known how sure the figures are.
+    Parameters
+    ----------
+    scene : Scene
     """
-    errors = dict(zip(judged_channels(joints), baseline.errors(joints).tolist(), strict=True))
-    for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
-        values, unit = column[np.isfinite(column)], sensor_kind(name).unit
-        if len(values) < BATCHES:
-            continue
-        mean, mean_sigma = batch_mean(values)
-        square, square_sigma = batch_mean(values**2)
-        rms, mean_error, rms_error = sqrt(square), None, None
-        if (error := errors.get(name)) is not None:
-            mean_error = hypot(mean_sigma, error)
-            rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
-        yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
-        yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # of values, and of their squares
+        self._displacement = self._acceleration = 0.0
+        self._travels = [PathLength() for _ in scene.joints]
+        self._loads = SectionLoads(scene)
+
+    def add(self, history: History) -> None:
+        """Take the next stretch in, with all its rows."""
+        for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
+            values = column[np.isfinite(column)]
+            means, squares = self._channels.setdefault(name, (BatchMeans(), BatchMeans()))
+            means.add(values)
+            squares.add(values**2)
+        self._displacement = max(self._displacement, float(np.hypot(*history.tip_displacement.T).max()))
+        self._acceleration = max(self._acceleration, float(np.hypot(*history.tip_acceleration.T).max()))
+        for travel, stroke in zip(self._travels, history.strokes.T, strict=True):
+            travel.add(stroke)
+        self._loads.add(history)
+
+    def loads(self, heights: Array | None) -> list[Load]:
+        """As `SectionLoads.loads`."""
+        return self._loads.loads(heights)
+
+    def quantities(
+        self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings, baseline: Baseline
+    ) -> list[Quantity]:
+        """All figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
+        return [
+            *self._residuals(baseline),
+            *_frequencies(still, baseline.detuning),
+            Quantity("tip_displacement_max", self._displacement, tip_sigma, "m"),
+            Quantity("tip_acceleration_max", self._acceleration, None, "m/s^2"),
+            *(
+                Quantity(f"bending_moment_max_section_{load.station.section + 1}", abs(load.moment), None, "N m")
+                for load in self.loads(None)
+            ),
+            *self._stroke_travels(settings),
+        ]
+
+    def _residuals(self, baseline: Baseline) -> Iterator[Quantity]:
+        """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
+
+        Where the baseline does not have that error, it is not known how sure the figures are.
+        """
+        joints = len(self._scene.joints)
+        errors = dict(zip(judged_channels(joints), baseline.errors(joints).tolist(), strict=True))
+        for name, (values, squares) in self._channels.items():
+            unit = sensor_kind(name).unit
+            if values.count < BATCHES:
+                continue
+            (mean, mean_sigma), (square, square_sigma) = values.mean, squares.mean
+            rms, mean_error, rms_error = sqrt(square), None, None
+            if (error := errors.get(name)) is not None:
+                mean_error = hypot(mean_sigma, error)
+                rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
+            yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
+            yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
+
+    def _stroke_travels(self, settings: Settings) -> Iterator[Quantity]:
+        for i, travel in enumerate(self._travels):
+            length, legs = travel.length
+            yield Quantity(f"stroke_travel_cylinder_{i + 1}", length, sqrt(2.0 * legs * settings.stroke_variance), "m")
+
+
+class BatchMeans:
+    """Mean of values that come in parts, and how sure it is by the method of batch means.
+
+    Attributes
+    ----------
+    count : int
+        Values.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._sums: list[tuple[float, int]] = []  # of each of `BATCHES` pieces of each part: sum and number of values
+
+    def add(self, values: Array) -> None:
+        """Take values in, shape (k,)."""
+        self.count += len(values)
+        self._sums += [(float(piece.sum()), len(piece)) for piece in np.array_split(values, BATCHES)]
+
+    @property
+    def mean(self) -> tuple[float, float]:
+        """The mean, and its standard deviation from those of `BATCHES` batches; at least so many values."""
+        parts = [part.sum(axis=0) for part in np.array_split(np.array(self._sums), BATCHES)]
+        means = np.array([total / count for total, count in parts if count])
+        total = sum(total for total, _ in self._sums)
+        return total / self.count, float(means.std(ddof=1) / sqrt(len(means))) if len(means) > 1 else 0.0
 
 
 def batch_mean(values: Array) -> tuple[float, float]:
-    """Mean of a row of values (k,), and its standard deviation from those of `BATCHES` batches."""
-    means = np.array([part.mean() for part in np.array_split(values, BATCHES)])
-    return float(values.mean()), float(means.std(ddof=1) / sqrt(BATCHES))
+    """Mean of a row of values (k,), and its standard deviation, see `BatchMeans`."""
+    means = BatchMeans()
+    means.add(values)
+    return means.mean
 
 
 def _frequencies(still: list[HoldInterval], detuning: float) -> Iterator[Quantity]:
@@ -102,44 +169,41 @@ def _weighted(name: str, rows: Array, error: float) -> Quantity:
     return Quantity(name, mean, hypot(sqrt(max(1.0, scatter) / weights.sum()), error), "1")
 
 
-def _tip(recording: Recording, history: History) -> Iterator[Quantity]:
-    """Peaks of the predicted tip; of the displacement with what the judge of health says of the predicted position."""
-    sigmas = np.array([health.tip_sigmas for health in recording.health]).reshape(-1, 2)
-    known = sigmas[np.isfinite(sigmas).all(axis=1)]
-    sigma = float(np.hypot(*known.T).max()) if len(known) else None
-    yield Quantity("tip_displacement_max", float(np.hypot(*history.tip_displacement.T).max()), sigma, "m")
-    yield Quantity("tip_acceleration_max", float(np.hypot(*history.tip_acceleration.T).max()), None, "m/s^2")
+class PathLength:
+    """How far a stroke has gone back and forth, and in how many legs; what does not come back by `LEG` is noise."""
 
+    def __init__(self) -> None:
+        self._begin: float | None = None
+        self._extreme, self._way = 0.0, 0
+        self._travel, self._legs = 0.0, 0
 
-def _moments(history: History, scene: Scene) -> Iterator[Quantity]:
-    """Largest bending moment of every flexible section."""
-    for load in loads(history, scene, None):
-        yield Quantity(f"bending_moment_max_section_{load.station.section + 1}", abs(load.moment), None, "N m")
+    def add(self, stroke: Array) -> None:
+        """Go on with the next values, shape (k,), m; at least one."""
+        begin = float(stroke[0]) if self._begin is None else self._begin
+        extreme, way = begin if self._begin is None else self._extreme, self._way
+        for value in stroke.tolist():
+            if way and (extreme - value) * way > LEG:
+                self._travel, self._legs = self._travel + abs(extreme - begin), self._legs + 1
+                begin, extreme, way = extreme, value, -way
+            elif not way and abs(value - begin) > LEG:
+                extreme, way = value, 1 if value > begin else -1
+            elif way and (value - extreme) * way > 0.0:
+                extreme = value
+        self._begin, self._extreme, self._way = begin, extreme, way
 
-
-def _travels(history: History, settings: Settings) -> Iterator[Quantity]:
-    for i, stroke in enumerate(history.strokes.T):
-        travel, legs = path_length(stroke)
-        sigma = sqrt(2.0 * legs * settings.stroke_variance)
-        yield Quantity(f"stroke_travel_cylinder_{i + 1}", travel, sigma, "m")
+    @property
+    def length(self) -> tuple[float, int]:
+        """Travel so far, m, and legs."""
+        if not self._way or self._begin is None:
+            return 0.0, 0
+        return self._travel + abs(self._extreme - self._begin), self._legs + 1
 
 
 def path_length(stroke: Array) -> tuple[float, int]:
-    """How far a stroke (k,), m, has gone back and forth, and in how many legs; what does not come back by `LEG` is noise."""
-    turns, way = [float(stroke[0])], 0
-    extreme = turns[0]
-    for value in stroke.tolist():
-        if way and (extreme - value) * way > LEG:
-            turns.append(extreme)
-            extreme, way = value, -way
-        elif not way and abs(value - turns[0]) > LEG:
-            extreme, way = value, 1 if value > turns[0] else -1
-        elif way and (value - extreme) * way > 0.0:
-            extreme = value
-    if not way:
-        return 0.0, 0
-    turns.append(extreme)
-    return float(np.abs(np.diff(turns)).sum()), len(turns) - 1
+    """Travel (m) and legs of a stroke (k,), see `PathLength`."""
+    path = PathLength()
+    path.add(stroke)
+    return path.length
 
 
 def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
@@ -196,22 +260,35 @@ class Load:
     stress: float
 
 
-def loads(history: History, scene: Scene, heights: Array | None) -> list[Load]:
-    """One for every flexible section; `heights` (n,) of the sections in m, or None to take them for thin-walled boxes."""
-    places = stations(scene)
-    found = []
-    for section in sorted({station.section for station in places}):
-        columns = [i for i, station in enumerate(places) if station.section == section]
-        size = np.abs(history.moments[:, columns])
-        row, best = np.unravel_index(int(size.argmax()), size.shape)
-        column = columns[int(best)]
-        moment, part = float(history.moments[row, column]), scene.sections[section]
-        assert part.A is not None and part.I is not None
-        height = BOX * math.sqrt(part.I / part.A) if heights is None else float(heights[section])
-        static = float(slow_part(history, column)[row])
-        stress = abs(moment) * height / 2.0 / part.I
-        found.append(Load(places[column], column, moment, float(history.stamps_s[row]), static, height, stress))
-    return found
+class SectionLoads:
+    """Looks for the largest bending moment of every flexible section in stretches of a session."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._places = scene, stations(scene)
+        self._largest: dict[int, tuple[int, float, float, float]] = {}  # by section: column, moment, time, static part
+
+    def add(self, history: History) -> None:
+        """Take the next stretch in, with all its rows."""
+        for section in sorted({station.section for station in self._places}):
+            columns = [i for i, station in enumerate(self._places) if station.section == section]
+            size = np.abs(history.moments[:, columns])
+            row, best = np.unravel_index(int(size.argmax()), size.shape)
+            column = columns[int(best)]
+            moment = float(history.moments[row, column])
+            if section not in self._largest or abs(moment) > abs(self._largest[section][1]):
+                static = float(slow_part(history, column)[row])
+                self._largest[section] = column, moment, float(history.stamps_s[row]), static
+
+    def loads(self, heights: Array | None) -> list[Load]:
+        """One for every flexible section; `heights` (n,) of the sections in m, or None to take them for thin-walled boxes."""
+        found = []
+        for section, (column, moment, time, static) in self._largest.items():
+            part = self._scene.sections[section]
+            assert part.A is not None and part.I is not None
+            height = BOX * math.sqrt(part.I / part.A) if heights is None else float(heights[section])
+            stress = abs(moment) * height / 2.0 / part.I
+            found.append(Load(self._places[column], column, moment, time, static, height, stress))
+        return found
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:

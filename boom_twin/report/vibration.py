@@ -8,7 +8,7 @@ frequency is, is told by the covariance of all parameters for white noise as lar
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 
 import numpy as np
 from scipy.signal import decimate
@@ -96,7 +96,9 @@ PACE = 1e-3
 OVER = 0.2
 """s over which the pace is taken."""
 LEAST = 3.0
-"""s; the shortest stretch that is looked at."""
+"""s; the shortest interval that is looked at."""
+LONGEST = 60.0
+"""s; the longest: free vibration has died away by then, and memory goes by the square of it."""
 NEAR = 0.2
 """A vibration belongs to the nearest mode of the model, if it is no further from it than this share."""
 SURE = 0.02
@@ -115,16 +117,71 @@ class HoldInterval:
     measured: dict[int, Vibration]
 
 
-def holds(history: History, scene: Scene) -> list[HoldInterval]:
-    """All stretches of a session in which the boom stood still for `LEAST`."""
-    times, values = measured_motion(history)
-    modes, found = ModeList(scene), []
-    for start, stop in still(history.stamps_s, history.strokes):
-        inside, there = _between(history.stamps_s, start, stop), _between(times, start, stop)
-        model = modes.at(np.median(history.strokes[inside], axis=0).tolist())
-        sure = [each for each in vibrations(times[there], values[there]) if each.frequency_sigma * (stop - start) < SURE]
-        found.append(HoldInterval(start, stop, model, _by_mode(sure, model)))
-    return found
+class HoldFinder:
+    """Finds all intervals of a session in which the boom stood still for `LEAST`; of a long one, `LONGEST` is looked at.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._modes = ModeList(scene)
+        self._found: list[HoldInterval] = []
+        self._strokes = self._motion = _NOTHING  # times and values, from where an interval may have begun
+        self._told_to = -inf  # s; end of an interval of `LONGEST`, which may go on
+
+    def add(self, history: History) -> None:
+        """Take the next rows in, all of them; an interval that lasts to their end waits for those that follow."""
+        self._strokes = _appended(self._strokes, (history.stamps_s, history.strokes))
+        self._motion = _appended(self._motion, measured_motion(history))
+        waits_from = self._look(is_last=False)
+        self._strokes, self._motion = _from(self._strokes, waits_from), _from(self._motion, waits_from)
+
+    def finish(self) -> list[HoldInterval]:
+        """All of them; to be called once, after the last `add`."""
+        self._look(is_last=True)
+        return self._found
+
+    def _look(self, is_last: bool) -> float:
+        """Take what has ended; returns from where on (s) rows are still needed."""
+        times, strokes = self._strokes
+        if not len(times):
+            return 0.0
+        waits_from = float(times[-1]) - OVER
+        for start, stop in still(times, strokes, 0.0):
+            is_open = not is_last and stop > times[-1] - OVER
+            if start <= self._told_to:
+                self._told_to = stop
+            elif is_open and stop - start < LONGEST:
+                waits_from = start - OVER
+            elif stop - start >= LEAST:
+                self._found.append(self._interval(start, min(stop, start + LONGEST)))
+                self._told_to = stop if is_open else self._told_to
+        return waits_from
+
+    def _interval(self, start: float, stop: float) -> HoldInterval:
+        (times, strokes), (moved, values) = self._strokes, self._motion
+        inside, there = _between(times, start, stop), _between(moved, start, stop)
+        model = self._modes.at(np.median(strokes[inside], axis=0).tolist())
+        sure = [each for each in vibrations(moved[there], values[there]) if each.frequency_sigma * (stop - start) < SURE]
+        return HoldInterval(start, stop, model, _by_mode(sure, model))
+
+
+_NOTHING = np.zeros(0), np.zeros((0, 0))
+
+
+def _appended(held: tuple[Array, Array], more: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Times and values with more behind them; of other channels than before, only those."""
+    if held[1].shape[1] != more[1].shape[1]:
+        return more
+    return np.concatenate([held[0], more[0]]), np.concatenate([held[1], more[1]])
+
+
+def _from(rows: tuple[Array, Array], start: float) -> tuple[Array, Array]:
+    """Times and values from `start` (s) on."""
+    kept = rows[0] >= start
+    return rows[0][kept], rows[1][kept]
 
 
 def course(history: History, scene: Scene) -> tuple[Array, Array]:
@@ -138,8 +195,8 @@ def course(history: History, scene: Scene) -> tuple[Array, Array]:
     return history.stamps_s[places], table
 
 
-def still(times: Array, strokes: Array) -> list[tuple[float, float]]:
-    """From and to (s) where no stroke (k, n) moved faster than `PACE`, for `LEAST` at least."""
+def still(times: Array, strokes: Array, least: float = LEAST) -> list[tuple[float, float]]:
+    """From and to (s) where no stroke (k, n) moved faster than `PACE`, for `least` seconds at least."""
     if len(times) < 2:
         return []
     before, after = (np.clip(np.searchsorted(times, times + half), 0, len(times) - 1) for half in (-OVER / 2, OVER / 2))
@@ -147,7 +204,7 @@ def still(times: Array, strokes: Array) -> list[tuple[float, float]]:
     calm = np.abs(strokes[after] - strokes[before]).max(axis=1) < PACE * span
     edges = np.flatnonzero(np.diff(np.concatenate([[0], calm.astype(int), [0]])))
     spans = [(float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [(start, stop) for start, stop in spans if stop - start >= LEAST]
+    return [(start, stop) for start, stop in spans if stop - start >= least]
 
 
 def measured_motion(history: History) -> tuple[Array, Array]:

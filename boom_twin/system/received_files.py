@@ -10,6 +10,7 @@ import os
 import stat
 from contextlib import ExitStack
 from errno import ENOENT
+from hashlib import file_digest
 from io import BufferedReader
 from pathlib import Path
 
@@ -71,3 +72,9 @@ def _check_regular(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = next((name for is_kind, name in _KINDS if is_kind(mode)), "no regular file")
         raise BagError(f"{path}: {kind}, not opened in a session's folder. Put the file itself there, or move it away.")
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, a block at a time; errors as of `open_received`."""
+    with open_received(path) as file:
+        return file_digest(file, "sha256").hexdigest()

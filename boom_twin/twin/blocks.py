@@ -299,20 +299,24 @@ def _outline_of(prediction: Prediction) -> Outline | None:
 def joined(parts: list[ReportBlock]) -> ReportBlock:
     """Blocks one after the other as one; there is at least one."""
     samples = np.cumsum([0, *(len(part.stamps) for part in parts)])[:-1].tolist()
-    rows = np.cumsum([0, *(len(part.predictions.stamps) for part in parts)])[:-1].tolist()
-    at = [part.predictions.at + first for part, first in zip(parts, samples, strict=True)]
-    fields = zip(*(part.predictions[1:-1] for part in parts), strict=True)
-    outlines = {
-        first + row: outline
-        for part, first in zip(parts, rows, strict=True)
-        for row, outline in part.predictions.outlines.items()
-    }
     residuals_at = [part.residuals.at + first for part, first in zip(parts, samples, strict=True)]
     others = zip(*(part.residuals[1:] for part in parts), strict=True)
     return ReportBlock(
         np.concatenate([part.stamps for part in parts]),
-        PredictionBlock._make([np.concatenate(at), *map(np.concatenate, fields), outlines]),
+        _joined_predictions([(part.predictions, first) for part, first in zip(parts, samples, strict=True)]),
         EstimateBlock._make(map(np.concatenate, zip(*(part.estimates for part in parts), strict=True))),
         ResidualBlock._make([np.concatenate(residuals_at), *map(np.concatenate, others)]),
         {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
     )
+
+
+def _joined_predictions(parts: list[tuple[PredictionBlock, int]]) -> PredictionBlock:
+    """Predictions one after the other, each block with the row of its first sample; one without any has no widths."""
+    parts = [part for part in parts if len(part[0].stamps)] or parts[:1]
+    rows = np.cumsum([0, *(len(part.stamps) for part, _ in parts)])[:-1].tolist()
+    fields = zip(*(part[1:-1] for part, _ in parts), strict=True)
+    outlines = {
+        first + row: outline for (part, _), first in zip(parts, rows, strict=True) for row, outline in part.outlines.items()
+    }
+    at = np.concatenate([part.at + first for part, first in parts])
+    return PredictionBlock._make([at, *map(np.concatenate, fields), outlines])

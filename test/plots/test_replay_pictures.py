@@ -12,7 +12,8 @@ import pytest
 
 from boom_twin.plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
 from boom_twin.plots.posture import spread
-from boom_twin.plots.residuals import density, residual_picture, running_mean
+from boom_twin.plots.residuals import residual_picture, running_mean
+from boom_twin.plots.session_totals import density
 from boom_twin.plots.style import broken, limits
 from boom_twin.plots.tip import most_active_window, rms_difference
 from boom_twin.types import Array
@@ -128,7 +129,8 @@ def test_numbers_behind_the_pictures() -> None:
     assert rms_difference(told, told.tip_position, t, told.tip_position + np.array([0.03, 0.04])) == pytest.approx(0.05)
     assert running_mean(t, t)[101:-101] == pytest.approx(t[101:-101], abs=3e-3)
     assert running_mean(t, np.ones_like(t)) == pytest.approx(1.0)
-    frequencies, power = density(t, 3.0 * np.sin(2.0 * np.pi * 5.0 * t))
+    found = density(t, 3.0 * np.sin(2.0 * np.pi * 5.0 * t))
+    frequencies, power = found.frequencies, found.power
     assert frequencies[np.argmax(power)] == pytest.approx(5.0, abs=0.13)
     assert np.sum(power) * frequencies[0] == pytest.approx(4.5, rel=0.02)  # half of the amplitude squared
     assert spread(100, 5) == [0, 25, 50, 74, 99] and spread(2, 5) == [0, 1] and spread(0, 5) == []

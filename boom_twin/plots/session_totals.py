@@ -1,0 +1,118 @@
+"""Figures of a whole session that pictures show and that do not follow from its extremes: distributions and spectra."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from ..analysis.column_statistics import ColumnStatistics
+from ..types import Array
+from .history import Density, History, ResidualDistribution, SessionTotals
+
+EDGES = np.linspace(-5.0, 5.0, 51)
+"""Of the bins of normalised residuals; what lies outside counts in the outermost ones."""
+SEGMENT = 8.0
+"""s; lines of a spectrum are 1/SEGMENT apart."""
+
+
+class SessionTotalsBuilder:
+    """Adds up parts of a session."""
+
+    def __init__(self) -> None:
+        self._channels: dict[str, _Channel] = {}
+        self._measured: list[Density] = []
+        self._predicted: list[Density] = []
+
+    def add(self, history: History) -> None:
+        """Take a part in, with all its rows."""
+        for i, name in enumerate(history.residual_names):
+            self._channels.setdefault(name, _Channel()).add(history.residual_values[:, i], history.residual_sigmas[:, i])
+        imu = history.imu
+        if imu is None and self._measured:
+            return
+        if imu is None:
+            self._predicted = _averaged(self._predicted, history.stamps_s, history.tip_acceleration)
+        else:
+            self._predicted = _averaged(self._predicted if self._measured else [], imu.stamps_s, imu.predicted)
+            self._measured = _averaged(self._measured, imu.stamps_s, imu.measured)
+
+    @property
+    def totals(self) -> SessionTotals:
+        """Of all parts so far."""
+        residuals = {name: channel.distribution for name, channel in self._channels.items()}
+        return SessionTotals(residuals, tuple(self._predicted), tuple(self._measured) or None)
+
+
+class _Channel:
+    """The residuals of one channel."""
+
+    def __init__(self) -> None:
+        self._statistics, self._reach = ColumnStatistics(1), 0.0
+        self._counts: NDArray[np.int64] = np.zeros(len(EDGES) - 1, np.int64)
+
+    def add(self, values: Array, sigmas: Array) -> None:
+        known = np.isfinite(values) & np.isfinite(sigmas)
+        if not known.any():
+            return
+        normalised = values[known] / sigmas[known]
+        self._statistics.add(normalised[:, None])
+        self._counts += np.histogram(np.clip(normalised, EDGES[0], EDGES[-1]), EDGES)[0]
+        large = 1.1 * float(np.quantile(np.abs(values[known]), 0.9995))
+        self._reach = max(self._reach, 4.2 * float(np.median(sigmas[known])), large)
+
+    @property
+    def distribution(self) -> ResidualDistribution:
+        (mean,), (deviation,) = self._statistics.mean, self._statistics.deviation
+        return ResidualDistribution(self._counts.copy(), mean, deviation, self._reach)
+
+
+def totals_of(history: History) -> SessionTotals:
+    """The totals of a session: its own, or those of its rows if they are all there."""
+    if history.totals is not None:
+        return history.totals
+    builder = SessionTotalsBuilder()
+    builder.add(history)
+    return builder.totals
+
+
+def _averaged(earlier: list[Density], stamps: Array, values: Array) -> list[Density]:
+    """Densities of both columns of `values`, averaged with those of earlier parts as by Welch over all segments."""
+    found = []
+    for i in range(2):
+        before = earlier[i] if earlier else None
+        own = density(stamps, values[:, i], before.interval if before and before.segments else None)
+        found.append(own if before is None else _mean(before, own))
+    return found
+
+
+def _mean(one: Density, other: Density) -> Density:
+    """Of two densities, weighted by their segments; of different lines, the finer one's."""
+    if len(one.frequencies) != len(other.frequencies):
+        return max(one, other, key=lambda each: len(each.frequencies))
+    if not (count := one.segments + other.segments):
+        return one
+    return replace(one, power=(one.segments * one.power + other.segments * other.power) / count, segments=count)
+
+
+def density(stamps: Array, values: Array, interval: float | None = None) -> Density:
+    """One-sided power spectral density of `values` (k,), put on even times first; what is NaN is bridged.
+
+    Parameters
+    ----------
+    stamps, values : ndarray, shape (k,)
+        s.
+    interval : float, optional
+        Between the even times, s; by default the median of `stamps`.
+    """
+    known = np.isfinite(values)
+    if known.sum() < 16:
+        return Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
+    interval = interval or float(np.median(np.diff(stamps[known])))
+    even = np.arange(stamps[known][0], stamps[known][-1], interval)
+    segment = min(len(even), round(SEGMENT / interval))
+    frequencies, power = welch(np.interp(even, stamps[known], values[known]), 1.0 / interval, nperseg=segment)
+    count = (len(even) - segment // 2) // (segment - segment // 2)
+    return Density(frequencies[1:], power[1:], interval, count)

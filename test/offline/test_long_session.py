@@ -1,0 +1,116 @@
+"""A long session goes through in stretches: the same figures as at once, and memory that does not grow."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from health.recorded import written
+
+from boom_twin import Settings, Stream, Twin, load_scene
+from boom_twin.offline import history, recording
+from boom_twin.offline.recording import Recording, Stretch
+from boom_twin.offline.replay import replay_into
+from boom_twin.report.evaluation import Evaluation, Evaluator
+from boom_twin.report.quantities import read
+from boom_twin.system.result_folder import REPLAY, result_folder
+from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
+
+SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
+
+
+def replayed(session: Path, out: Path) -> tuple[dict, Evaluation, list[Stretch]]:
+    """Summary, evaluation and stretches of a replay into `out`."""
+    scene, stretches = load_scene(), []
+    evaluator = Evaluator(scene, Settings(), None)
+
+    def take(stretch: Stretch) -> None:
+        stretches.append(stretch)
+        evaluator.add(stretch)
+
+    with result_folder(out, REPLAY, [session]) as building:
+        result = replay_into(building, session, scene, take=take)
+        return result.summary, evaluator.finish(result, building.folder), stretches
+
+
+def numbers(value: object) -> list:
+    """What a summary holds, flat, without what time took."""
+    if isinstance(value, dict):
+        return [each for key, item in value.items() if key not in ("wall_s", "realtime_factor") for each in numbers(item)]
+    return [each for item in value for each in numbers(item)] if isinstance(value, list) else [value]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple:
+    """24 s with two stops, at once and in stretches of 4 s; folder of each."""
+    folder = tmp_path_factory.mktemp("long")
+    written(folder / "session", 24.0)
+    whole = replayed(folder / "session", folder / "whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recording, "STRETCH", 800)
+        parts = replayed(folder / "session", folder / "parts")
+    return whole, parts, folder
+
+
+def test_the_figures_are_those_of_the_whole(both: tuple) -> None:
+    (summary, whole, (one,)), (again, parts, stretches), folder = both
+    assert len(stretches) >= 5 and sum(len(each.predictions.stamps) for each in stretches) == len(one.predictions.stamps)
+    assert numbers(again) == [pytest.approx(each, rel=1e-9) if isinstance(each, float) else each for each in numbers(summary)]
+    spans = [np.array([(hold.start, hold.stop) for hold in found.still]) for found in (parts, whole)]
+    assert len(spans[1]) == 4 and spans[0] == pytest.approx(spans[1])
+    assert any(hold.measured for hold in whole.still)
+    (_, wanted), (_, found) = read(folder / "whole"), read(folder / "parts")
+    assert [each.name for each in found] == [each.name for each in wanted]
+    assert [each.value for each in found] == pytest.approx([each.value for each in wanted], rel=1e-6)
+
+
+def test_the_history_is_that_of_the_whole(both: tuple) -> None:
+    (_, whole, _), (_, parts, _), _ = both
+    for name in ("stamps_s", "tip_position", "moments", "residual_values", "levels"):
+        assert np.array_equal(getattr(parts.history, name), getattr(whole.history, name), equal_nan=True), name
+    assert len(parts.history.shapes) == len(whole.history.shapes)
+    for name, found in parts.history.totals.residuals.items():
+        wanted = whole.history.totals.residuals[name]
+        assert np.array_equal(found.counts, wanted.counts)
+        assert (found.mean, found.deviation) == pytest.approx((wanted.mean, wanted.deviation), rel=1e-9)
+
+
+def blocks(seconds: float) -> list[ReportBlock]:
+    """What a twin says of the first seconds of the bundled session's true strokes, and angles."""
+    truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]
+    strokes, stamps = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)]), np.round(truth["t_s"] * 1e9)
+    rows, streams = np.repeat(strokes, 2, axis=0), np.tile([CODES[Stream.STROKES], CODES[Stream.ANGLES]], len(strokes))
+    found = Twin(load_scene()).update_block(SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows))
+    return [each for each in found if isinstance(each, ReportBlock)]
+
+
+def peak_of(parts: list[ReportBlock], times: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Evaluation]:
+    """Peak of memory, bytes, and what comes out of a session that repeats `parts`."""
+    monkeypatch.setattr(recording, "STRETCH", 2000)
+    monkeypatch.setattr(history, "MOST_ROWS", 8192)
+    evaluator = Evaluator(load_scene(), Settings(), None)
+    held = Recording(4, evaluator.add)
+    tracemalloc.start()
+    for k in range(times):
+        shift = k * 10_000_000_000
+        for part in parts:
+            predictions = part.predictions._replace(stamps=part.predictions.stamps + shift)
+            residuals = part.residuals._replace(stamps=part.residuals.stamps + shift)
+            held.add(part._replace(stamps=part.stamps + shift, predictions=predictions, residuals=residuals))
+    held.close()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert held.totals.samples == times * sum(len(part.predictions.stamps) for part in parts)
+    return peak, evaluator._history.history(held)
+
+
+def test_memory_does_not_grow_with_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = blocks(10.0)
+    (short, _), (long, shown) = (peak_of(parts, times, monkeypatch) for times in (12, 72))
+    assert long < 1.25 * short, f"{long / 1e6:.1f} MB for 12 minutes, {short / 1e6:.1f} MB for 2"
+    assert len(shown.stamps_s) < 12_000
+    accelerations = np.concatenate([part.predictions.tip_acceleration for part in parts])
+    for extreme in (np.min, np.max):
+        assert np.array_equal(extreme(shown.tip_acceleration, axis=0), extreme(accelerations, axis=0))
