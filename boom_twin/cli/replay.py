@@ -110,11 +110,22 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     for name, count in summary["events"].items():
         lines.append(f"{name:18s} {count}")
     if "tip_error_rms_m" in summary:
-        lines += [
-            f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
-            f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
-        ]
+        lines += _errors(summary)
+    if "tip_load" in summary:
+        lines.append(f"load at the tip    {summary['tip_load']}")
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
+
+
+def _errors(summary: dict[str, Any]) -> list[str]:
+    """Errors against the truth, of the prediction and of the estimate beside it."""
+    lines = [
+        f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
+        f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
+    ]
+    if "tip_estimate_error_rms_m" in summary:
+        lines[0] += f"; of the estimate {1e3 * summary['tip_estimate_error_rms_m']:.2f} mm"
+        lines[1] += f"; of the estimate {summary['tip_estimate_acceleration_error_rms_m_s2']:.3f} m/s^2"
+    return lines
