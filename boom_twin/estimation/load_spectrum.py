@@ -81,7 +81,7 @@ def find_pulses(load: Array, interval: float) -> Pulses | None:
     window = np.hanning(len(load) + 1)[:-1]
     centred = window[:, None] * (load - window @ load / window.sum())
     lines = np.fft.rfft(centred, PADDED * len(load), axis=0)
-    frequencies = np.fft.rfftfreq(PADDED * len(load), interval)
+    frequencies = np.arange(float(len(lines))) / (PADDED * span)
     peak = _highest(frequencies, np.square(np.abs(lines)).sum(axis=1), span)
     if peak is None:
         return None
@@ -109,7 +109,7 @@ def _highest(frequencies: Array, power: Array, span: float) -> int | None:
 
 
 def _prominence(frequencies: Array, power: Array, place: int, span: float) -> float:
-    """Power of a peak over the mean of its neighbourhood, from half its frequency to twice, on the side where that is larger."""
+    """Power of a peak over the mean of its neighbourhood, half its frequency to twice; of the two sides the larger mean."""
     at, lobe = frequencies[place], LOBE / span
     below = (frequencies > 0.5 * at) & (frequencies < at - lobe)
     above = (frequencies > at + lobe) & (frequencies < max(2.0 * at - lobe, at + 3.0 * lobe))

@@ -1,4 +1,4 @@
-"""Picture of the tip over time: displacement, acceleration, and the IMU beside its prediction."""
+"""Picture of the tip over time: displacement, acceleration, the load that is not known, and the IMU beside its prediction."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..types import Array
-from .history import History, ImuTrace, Truth
-from .style import BLUE, GREY, INK, ORANGE, PALE, broken, extent, legend_above, limits, picture, shade_gaps
+from .history import EstimateTrace, History, ImuTrace, Truth
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,22 +17,30 @@ if TYPE_CHECKING:
 
 WINDOW = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 4))}
-AXES = (("x (forward)", BLUE), ("y (up)", ORANGE))
+AXES = (("x", BLUE), ("y", ORANGE))
+ESTIMATED = (GREEN, PURPLE)
+"""Colours of what all sensors together say of x and y."""
+BAND = 2.0  # standard deviations that are shaded, as their label says
 
 
 def tip_picture(path: Path, session: str, history: History, truth: Truth | None, note: str) -> None:
     """Write ``tip.png``."""
     window = most_active_window(history.stamps_s, history.tip_acceleration)
-    with picture(path, f"{session}: tip motion", note) as figure:
-        grid = figure.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.1])
+    estimate = history.estimate
+    has_load = estimate is not None
+    with picture(path, f"{session}: tip motion", note, (16.0, 12.0 if has_load else 9.0)) as figure:
+        grid = figure.add_gridspec(3 + has_load, 2, height_ratios=[1.0, 1.0, *([0.8] * has_load), 1.1])
         upper = figure.add_subplot(grid[0, :])
-        middle = figure.add_subplot(grid[1, :], sharex=upper)
-        lower = [figure.add_subplot(grid[2, i]) for i in range(2)]
+        others = [figure.add_subplot(grid[1 + i, :], sharex=upper) for i in range(1 + has_load)]
+        lower = [figure.add_subplot(grid[2 + has_load, i]) for i in range(2)]
         _displacement(upper, history, truth)
-        _acceleration(middle, history, truth)
-        _mark(middle, window)
-        upper.tick_params(labelbottom=False)
-        middle.set_xlabel("time since first sample, s")
+        _acceleration(others[0], history, truth)
+        if estimate is not None:
+            _load(others[1], history, estimate)
+        _mark(others[0], window)
+        for axes in (upper, *others[:-1]):
+            axes.tick_params(labelbottom=False)
+        others[-1].set_xlabel("time since first sample, s")
         if history.imu is not None:
             _imu(lower, history.imu, history, window)
         else:
@@ -62,49 +70,84 @@ def _at(stamps: Array, at: Array, values: Array) -> Array:
 
 
 def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
-    shown = 1e3 * history.tip_displacement
-    _lines(axes, history, shown, "predicted ")
+    title, shown, estimate = "Displacement, x forward, y up", 1e3 * history.tip_displacement, history.estimate
+    _lines(axes, history, shown)
     arrays = [shown]
+    if estimate is not None:
+        arrays += _estimate_lines(axes, history, 1e3 * estimate.displacement, 1e3 * estimate.displacement_sigmas)
     if truth is not None:
         rigid = history.tip_position - history.tip_displacement
         real = 1e3 * (_at(history.stamps_s, truth.stamps_s, truth.tip_position) - rigid)
-        error = 1e3 * rms_difference(history, history.tip_position, truth.stamps_s, truth.tip_position)
-        _truth_lines(axes, history.stamps_s, real, f"truth (tip apart by {error:.2g} mm rms)")
+        estimated = None if estimate is None else estimate.displacement + rigid
+        title += _errors(history, (history.tip_position, estimated), (truth.stamps_s, truth.tip_position), (1e3, "mm"))
+        _truth_lines(axes, history.stamps_s, real)
         arrays.append(real)
     axes.set_ylim(*limits(*arrays))
     axes.set_ylabel("displacement, mm")
-    axes.set_title("Tip displacement against a rigid boom on the same strokes")
+    axes.set_title(title)
     _finish(axes, history)
 
 
 def _acceleration(axes: Axes, history: History, truth: Truth | None) -> None:
-    _lines(axes, history, history.tip_acceleration, "predicted ")
-    arrays = [history.tip_acceleration]
+    _lines(axes, history, history.tip_acceleration)
+    title, arrays, estimate = "Acceleration without gravity", [history.tip_acceleration], history.estimate
+    if estimate is not None:
+        arrays += _estimate_lines(axes, history, estimate.acceleration, estimate.acceleration_sigmas)
     if truth is not None:
-        error = rms_difference(history, history.tip_acceleration, truth.stamps_s, truth.tip_acceleration)
-        _truth_lines(axes, truth.stamps_s, truth.tip_acceleration, f"truth (apart by {error:.2g} m/s² rms)")
+        estimated = None if estimate is None else estimate.acceleration
+        shown = history.tip_acceleration, estimated
+        title += _errors(history, shown, (truth.stamps_s, truth.tip_acceleration), (1.0, "m/s²"))
+        _truth_lines(axes, truth.stamps_s, truth.tip_acceleration)
         arrays.append(truth.tip_acceleration)
     axes.set_ylim(*limits(*arrays, around=0.0))
     axes.set_ylabel("acceleration, m/s²")
-    axes.set_title("Tip acceleration (of the point, without gravity)")
+    axes.set_title(title)
     _finish(axes, history)
 
 
-def _lines(axes: Axes, history: History, values: Array, prefix: str) -> None:
+def _load(axes: Axes, history: History, estimate: EstimateTrace) -> None:
+    arrays = _estimate_lines(axes, history, estimate.load, estimate.load_sigmas)
+    axes.set_ylim(*limits(*arrays, around=0.0))
+    axes.set_ylabel("force, N")
+    axes.set_title(f"Load at the tip that the model does not know: {history.load_text}")
+    _finish(axes, history)
+
+
+def _errors(history: History, shown: tuple[Array, Array | None], truth: tuple[Array, Array], unit: tuple[float, str]) -> str:
+    """Errors of prediction and estimate (m, 2) against the truth, its stamps and values (t, 2), for a title."""
+    factor, name = unit
+    errors = [None if values is None else factor * rms_difference(history, values, *truth) for values in shown]
+    told = [f"{kind} {error:.2g}" for kind, error in zip(("prediction", "estimate"), errors, strict=True) if error is not None]
+    return f"; rms error: {', '.join(told)} {name}"
+
+
+def _estimate_lines(axes: Axes, history: History, values: Array, sigmas: Array) -> list[Array]:
+    """Draw an estimate (m, 2) with its band; returns what is to be seen: the lines, and where the band usually ends."""
+    stamps, drawn = broken(history.stamps_s, values, history.gaps)
+    _, deviations = broken(history.stamps_s, sigmas, history.gaps)
+    for i, (name, colour) in enumerate(zip("xy", ESTIMATED, strict=True)):
+        axes.plot(stamps, drawn[:, i], color=colour, linewidth=1.0, label=f"estimated {name}{', ±2 sigma' if i else ''}")
+        low, high = drawn[:, i] - BAND * deviations[:, i], drawn[:, i] + BAND * deviations[:, i]
+        axes.fill_between(stamps, low, high, color=colour, alpha=0.22, linewidth=0)
+    usual = BAND * np.nanmedian(sigmas, axis=0)
+    return [values - usual, values + usual]
+
+
+def _lines(axes: Axes, history: History, values: Array) -> None:
     stamps, drawn = broken(history.stamps_s, values, history.gaps)
     for i, (name, colour) in enumerate(AXES):
-        axes.plot(stamps, drawn[:, i], color=colour, label=prefix + name)
+        axes.plot(stamps, drawn[:, i], color=colour, label=f"predicted {name}")
 
 
-def _truth_lines(axes: Axes, stamps: Array, values: Array, label: str) -> None:
+def _truth_lines(axes: Axes, stamps: Array, values: Array) -> None:
     for i in range(2):
-        axes.plot(stamps, values[:, i], color=INK, **TRUTH, label="" if i else label)
+        axes.plot(stamps, values[:, i], color=INK, **TRUTH, label="" if i else "truth")
 
 
 def _finish(axes: Axes, history: History) -> None:
     shade_gaps(axes, history.gaps)
     axes.set_xlim(extent(history.stamps_s))
-    legend_above(axes, 5, 0.99, handlelength=1.6)
+    legend_above(axes, 6, 0.99, handlelength=1.6)
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:
