@@ -90,7 +90,7 @@ def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
 
 def _acceleration(axes: Axes, history: History, truth: Truth | None) -> None:
     _lines(axes, history, history.tip_acceleration)
-    title, arrays, estimate = "Acceleration without gravity", [history.tip_acceleration], history.estimate
+    title, arrays, estimate = "Acceleration, no gravity", [history.tip_acceleration], history.estimate
     if estimate is not None:
         arrays += _estimate_lines(axes, history, estimate.acceleration, estimate.acceleration_sigmas)
     if truth is not None:
@@ -147,7 +147,7 @@ def _truth_lines(axes: Axes, stamps: Array, values: Array) -> None:
 def _finish(axes: Axes, history: History) -> None:
     shade_gaps(axes, history.gaps)
     axes.set_xlim(extent(history.stamps_s))
-    legend_above(axes, 6, 0.99, handlelength=1.6)
+    legend_above(axes, 5, 0.99, handlelength=1.6, columnspacing=1.1)
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:

@@ -42,7 +42,13 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
 
 
 def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: Feed, replayed: Path) -> None:
-    roles = (Output.TIP_POSITION, Output.TIP_DISPLACEMENT, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD)
+    roles = (
+        Output.TIP_POSITION,
+        Output.TIP_DISPLACEMENT,
+        Output.ESTIMATE_POSE,
+        Output.ESTIMATE_ACCELERATION,
+        Output.ESTIMATE_LOAD,
+    )
     topics = {role: load_topics().outputs[role].absolute for role in roles}
     position, displacement, pose, acceleration, load = (
         [message for _, _, message in read(scan(replayed / "bag"), {topics[role]: TYPES[role]})] for role in roles

@@ -181,7 +181,9 @@ MALFORMED: dict[str, tuple[Role | None, Callable[[], Any], str]] = {
     "estimate of NaN": (Output.ESTIMATE_POSE, lambda: vector(Output.ESTIMATE_POSE, nan), "a number is nan"),
     "negative variance": (Output.ESTIMATE_POSE, lambda: uncertain(Output.ESTIMATE_POSE, -1.0), "a variance is -1"),
     "infinite variance": (
-        Output.ESTIMATE_ACCELERATION, lambda: uncertain(Output.ESTIMATE_ACCELERATION, inf), "a number is inf"
+        Output.ESTIMATE_ACCELERATION,
+        lambda: uncertain(Output.ESTIMATE_ACCELERATION, inf),
+        "a number is inf",
     ),
     "load of NaN": (Output.ESTIMATE_LOAD, lambda: vector(Output.ESTIMATE_LOAD, nan), "a number is nan"),
     "many statuses": (Output.DIAGNOSTICS, lambda: statuses(*["n: m"] * 501), "501 statuses, at most 500"),

@@ -87,7 +87,9 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
     assert told["estimate_sigma_tip_angle_rad"] == pytest.approx(np.sqrt(estimates.tip_covariance[:, 5]), rel=1e-8)
     given = samples()
     strokes = {each.stamp: each.values for each in given if each.stream is Stream.STROKES}
-    assert told["measured_cylinder_2_m"] == pytest.approx([strokes[stamp][1] for stamp in predictions.stamps.tolist()], rel=1e-8)
+    assert told["measured_cylinder_2_m"] == pytest.approx(
+        [strokes[stamp][1] for stamp in predictions.stamps.tolist()], rel=1e-8
+    )
     angles = {each.stamp + STEP // 3: each.values for each in given if each.stream is Stream.ANGLES}
     expected = np.array([angles.get(stamp, np.full(4, np.nan)) for stamp in predictions.stamps.tolist()])
     for i in range(4):
@@ -95,13 +97,17 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
         known = np.isfinite(told[f"residual_joint_{i + 1}_rad"])
         assert known.sum() >= 0.98 * np.isfinite(expected[:, i]).sum() and not (known & np.isnan(expected[:, i])).any()
     rows = found.of(Stream.IMU)
-    assert told["residual_tip_imu_z_m_s2"][np.isin(predictions.stamps, rows.stamps)] == pytest.approx(rows.values[:, 1], rel=1e-8)
+    assert told["residual_tip_imu_z_m_s2"][np.isin(predictions.stamps, rows.stamps)] == pytest.approx(
+        rows.values[:, 1], rel=1e-8
+    )
 
 
 @pytest.fixture
 def session(tmp_path: Path) -> Path:
     still = np.tile(strokes_of_posture(load_scene(), "arch"), (400, 1))
-    write_session(tmp_path / "session", START + np.arange(400) * STEP, still, np.zeros_like(still), None, {"origin": "synthetic"})
+    write_session(
+        tmp_path / "session", START + np.arange(400) * STEP, still, np.zeros_like(still), None, {"origin": "synthetic"}
+    )
     return tmp_path / "session"
 
 
@@ -131,4 +137,6 @@ def test_parquet_holds_the_same_numbers(session: Path, tmp_path: Path) -> None:
     for name, column in told.items():
         values = found.column(name)
         assert values.null_count == np.isnan(column).sum()
-        assert np.array([np.nan if each is None else each for each in values.to_pylist()]) == pytest.approx(column, rel=1e-8, nan_ok=True)
+        assert np.array([np.nan if each is None else each for each in values.to_pylist()]) == pytest.approx(
+            column, rel=1e-8, nan_ok=True
+        )
