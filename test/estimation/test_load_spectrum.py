@@ -1,4 +1,4 @@
-"""Main frequency of the load at the tip against closed forms: right within its stated deviation, and silent where there is none."""
+"""Main frequency of the load at the tip against closed forms: right within its deviation, and none where there is none."""
 
 from __future__ import annotations
 

@@ -54,10 +54,14 @@ def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: F
         [message for _, _, message in read(scan(replayed / "bag"), {topics[role]: TYPES[role]})] for role in roles
     )
     expected = [
-        (d.vector.x + e.pose.pose.position.x - p.point.x, d.vector.z + e.pose.pose.position.z - p.point.z)
-        + tuple(np.sqrt([e.pose.covariance[0], e.pose.covariance[14]]))
-        + (a.accel.accel.linear.x, a.accel.accel.linear.z, *np.sqrt([a.accel.covariance[0], a.accel.covariance[14]]))
-        + (f.wrench.force.x, f.wrench.force.z)
+        (
+            d.vector.x + e.pose.pose.position.x - p.point.x,
+            d.vector.z + e.pose.pose.position.z - p.point.z,
+            *np.sqrt([e.pose.covariance[0], e.pose.covariance[14]]),
+            *(a.accel.accel.linear.x, a.accel.accel.linear.z),
+            *np.sqrt([a.accel.covariance[0], a.accel.covariance[14]]),
+            *(f.wrench.force.x, f.wrench.force.z),
+        )
         for p, d, e, a, f in zip(position, displacement, pose, acceleration, load, strict=True)
         if f.wrench.force.x or f.wrench.force.z
     ]

@@ -1,4 +1,4 @@
-"""The table of a replay holds what the reports hold, measured values in the rows that they are of, in whatever parts it comes."""
+"""The table of a replay holds what its reports hold, measured values in the rows that they are of, whatever parts it comes in."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_first_columns_are_those_of_the_reference() -> None:
 
 
 def samples() -> list[Sample]:
-    """12 s at 200 Hz: angles lie between the strokes and come late, every second is missing; the IMU has the strokes' stamps."""
+    """12 s at 200 Hz: angles between the strokes, late, every second missing; the IMU with the stamps of the strokes."""
     chance, strokes = np.random.default_rng(2), strokes_of_posture(load_scene(), "arch")
     found: list[tuple[int, Sample]] = []
     for row in range(2400):
