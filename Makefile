@@ -33,7 +33,7 @@ setup: $(READY)
 $(READY): setup.py
 	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs]"
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
 	@touch $@
 
 # Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.

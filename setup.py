@@ -56,6 +56,13 @@ setup(
         ],
         "peers": ["exudyn>=1.13,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
+        "batch": [
+            "dask>=2025.5,<2027",
+            "distributed>=2025.5,<2027",
+            "pyarrow>=18,<27",
+            "psutil>=5.9,<8",
+            "bokeh>=3.4,<4",  # Dask's dashboard
+        ],
         "docs": [
             "mkdocs>=1.6.1,<2",
             "mkdocs-material>=9.8.1,<10",

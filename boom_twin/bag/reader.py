@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 
 from ..errors import BagError
 from ..messages.type_store import jazzy
-from ..system.received_files import holds_file
+from ..system.received_files import holds_file, sha256_of
 from .integrity import compare_counts
 from .mcap_summary import McapFile, summarise
 from .metadata import FILE_NAME, BagMetadata, read_metadata
@@ -149,6 +150,11 @@ class Session:
     def find(self, name: str) -> TopicInfo | None:
         """The topic of that name, with or without its leading slash."""
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
+
+
+def files_sha256(session: Session) -> str:
+    """SHA-256 over those of the files of a session, in their order."""
+    return sha256(b"".join(bytes.fromhex(sha256_of(file.path)) for file in session.files)).hexdigest()
 
 
 def scan(path: Path) -> Session:

@@ -6,7 +6,6 @@ lag: that of the twin's smoother for strokes that are integrated white jerk, wit
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -19,12 +18,11 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..bag.joint_names import refuse_other_names
-from ..bag.reader import Session, check_topic, scan
+from ..bag.reader import Session, check_topic, files_sha256, scan
 from ..config.settings import Settings
 from ..errors import BagError
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
-from ..system.received_files import open_received
 from ..types import NANO, SENSORS, Array, Change, Sample, Stream, channels_of
 
 NEEDED = (Stream.STROKES, Stream.ANGLES)  # streams without which nothing can be estimated
@@ -133,7 +131,7 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
             f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
             "cylinders: give a session of this boom."
         )
-    return MeasuredSession(session.path.resolve().name, _digest(session), series, changed)
+    return MeasuredSession(session.path.resolve().name, files_sha256(session)[:SHOWN], series, changed)
 
 
 def _series(samples: list[Sample]) -> Series:
@@ -144,14 +142,6 @@ def _series(samples: list[Sample]) -> Series:
 
 def _told(samples: SampleReader) -> str:
     return ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"
-
-
-def _digest(session: Session) -> str:
-    digest = hashlib.sha256()
-    for file in session.files:
-        with open_received(file.path) as stream:
-            digest.update(hashlib.file_digest(stream, "sha256").digest())
-    return digest.hexdigest()[:SHOWN]
 
 
 LARGEST_GAP = 0.5  # s between strokes; a session is used from one such gap to the next

@@ -41,6 +41,7 @@ COMMANDS: dict[str, str] = {
     "simulate": "the boom's answer to a stroke history",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",
+    "batch": "many recorded sessions through the twin, one table (extra batch)",
     "compare": "two recorded sessions side by side",
     "study": "reports on the methods: error against run time",
     "rig": "make a synthetic session on the virtual rig (extra peers)",

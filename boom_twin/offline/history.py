@@ -42,8 +42,8 @@ def history_of(recording: Recording, scene: Scene) -> History:
     return builder.history(recording)
 
 
-MOST_ROWS = 2**16
-"""Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 5.5 min at 200 Hz."""
+MOST_ROWS = 2**15
+"""Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz."""
 MOST_SHAPES = 1024
 """Shapes of the boom that are kept, of which pictures show two dozen."""
 PREDICTED = (

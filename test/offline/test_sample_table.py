@@ -1,4 +1,4 @@
-"""The table of a replay holds what its reports hold, measured values in the rows that they are of, whatever parts it comes in."""
+"""The table of a replay holds what its reports hold, measured values in the rows that they are of, whatever its parts."""
 
 from __future__ import annotations
 

@@ -1,0 +1,135 @@
+"""Tasks on Dask distributed: a cluster on this machine or a scheduler that runs elsewhere, and the rows as they come."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from logging import CRITICAL
+from threading import Event, Thread
+from typing import TYPE_CHECKING
+
+from ..errors import BagError, UsageError
+from .session_task import Row, SessionTask, failed
+
+if TYPE_CHECKING:
+    from distributed import Client, Future, LocalCluster
+
+REMEDY = 'Run `pip install "boom_twin[batch]"`.'
+ALLOWED = 5
+"""Workers that may end while they have a task, before it counts as a failed attempt."""
+AHEAD = 500
+"""Tasks that are with the scheduler at once: enough for its workers to be busy, few enough for 100 000 sessions."""
+LOST = 5
+"""Seconds without a word of a worker after which another one takes its place."""
+CONNECT = 20.0
+"""Seconds for a scheduler to answer."""
+
+
+@contextmanager
+def connected(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    """A client of the scheduler at an address, or of a cluster on this machine, which ends with the block.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address, as ``tcp://host:8786``.
+    workers : int, optional
+        Of a cluster on this machine, a process each; by default as many as it has cores.
+
+    Raises
+    ------
+    UsageError
+        Dask is not installed.
+    BagError
+        No scheduler answers there.
+    """
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise UsageError(f"dask is not installed, and batch needs it. {REMEDY}") from None
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=CONNECT, set_as_default=False)
+        except (TimeoutError, OSError, ValueError) as error:
+            remedy = "Start `dask scheduler`, check host and port."
+            raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
+        with client:
+            yield client
+        return
+    settings = {
+        "distributed.scheduler.allowed-failures": ALLOWED,
+        "distributed.worker.daemon": False,  # a worker has children of its own
+        "distributed.deploy.lost-worker-timeout": f"{LOST}s",
+    }
+    options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "memory_limit": 0, "silence_logs": CRITICAL}
+    with (
+        dask.config.set(settings),
+        LocalCluster(n_workers=workers or os.cpu_count(), threads_per_worker=1, processes=True, **options) as cluster,
+        Client(cluster, set_as_default=False) as client,
+        _kept_up(cluster),
+    ):
+        yield client
+
+
+@contextmanager
+def _kept_up(cluster: LocalCluster) -> Iterator[None]:
+    """Replace workers that have gone for good: Dask restarts one that is killed, but not if that happens while it starts."""
+    count, ended = len(cluster.worker_spec), Event()
+
+    def watch() -> None:
+        while not ended.wait(LOST):
+            cluster.scale(count)
+
+    thread = Thread(target=watch, name="workers", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[SessionTask], Row]) -> Iterator[Row]:
+    """The rows of all tasks, as they are done.
+
+    A task whose workers end (killed, out of memory, a machine that is lost) goes to others; when `ALLOWED` of them have,
+    that counts as one of its attempts. What fails in any other way costs its own row only.
+    """
+    from distributed import as_completed
+
+    waiting, running, attempts = deque(tasks), dict[str, SessionTask](), dict[str, int]()
+
+    def submitted(task: SessionTask) -> Future:
+        attempts[task.key] = attempts.get(task.key, 0) + 1
+        future = client.submit(work, task, key=f"{task.key}-{attempts[task.key]}", pure=False, retries=0)
+        running[future.key] = task
+        return future
+
+    first = [submitted(waiting.popleft()) for _ in range(min(AHEAD, len(waiting)))]
+    done = as_completed(first, loop=client.loop)
+    for future in done:
+        task = running.pop(future.key)
+        if (reason := _fault(future)) is None:
+            yield future.result()
+        elif attempts[task.key] <= task.retries:
+            done.add(submitted(task))
+        else:
+            yield failed(task, reason, attempts[task.key])
+        future.release()
+        if waiting:
+            done.add(submitted(waiting.popleft()))
+
+
+def _fault(future: Future) -> str | None:
+    """Why a task came to no end."""
+    from distributed import KilledWorker
+
+    if future.status == "finished":
+        return None
+    error = future.exception() if future.status == "error" else None
+    if isinstance(error, KilledWorker):
+        return f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
+    return f"{type(error).__name__}: {error}" if error else f"Dask gave it up ({future.status})"

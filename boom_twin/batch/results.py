@@ -1,0 +1,146 @@
+"""Folder of a batch: a file for every finished row, so that a second call goes on; the table and the page at its end."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import BagError, UsageError
+from ..system.atomic_files import DRAFT, write_atomic
+from ..system.result_folder import check_lasting
+from .cluster import REMEDY
+from .session_task import OK, Row
+
+MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
+ROWS, SESSIONS = "rows", "sessions"
+"""Folders of the rows, and of the replays."""
+_OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
+
+
+@contextmanager
+def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
+    """The folder of a batch, made or gone on with, and locked: one batch at a time works in it.
+
+    Parameters
+    ----------
+    out : Path
+        Not there, empty, or of an earlier batch.
+    sessions : sequence of Path
+        Those that are read: none may lie in `out`, nor `out` in one of them.
+
+    Raises
+    ------
+    BagError
+        `out` holds anything else, another batch works in it, or it cannot be written.
+    """
+    check_lasting(out)
+    place = out.resolve()
+    for session in sessions:
+        path = session.resolve()
+        if path == place or place in path.parents or path in place.parents:
+            raise BagError(f"{out}: {session} lies in it, or it in the session, and a source is never touched. Choose another.")
+    try:
+        others = sorted({each.name for each in place.iterdir()} - _OWN) if place.exists() else []
+        is_new = not (place / MARK).is_file()
+        if (is_new and place.exists() and any(place.iterdir())) or any(not name.endswith(DRAFT) for name in others):
+            raise BagError(f"{out}: holds {(others or ['results'])[0]}, which no batch left. Choose a new folder.")
+        for folder in (place / ROWS, place / SESSIONS):
+            folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(place / MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise BagError(f"{out}: cannot be written ({error.strerror}). Choose a folder that can.") from None
+    try:
+        _lock(lock, out)
+        yield BatchFolder(place, lock)
+    finally:
+        os.close(lock)
+
+
+def _lock(lock: int, out: Path) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        busy = "another `boom_twin batch` is at work there. Wait for its end, or choose another folder."
+        raise BagError(f"{out}: {busy}") from None
+
+
+class BatchFolder:
+    """What is kept of a batch; see `batch_folder`."""
+
+    def __init__(self, folder: Path, lock: int) -> None:
+        self.folder, self._lock = folder, lock
+
+    def replay(self, key: str) -> Path:
+        """Where the replay of a session is."""
+        return self.folder / SESSIONS / key
+
+    def kept(self, key: str, fingerprint: str) -> Row | None:
+        """The row of a session if it is finished and the same was asked for; None otherwise."""
+        try:
+            row = json.loads((self.folder / ROWS / f"{key}.json").read_bytes())
+            return dict(row) if row["fingerprint"] == fingerprint else None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def keep(self, row: Row) -> None:
+        """Write a finished row."""
+        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row) + "\n")
+
+    def mark(self, total: int, finished: int) -> None:
+        """Say how far the batch is."""
+        state = "complete" if finished == total else "unfinished: the same command goes on with it"
+        told = {"command": "batch", "version": __version__, "sessions": total, "finished": finished, "state": state}
+        os.truncate(self._lock, 0)
+        os.pwrite(self._lock, (json.dumps(told) + "\n").encode(), 0)
+
+
+_ALWAYS: dict[str, str] = {
+    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string", "attempts": "int64",
+    "first_stamp_ns": "int64", "duration_s": "double", "samples": "int64", "dropped": "int64", "outside_validity": "int64",
+    "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
+    "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
+    "session_incomplete": "string", "file_sha256": "string", "output_sha256": "string", "scene": "string",
+    "scene_sha256": "string", "baseline": "string", "mapping": "string", "version": "string", "fingerprint": "string",
+    "key": "string", "report": "bool",
+}  # fmt: skip
+"""Columns that every table has, with their types; the others are the figures of `boom_twin.report.quantities`, numbers."""
+
+
+def write_table(path: Path, rows: Sequence[Row]) -> None:
+    """Write all rows as Parquet, one a session: columns that a row lacks are null there.
+
+    Raises
+    ------
+    UsageError
+        pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise UsageError(f"pyarrow is not installed, and batch needs it. {REMEDY}") from None
+    alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in
+                       ("channel", "kind", "from_s", "to_s", "cause", "told")])  # fmt: skip
+    types: dict[str, Any] = {
+        **{name: pa.list_(pa.float64()) if kind == "list" else pa.type_for_alias(kind) for name, kind in _ALWAYS.items()},
+        "alarms": pa.list_(alarm),
+        "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
+    }
+    figures = sorted({name for row in rows for name in row} - types.keys())
+    types |= dict.fromkeys(figures, pa.float64())
+    columns = [pa.array([row.get(name) for row in rows], kind) for name, kind in types.items()]
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.table(columns, schema=pa.schema(list(types.items()))), sink)
+    write_atomic(path, sink.getvalue().to_pybytes())
+
+
+def counts(rows: Sequence[Row]) -> tuple[int, int]:
+    """Rows that are right, and that failed."""
+    right = sum(row["status"] == OK for row in rows)
+    return right, len(rows) - right

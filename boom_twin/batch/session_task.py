@@ -1,0 +1,153 @@
+"""One session of a batch: what is to be done with it, the process that does it, and the row of the table that comes out."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+from .. import __version__
+from ..errors import BoomTwinError
+from ..system.child_process import python_command
+from .supervised_process import Limits, end_with_caller, run_supervised
+
+OK, FAILED = "ok", "failed"
+"""Status of a row."""
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionTask:
+    """What is to be done with one session.
+
+    Attributes
+    ----------
+    key : str
+        Of its row.
+    session : str
+        Path.
+    out : str
+        Folder of its replay.
+    fingerprint : str
+        See `boom_twin.batch.sources.fingerprint`.
+    scene, params, mapping, baseline : str or None
+        As for ``boom_twin replay``.
+    report, keep_bag : bool
+        Whether to write the report with its pictures, and to keep the replay's bag.
+    time, memory : float, int
+        Limits: seconds, and bytes of resident memory.
+    retries : int
+        How often a session that fails is tried again.
+    """
+
+    key: str
+    session: str
+    out: str
+    fingerprint: str
+    scene: str | None
+    params: str | None
+    mapping: str | None
+    baseline: str | None
+    report: bool
+    keep_bag: bool
+    time: float
+    memory: int
+    retries: int
+
+
+def run_task(task: SessionTask) -> Row:
+    """The row of a session, which is replayed in a process of its own; why, if it failed. The task of a Dask worker."""
+    line = json.dumps(asdict(task)).encode() + b"\n"
+    for attempt in range(1, task.retries + 2):
+        found = run_supervised(python_command(__name__), line, Limits(task.time, task.memory))
+        if not found.reason:
+            with suppress(ValueError):
+                return {**json.loads(found.output), "attempts": attempt, "peak_memory_bytes": found.peak}
+    return failed(task, found.reason or "its process told no result", attempt) | {"peak_memory_bytes": found.peak}
+
+
+def failed(task: SessionTask, reason: str, attempts: int) -> Row:
+    """The row of a session that gave no result."""
+    return {**_head(task), "status": FAILED, "reason": reason, "attempts": attempts}
+
+
+def _head(task: SessionTask) -> Row:
+    path = Path(task.session)
+    return {
+        "key": task.key,
+        "session": path.resolve().name,
+        "path": task.session,
+        "fingerprint": task.fingerprint,
+        "version": __version__,
+    }
+
+
+def row_of(task: SessionTask) -> Row:
+    """Replay a session, and tell what came out.
+
+    Raises
+    ------
+    BoomTwinError
+        As `boom_twin.offline.replay.replay`.
+    """
+    from ..bag.reader import files_sha256
+    from ..bag.session_model import scene_of
+    from ..config.settings import load_settings
+    from ..offline.history import draw
+    from ..offline.replay import replay_into
+    from ..report.evaluation import Evaluator
+    from ..report.page import Subject, write_report
+    from ..report.quantities import read
+    from ..system.result_folder import REPLAY, result_folder
+
+    session, params, mapping, baseline = (
+        None if each is None else Path(each) for each in (task.session, task.params, task.mapping, task.baseline)
+    )
+    assert session is not None
+    scene, settings = scene_of(session, task.scene), load_settings(params)
+    evaluator = Evaluator(scene.scene, settings, baseline)
+    with result_folder(Path(task.out), REPLAY, [session]) as building:
+        result = replay_into(building, session, scene, settings, mapping=mapping, baseline=baseline, take=evaluator.add)
+        found = evaluator.finish(result, building.folder)
+        if task.report:
+            draw(result, found.history, building.folder)
+            write_report(Subject(result, found, scene.scene, scene.source, False), building.folder)
+        _, quantities = read(building.folder)
+        if not task.keep_bag:
+            rmtree(building.folder / "bag")
+    summary = result.summary
+    row = _head(task) | {"status": OK, "reason": None, "first_stamp_ns": result.recording.first}
+    row |= {name: value for name, value in summary.items() if name not in ("events", "alarms", "lost_contacts")}
+    row |= {
+        "file_sha256": files_sha256(result.session),
+        "rig": scene.scene.description or scene.sha256[:12],
+        "report": task.report,
+        "alarms": [{name: alarm[name] for name in ALARM} for alarm in summary["alarms"]],
+        "events": [{"event": name, "count": count} for name, count in summary["events"].items()],
+    }
+    for each in quantities:
+        row |= {each.name: each.value, f"{each.name}_sigma": each.sigma}
+    return row
+
+
+ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
+
+
+def main() -> int:
+    """Do the task that comes on stdin, and tell the row on stdout; exit code 1 with the reason on stderr if that fails."""
+    task = SessionTask(**json.loads(sys.stdin.readline()))
+    end_with_caller()
+    try:
+        print(json.dumps(row_of(task)))
+    except BoomTwinError as error:
+        print(str(error).replace("\n", " "), file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

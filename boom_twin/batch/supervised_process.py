@@ -1,0 +1,127 @@
+"""Run a command with limits of time and memory, apart from its caller: whatever becomes of it, the caller goes on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from tempfile import TemporaryFile
+from threading import Thread
+
+LOOK = 0.1
+"""Seconds between looks at the memory."""
+MOST_TOLD = 2000
+"""Last bytes of what a process said on stderr that are told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a process, with all its children, may take: seconds, and bytes of resident memory."""
+
+    time: float
+    memory: int
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a process.
+
+    Attributes
+    ----------
+    output : bytes
+        Of its stdout; whole only without a reason.
+    reason : str
+        Why it failed, one line; empty if it ended with 0.
+    peak : int
+        Largest resident memory that was seen, bytes: pages that its processes share are counted in each.
+    """
+
+    output: bytes
+    reason: str
+    peak: int
+
+
+def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outcome:
+    """Run `command` with one line on stdin, which then stays open: its end tells a process that its caller has gone.
+
+    The process leads a group of its own, and all of the group is ended with it.
+
+    Parameters
+    ----------
+    command : sequence of str
+    task : bytes
+        The line, with its end.
+    limits : Limits
+    """
+    with TemporaryFile() as out, TemporaryFile() as told:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=out, stderr=told, start_new_session=True)
+        assert process.stdin is not None
+        try:
+            with suppress(BrokenPipeError):
+                process.stdin.write(task)
+                process.stdin.flush()
+            reason, peak = _watch(process, limits)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            code = process.wait()
+            with suppress(BrokenPipeError):
+                process.stdin.close()
+        out.seek(0)
+        if not reason and code:
+            told.seek(max(0, told.seek(0, os.SEEK_END) - MOST_TOLD))
+            reason = _last_line(told.read()) if code > 0 else ""
+            reason = reason or f"its process was ended by {_cause(code)}"
+        return Outcome(out.read(), reason, peak)
+
+
+def _watch(process: subprocess.Popen[bytes], limits: Limits) -> tuple[str, int]:
+    """Wait for the end; why it must be ended before, and the largest memory seen."""
+    end, peak = time.monotonic() + limits.time, 0
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(LOOK)
+            return "", peak
+        peak = max(peak, _memory(process.pid))
+        if peak > limits.memory:
+            return f"needs {peak / 1e6:.0f} MB of memory, more than {limits.memory / 1e6:.0f} MB. Raise --memory.", peak
+        if time.monotonic() > end:
+            return f"takes longer than {limits.time:g} s. Raise --timeout.", peak
+
+
+def _memory(pid: int) -> int:
+    """Resident memory of a process and all its children, bytes."""
+    import psutil
+
+    total = 0
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for each in (process, *process.children(recursive=True)):
+            with suppress(psutil.Error):
+                total += each.memory_info().rss
+    return total
+
+
+def _last_line(told: bytes) -> str:
+    lines = told.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else ""
+
+
+def _cause(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"itself with code {code}"
+
+
+def end_with_caller() -> None:
+    """Called by the process, once it has read its line: from now on it ends, with its group, when its caller does."""
+    Thread(target=_wait_for_end, name="caller", daemon=True).start()
+
+
+def _wait_for_end() -> None:
+    sys.stdin.read()
+    if os.getpgid(0) == os.getpid():
+        os.killpg(0, signal.SIGKILL)

@@ -1,0 +1,138 @@
+"""``boom_twin batch``: many recorded sessions through the twin, one table."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .main import add_params
+from .play import positive
+
+if TYPE_CHECKING:
+    from ..batch.results import BatchFolder
+    from ..batch.session_task import Row, SessionTask
+
+MEGABYTE = 1_000_000
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
+    parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
+    place = "folder for sessions.parquet, batch.html and the replays: new, empty, or of an earlier batch, which goes on"
+    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=place)
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, a cluster on this machine"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=at_least(1), help="of the cluster on this machine; by default as many as cores"
+    )
+    scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
+    parser.add_argument("--scene", metavar="SCENE", type=Path, help=scene)
+    add_params(parser)
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors of all sessions; as for replay")
+    parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
+    parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
+    parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
+    parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
+    parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
+    parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="of a session that fails (1)")
+    parser.add_argument("--retry-failed", action="store_true", help="go on with those too that failed in an earlier call")
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """Reads a whole number that is not below `least`."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise ArgumentTypeError(f"{text}: must be a whole number of at least {least}")
+        return int(text)
+
+    return read
+
+
+def run(args: Namespace) -> int:
+    """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
+    from ..batch.cluster import connected, rows_of
+    from ..batch.page import write_page
+    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_table
+    from ..batch.session_task import run_task
+    from ..batch.sources import sessions_of
+
+    sessions = sessions_of(args.bags)
+    with batch_folder(args.out, sessions) as folder:
+        tasks = _tasks(args, sessions, folder)
+        done = {task.key: row for task in tasks if (row := _kept(args, folder, task)) is not None}
+        if waiting := [task for task in tasks if task.key not in done]:
+            with connected(args.scheduler, args.workers) as client:
+                print(f"{len(done)} of {len(tasks)} sessions are done; dashboard: {client.dashboard_link}", file=sys.stderr)
+                try:
+                    for row in _shown(rows_of(client, waiting, run_task), len(done), len(tasks)):
+                        folder.keep(row)
+                        done[row["key"]] = row
+                finally:
+                    folder.mark(len(tasks), len(done))
+        rows = [done[task.key] for task in tasks]
+        write_table(folder.folder / TABLE, rows)
+        write_page(folder.folder / PAGE, rows)
+        folder.mark(len(tasks), len(done))
+    right, wrong = counts(rows)
+    print(f"{right} sessions right, {wrong} failed")
+    for row in rows:
+        if row["reason"]:
+            print(f"  {row['path']}: {row['reason']}")
+    print(args.out / TABLE, args.out / PAGE, sep="\n")
+    return 1 if wrong else 0
+
+
+def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> list[SessionTask]:
+    from .. import __version__
+    from ..batch.session_task import SessionTask
+    from ..batch.sources import fingerprint, key_of
+    from ..system.received_files import sha256_of
+
+    given = {name: getattr(args, name) for name in ("scene", "params", "mapping", "baseline")}
+    contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
+    options = "\n".join([__version__, str(args.report), str(args.keep_bags), *contents])
+    paths = {name: None if path is None else str(path.resolve()) for name, path in given.items()}
+    return [
+        SessionTask(
+            key=(key := key_of(session)),
+            session=str(session.absolute()),
+            out=str(folder.replay(key)),
+            fingerprint=fingerprint(session, options),
+            **paths,
+            report=args.report,
+            keep_bag=args.keep_bags,
+            time=args.timeout,
+            memory=round(args.memory * MEGABYTE),
+            retries=args.retries,
+        )
+        for session in sessions
+    ]
+
+
+def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None:
+    """The row of an earlier call, unless it is to be tried again."""
+    from ..batch.session_task import OK
+
+    row = folder.kept(task.key, task.fingerprint)
+    return None if row is not None and row["status"] != OK and args.retry_failed else row
+
+
+def _shown(rows: Iterator[Row], before: int, total: int) -> Iterator[Row]:
+    """The rows, with a bar on a terminal, else a line for every tenth of all."""
+    from tqdm import tqdm
+
+    if sys.stderr.isatty():
+        yield from tqdm(rows, total=total, initial=before, unit="session", desc="batch")
+        return
+    told = 10 * before // total
+    for count, row in enumerate(rows, before + 1):
+        yield row
+        if 10 * count // total > told:
+            told = 10 * count // total
+            print(f"{count} of {total} sessions, {10 * told} %", file=sys.stderr)

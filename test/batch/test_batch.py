@@ -1,0 +1,215 @@
+"""A batch of small sessions: a broken one, a killed worker, Ctrl-C, and going on."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from health.recorded import written
+
+psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
+pytest.importorskip("distributed")
+
+from boom_twin import replay  # noqa: E402
+from boom_twin.cli.main import main  # noqa: E402
+from boom_twin.system.child_process import python_command  # noqa: E402
+
+COUNT = 5
+PATIENCE = 300.0
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five of two seconds, and one that was cut off."""
+    folder = tmp_path_factory.mktemp("sessions")
+    written(folder / "s0", 2.0)
+    for number in range(1, COUNT):
+        shutil.copytree(folder / "s0", folder / f"s{number}")
+    (folder / "torn").mkdir()
+    whole = (folder / "s0" / "session_0.mcap").read_bytes()
+    (folder / "torn" / "session_0.mcap").write_bytes(whole[: len(whole) // 2])
+    return folder
+
+
+def started(sessions: Path, out: Path) -> subprocess.Popen[str]:
+    """A batch by two workers, at work."""
+    command = python_command("boom_twin.cli.main", "batch", str(sessions / "*"), "--out", str(out), "--workers", "2")
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def rows_in(out: Path) -> list[Path]:
+    return sorted((out / "rows").glob("*.json"))
+
+
+def wait_for_rows(process: subprocess.Popen[str], out: Path, count: int) -> None:
+    end = time.monotonic() + PATIENCE
+    while len(rows_in(out)) < count:
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.02)
+
+
+def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """The processes of Dask's workers, as the processes of sessions have them for parents."""
+    return [each for each in psutil.Process(process.pid).children() if is_at_work(each)]
+
+
+def is_at_work(process: psutil.Process) -> bool:
+    with suppress(psutil.Error):
+        return any("session_task" in word for child in process.children() for word in child.cmdline())
+    return False
+
+
+@pytest.fixture(scope="module")
+def done(sessions: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, int], list[psutil.Process]]:
+    """Folder of a batch that lost a worker, was stopped, and went on; times of the rows when it was stopped; its processes."""
+    out = tmp_path_factory.mktemp("batch") / "out"
+    process = started(sessions, out)
+    wait_for_rows(process, out, 1)
+    end = time.monotonic() + PATIENCE
+    while not (workers := workers_of(process)):
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.02)
+    workers[0].kill()
+    wait_for_rows(process, out, 2)
+    family = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1 and told.splitlines()[-1] == "boom_twin batch: stopped", told
+    assert json.loads((out / "batch.json").read_text())["state"].startswith("unfinished")
+    assert not (out / "sessions.parquet").exists()
+    kept = {path.name: path.stat().st_mtime_ns for path in rows_in(out)}
+    again = started(sessions, out)
+    _, told = again.communicate(timeout=PATIENCE)
+    assert again.returncode == 1 and f"{len(kept)} of {COUNT + 1} sessions are done" in told, told
+    return out, kept, family
+
+
+def test_going_on_repeats_nothing(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+    out, kept, family = done
+    assert 2 <= len(kept) < COUNT + 1
+    assert {name: time for path in rows_in(out) if (name := path.name) in kept for time in [path.stat().st_mtime_ns]} == kept
+    assert json.loads((out / "batch.json").read_text())["state"] == "complete"
+    _, alive = psutil.wait_procs(family, timeout=60)
+    assert not [each for each in alive if each.status() != psutil.STATUS_ZOMBIE]
+
+
+def test_rows_are_those_of_single_replays(
+    sessions: Path, done: tuple[Path, dict[str, int], list[psutil.Process]], tmp_path: Path
+) -> None:
+    table = parquet.read_table(done[0] / "sessions.parquet").to_pylist()
+    right = [row for row in table if row["status"] == "ok"]
+    assert len(table) == COUNT + 1 and {row["session"] for row in right} == {f"s{number}" for number in range(COUNT)}
+    summary = replay(sessions / "s0", None, tmp_path / "one").summary
+    for row in right:
+        for name in ("output_sha256", "samples", "joint_residual_rms_rad", "scene_sha256", "tip_acceleration_max_m_s2"):
+            assert row[name] == summary[name], name
+        assert row["alarms"] == [] and row["version"] and row["residual_rms_joint_1"] > 0.0 and len(row["file_sha256"]) == 64
+
+
+def test_a_broken_session_costs_its_own_row(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+    (row,) = [row for row in parquet.read_table(done[0] / "sessions.parquet").to_pylist() if row["status"] != "ok"]
+    assert row["session"] == "torn" and row["status"] == "failed" and row["attempts"] == 2
+    assert "incomplete: the end is missing" in row["reason"]
+
+
+class Links(HTMLParser):
+    """Tags, and what they refer to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list) -> None:
+        self.tags.append(tag)
+        self.links += [value for name, value in attrs if name in ("src", "href", "srcset")]
+
+
+def test_the_page_needs_nothing_from_elsewhere(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+    text = (done[0] / "batch.html").read_text(encoding="utf-8")
+    found = Links()
+    found.feed(text)
+    assert found.links == [] and "http" not in text and not re.search(r"url\(|@import|fetch\(", text)
+    assert found.tags.count("tr") == COUNT + 2 and found.tags.count("svg") >= 3
+
+
+def test_a_finished_batch_starts_no_cluster(
+    sessions: Path, done: tuple[Path, dict[str, int], list[psutil.Process]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["batch", str(sessions / "s*"), str(sessions / "torn"), "--out", str(done[0])]) == 1
+    told = capsys.readouterr()
+    assert "dashboard" not in told.err and f"{COUNT} sessions right, 1 failed" in told.out
+
+
+def test_only_a_batch_is_gone_on_with(sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.txt").write_text("x")
+    for out, told in ((tmp_path, "which no batch left"), (sessions, "a source is never touched")):
+        assert main(["batch", str(sessions / "s0"), "--out", str(out)]) == 1
+        assert told in capsys.readouterr().err
+    assert (tmp_path / "mine.txt").read_text() == "x" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_no_scheduler_answers(
+    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("boom_twin.batch.cluster.CONNECT", 0.5)
+    assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "o"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
+    assert "no Dask scheduler answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", [("--workers", "0"), ("--retries", "-1"), ("--timeout", "0"), ("--memory", "nan")])
+def test_numbers_out_of_bounds_are_refused(option: tuple[str, str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["batch", "x", "--out", str(tmp_path / "o"), *option])
+
+
+KILLS = """
+import time, psutil
+from boom_twin.batch.cluster import connected, rows_of
+from boom_twin.batch.session_task import SessionTask
+
+def nothing(task):
+    return {"key": task.key}
+
+def is_worker(process):
+    try:
+        return "spawn_main" in " ".join(process.cmdline())
+    except psutil.Error:  # it has gone meanwhile
+        return False
+
+if __name__ == "__main__":
+    tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(20)]
+    with connected(None, 1) as client:
+        for _ in range(2):  # the worker, and the next one, which has not said a word yet
+            while not (found := [each for each in psutil.Process().children() if is_worker(each)]):
+                time.sleep(0.02)
+            found[0].kill()
+        print(len(list(rows_of(client, tasks, nothing))))
+"""
+
+
+@pytest.mark.slow
+def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path) -> None:
+    (tmp_path / "kills.py").write_text(KILLS)
+    command = [sys.executable, str(tmp_path / "kills.py")]
+    assert subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout == "20\n"
+
+
+def test_without_the_extra_one_line_tells_what_to_install(sessions: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys; sys.modules['distributed'] = None; from boom_twin.cli.main import main; "
+        "sys.exit(main(['batch', sys.argv[1], '--out', sys.argv[2]]))"
+    )
+    command = [sys.executable, "-c", code, str(sessions / "s0"), str(tmp_path / "out")]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert found.returncode == 1 and len(found.stderr.splitlines()) == 1
+    assert 'pip install "boom_twin[batch]"' in found.stderr

@@ -1,0 +1,47 @@
+"""Which sessions are meant: paths, globs, lists."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from boom_twin.batch.sources import fingerprint, key_of, sessions_of
+from boom_twin.errors import UsageError
+
+
+@pytest.fixture
+def there(tmp_path: Path) -> Path:
+    for name in ("a", "b", "c"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "session_0.mcap").write_bytes(b"x")
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "notes.md").write_text("x")
+    return tmp_path
+
+
+def test_globs_lists_and_paths_give_each_session_once(there: Path) -> None:
+    (there / "list.txt").write_text("# all of them\nb  # the second\n\n[ab]\n")
+    assert sessions_of([str(there / "*")]) == [there / "a", there / "b", there / "c"]
+    assert sessions_of([str(there / "list.txt"), str(there / "a"), str(there / "nothing")]) == [
+        there / "b", there / "a", there / "nothing",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("source", "told"), [("x*", "fits no session"), ("none.txt", "cannot be read as a list"), ("void.txt", "lists no session")]
+)
+def test_what_names_nothing_is_refused(there: Path, source: str, told: str) -> None:
+    (there / "void.txt").write_text("# nothing\n")
+    with pytest.raises(UsageError, match=told):
+        sessions_of([str(there / source)])
+
+
+def test_keys_and_fingerprints_tell_sessions_and_changes_apart(there: Path) -> None:
+    (there / "d").mkdir()
+    (there / "d" / "a").mkdir()
+    assert key_of(there / "a") != key_of(there / "d" / "a") and key_of(there / "a") == key_of(there / "b" / ".." / "a")
+    before = fingerprint(there / "a", "options")
+    assert before == fingerprint(there / "a", "options") != fingerprint(there / "a", "others")
+    (there / "a" / "session_0.mcap").write_bytes(b"xy")
+    assert fingerprint(there / "a", "options") != before

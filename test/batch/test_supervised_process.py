@@ -1,0 +1,74 @@
+"""A process with limits: whatever it does, its caller goes on and knows why it failed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+psutil = pytest.importorskip("psutil")
+
+from boom_twin.batch.supervised_process import Limits, Outcome, run_supervised  # noqa: E402
+
+PLENTY = Limits(120.0, 4_000_000_000)
+
+
+def run(code: str, limits: Limits = PLENTY, *arguments: str) -> Outcome:
+    return run_supervised([sys.executable, "-c", code, *arguments], b"task\n", limits)
+
+
+def is_gone(pid: int) -> bool:
+    """Whether a process ends within a minute."""
+    for _ in range(600):
+        if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def test_what_it_says_is_told() -> None:
+    assert run("print(input())").output == b"task\n"
+    assert run("import sys; sys.exit('this: is wrong')").reason == "this: is wrong"
+    assert run("raise ValueError('of a kind')").reason == "ValueError: of a kind"
+    assert run("import os; os.kill(os.getpid(), 9)").reason == "its process was ended by signal 9"
+    assert run("import os; os._exit(3)").reason == "its process was ended by itself with code 3"
+
+
+def test_one_that_hangs_is_ended_with_its_children(tmp_path: Path) -> None:
+    code = (
+        "import subprocess, sys, time; child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); "
+        "open(sys.argv[1], 'w').write(str(child.pid)); time.sleep(600)"
+    )
+    found = run(code, Limits(3.0, PLENTY.memory), str(tmp_path / "pid"))
+    assert found.reason == "takes longer than 3 s. Raise --timeout."
+    assert is_gone(int((tmp_path / "pid").read_text()))
+
+
+def test_one_that_takes_too_much_memory_is_ended() -> None:
+    found = run("import time; held = bytearray(b'x') * 400_000_000; time.sleep(600)", Limits(600.0, 200_000_000))
+    assert "more than 200 MB. Raise --memory." in found.reason and found.peak > 200_000_000
+
+
+def test_it_ends_with_its_caller(tmp_path: Path) -> None:
+    """The caller is killed, as a worker may be."""
+    child = (
+        "import os, sys, time; from boom_twin.batch.supervised_process import end_with_caller; sys.stdin.readline(); "
+        "end_with_caller(); open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(600)"
+    )
+    caller = (
+        "import sys; from boom_twin.batch.supervised_process import Limits, run_supervised; "
+        "run_supervised([sys.executable, '-c', sys.argv[1], sys.argv[2]], b'task\\n', Limits(600.0, 10**10))"
+    )
+    place = tmp_path / "pid"
+    process = subprocess.Popen([sys.executable, "-c", caller, child, str(place)])
+    while not (place.exists() and place.read_text()):
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert is_gone(int(place.read_text()))
