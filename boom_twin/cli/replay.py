@@ -12,6 +12,7 @@ from .main import add_json, add_params, add_session_scene, open_session_scene, p
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
+    from ..offline.recording import Stretch
     from ..offline.replay import ProgressBar, Replay
     from ..report.evaluation import Evaluation
 
@@ -36,6 +37,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
     heights = "heights of the sections in m, for the stresses in the report; by default those of thin-walled boxes"
     parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
+    told = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
+    parser.add_argument("--table", choices=("csv", "parquet"), help=told)
     add_json(parser)
 
 
@@ -43,6 +46,7 @@ def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
     from ..config.settings import load_settings
     from ..offline.replay import replay_into
+    from ..offline.sample_table import SampleTable, check_kind
     from ..report.evaluation import Evaluator
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
@@ -50,14 +54,24 @@ def run(args: Namespace) -> int:
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
     settings = load_settings(args.params)
+    check_kind(args.table)
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
         options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
         evaluator = Evaluator(scene.scene, settings, args.baseline)
-        result = replay_into(building, args.bag, scene, *options, take=evaluator.add)
+        table = SampleTable(building.folder, args.table, len(scene.scene.joints)) if args.table else None
+
+        def take(stretch: Stretch) -> None:
+            evaluator.add(stretch)
+            if table is not None:
+                table.add(stretch)
+
+        result = replay_into(building, args.bag, scene, *options, take=take)
         found = evaluator.finish(result, building.folder, heights)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
+        if table is not None:
+            files.append(table.finish().name)
     warn_incomplete(result.session)
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
@@ -110,11 +124,22 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     for name, count in summary["events"].items():
         lines.append(f"{name:18s} {count}")
     if "tip_error_rms_m" in summary:
-        lines += [
-            f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
-            f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
-        ]
+        lines += _errors(summary)
+    if "tip_load" in summary:
+        lines.append(f"load at the tip    {summary['tip_load']}")
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
+
+
+def _errors(summary: dict[str, Any]) -> list[str]:
+    """Errors against the truth, of the prediction and of the estimate beside it."""
+    lines = [
+        f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
+        f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",
+    ]
+    if "tip_estimate_error_rms_m" in summary:
+        lines[0] += f"; of the estimate {1e3 * summary['tip_estimate_error_rms_m']:.2f} mm"
+        lines[1] += f"; of the estimate {summary['tip_estimate_acceleration_error_rms_m_s2']:.3f} m/s^2"
+    return lines

@@ -10,12 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..config.settings import Thresholds
+from ..estimation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, values_of
-from ..types import Alarm, Array, Health, Report
+from ..types import SECOND, Alarm, Array, Estimate, Health, Report
 from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 
 HOLD = 1.0
 """Seconds for which a failure is shown."""
+LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
+"""Of the load at the tip that is looked at, ns: from when, and how far apart."""
 
 
 class ModelWatch:
@@ -104,6 +107,43 @@ class ModelWatch:
         told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0
+
+
+class LoadWatch:
+    """The load at the tip that the model does not know, as it was estimated in the last `LOAD_WINDOW`; it is never a fault."""
+
+    def __init__(self) -> None:
+        self._judge = ComponentJudge("tip load")
+        self._stamps: deque[int] = deque()
+        self._loads: deque[Array] = deque()
+
+    def took(self, estimate: Estimate) -> None:
+        """Go on with an estimate, unless the last one was but `LOAD_INTERVAL` before."""
+        if self._stamps and not estimate.stamp - self._stamps[-1] >= LOAD_INTERVAL:
+            if estimate.stamp >= self._stamps[-1]:
+                return
+            self._stamps.clear()  # the clock was set back
+            self._loads.clear()
+        self._stamps.append(estimate.stamp)
+        self._loads.append(estimate.load)
+        while self._stamps[-1] - self._stamps[0] > LOAD_WINDOW:
+            self._stamps.popleft()
+            self._loads.popleft()
+
+    def status(self, at: Evaluation) -> Status | None:
+        """In words and figures; None as long as nothing but strokes was measured."""
+        finder = TipLoadFinder()
+        finder.add(np.array(self._stamps, np.int64), np.array(self._loads).reshape(-1, 2))
+        load = finder.load
+        if load is None:
+            return None
+        self._judge.begin(at)
+        self._judge.note("rms_N", load.rms)
+        if load.pulses is not None:
+            self._judge.note("pulses_N", load.pulses.height)
+            self._judge.note("frequency_Hz", load.pulses.frequency)
+            self._judge.note("frequency_sigma_Hz", load.pulses.frequency_sigma)
+        return self._judge.finish(load.text)
 
 
 class _Sums(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from ..config.settings import Thresholds
 from ..types import Report, Residuals, Sample, Stream
 from .levels import Evaluation, Level, Status
-from .model_status import HealthWatch, ModelWatch, ResidualJudge, level_of
+from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
 from .sensor_status import SensorJudge, SensorSpec
 from .source_status import PublishersJudge, Reception, ReceptionJudge
 from .stream_stats import StreamWatch
@@ -59,6 +59,7 @@ class TwinWatch:
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
         self.health: HealthWatch | None = None
+        self._load = LoadWatch()
 
     # -- one message --------------------------------------------------------------------------------------------------
 
@@ -73,6 +74,8 @@ class TwinWatch:
             self._model.took(each, duration if each is report else 0.0)
             if each.residuals:
                 self._residuals += each.residuals
+            if each.estimate is not None:
+                self._load.took(each.estimate)
             if each.health is not None:
                 self.health = self.health or HealthWatch()
                 self.health.took(each.health)
@@ -137,6 +140,8 @@ class TwinWatch:
         found.append(self._outputs.status(subscribers, at))
         if self.health is not None:
             found.append(self.health.status(at))
+        if (load := self._load.status(at)) is not None:
+            found.append(load)
         return found + sensors + self._look_at_residuals(at)
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:

@@ -15,7 +15,7 @@ offset  type                   meaning
 
 A spectrum has one column for each column of the table that its number names; a spectrogram one for each of
 `boom_twin.monitor.data.spectrum.FREQUENCIES`. All else is JSON in text messages, with a key
-``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``answer``.
+``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``load``, ``answer``.
 """
 
 from __future__ import annotations

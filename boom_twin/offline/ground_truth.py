@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
-from ..twin.blocks import PredictionBlock
+from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
 
 FILE_NAME = "truth.csv.gz"
@@ -66,31 +66,46 @@ class TipTruth:
 
 
 class TipErrors:
-    """Root mean square errors of predictions that come in parts; the first one of all is at the truth's first time."""
+    """Root mean square errors of what comes in parts: predictions, and the estimates beside them.
+
+    The first prediction of all is at the truth's first time.
+    """
 
     def __init__(self, truth: TipTruth) -> None:
         self._truth = truth
         self._first: int | None = None
         self._count, self._position, self._acceleration = 0, 0.0, 0.0
+        self._estimates, self._estimated_position, self._estimated_acceleration = 0, 0.0, 0.0
 
-    def add(self, predictions: PredictionBlock, rows: slice) -> None:
-        """Take in some rows of predictions, all by the clock of the first one."""
+    def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock | None = None) -> None:
+        """Take in some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
         stamps, truth = predictions.stamps[rows], self._truth
         if not len(stamps):
             return
         self._first = int(stamps[0]) if self._first is None else self._first
         times = (stamps - self._first) * NANO + truth.times[0]
         self._count += len(stamps)
-        self._position += float(np.sum((predictions.tip_position[rows] - truth.at(times, truth.position)) ** 2))
-        self._acceleration += float(np.sum((predictions.tip_acceleration[rows] - truth.at(times, truth.acceleration)) ** 2))
+        position, acceleration = truth.at(times, truth.position), truth.at(times, truth.acceleration)
+        self._position += float(np.sum((predictions.tip_position[rows] - position) ** 2))
+        self._acceleration += float(np.sum((predictions.tip_acceleration[rows] - acceleration) ** 2))
+        if estimates is None:
+            return
+        fed = estimates.is_fed[rows]
+        self._estimates += int(fed.sum())
+        self._estimated_position += float(np.sum((estimates.tip[rows, :2] - position)[fed] ** 2))
+        self._estimated_acceleration += float(np.sum((estimates.acceleration[rows, :2] - acceleration)[fed] ** 2))
 
     @property
     def rms(self) -> dict[str, float]:
-        """Of the position, m, and of the acceleration, m/s^2, by their names in ``summary.json``."""
-        return {
+        """Of the position, m, and of the acceleration, m/s^2, by their names in ``summary.json``; of estimates if there are."""
+        found = {
             "tip_error_rms_m": sqrt(self._position / self._count),
             "tip_acceleration_error_rms_m_s2": sqrt(self._acceleration / self._count),
         }
+        if self._estimates:
+            found["tip_estimate_error_rms_m"] = sqrt(self._estimated_position / self._estimates)
+            found["tip_estimate_acceleration_error_rms_m_s2"] = sqrt(self._estimated_acceleration / self._estimates)
+        return found
 
 
 def load_truth(folder: Path) -> TipTruth | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
-from ..plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
+from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
 from ..plots.extreme_rows import ExtremeRows
 from ..plots.health import slow_part
 from ..plots.history import Orbits
@@ -61,7 +61,7 @@ class HistoryBuilder:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
-        self._predicted = ExtremeRows(MOST_ROWS, (1, 2, 3, 7, 8, 9))
+        self._predicted = ExtremeRows(MOST_ROWS, (1, 2, 3, 7, 8, 9, 10, 11, 12))
         self._imu, self._levels = ExtremeRows(MOST_ROWS, (1, 2)), ExtremeRows(MOST_ROWS, (1,))
         self._residuals = {stream: ExtremeRows(MOST_ROWS, (1, 3)) for stream in Stream}
         self._totals = SessionTotalsBuilder()
@@ -77,7 +77,7 @@ class HistoryBuilder:
         slow = np.stack([slow_part(own, i) for i in range(own.moments.shape[1])], 1) if own.moments.size else own.moments
         pins = stretch.predictions.clearances
         columns = *(getattr(own, name) for name in PREDICTED), slow, pins.reshape(len(pins), -1)
-        self._put(self._predicted, columns)
+        self._put(self._predicted, (*columns, *_estimate_trace(stretch).columns))
         for stream, table in self._residuals.items():
             rows = stretch.of(stream)
             if len(rows.stamps):
@@ -113,8 +113,9 @@ class HistoryBuilder:
         for table in (self._predicted, self._imu, self._levels, *self._residuals.values()):
             if table.is_thin:
                 table.thin(self._enlarged(table))  # the newest ones as those before
-        *predicted, slow, pins = self._predicted.columns
-        found = dict(zip(PREDICTED, predicted, strict=True))
+        predicted = self._predicted.columns
+        found, (slow, pins, *estimated) = dict(zip(PREDICTED, predicted, strict=False)), predicted[len(PREDICTED) :]
+        load = recording.totals.load.load
         names = channels_of(len(self._scene.joints))
         tables = [(names[stream], table.columns) for stream, table in self._residuals.items() if table.columns]
         groups = [_ChannelGroup(own, columns[0], columns[1:]) for own, columns in tables]
@@ -138,6 +139,8 @@ class HistoryBuilder:
             level_stamps_s=level_stamps,
             level_names=self._level_names,
             levels=levels,
+            estimate=None if load is None else EstimateTrace(*estimated),
+            load_text="" if load is None else load.text,
         )
 
 
@@ -193,6 +196,16 @@ def _stretch_history(stretch: Stretch, scene: Scene) -> History:
         level_names=stretch.health[0].names if stretch.health else (),
         levels=np.array([health.levels for health in stretch.health]),
     )
+
+
+def _estimate_trace(stretch: Stretch) -> EstimateTrace:
+    """The estimates beside the predictions."""
+    estimates, predictions = stretch.estimates, stretch.predictions
+    fed = estimates.is_fed[:, None]
+    rigid = predictions.tip_position - predictions.tip_displacement
+    variances = estimates.tip_covariance[:, [0, 3]], estimates.acceleration_covariance[:, [0, 3]], estimates.load_variance
+    told = estimates.tip[:, :2] - rigid, estimates.acceleration[:, :2], estimates.load
+    return EstimateTrace(*(np.where(fed, each, np.nan) for each in (*told, *map(np.sqrt, variances))))
 
 
 def _running_means(stamps: Array, values: Array) -> Array:

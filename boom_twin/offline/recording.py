@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.column_statistics import ColumnStatistics
+from ..estimation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms
-from ..twin.blocks import CODES, PredictionBlock, ReportBlock, joined, report_block
+from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block
 from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, channels_of
 from .ground_truth import TipErrors
 
@@ -55,17 +56,25 @@ class Stretch:
     health : list of Health
     first : int
         Stamp of the first prediction of the session, ns.
+    samples : list of SampleBlock
+        That were read meanwhile; not kept of a session that is one stretch.
     """
 
     joints: int
     block: ReportBlock
     health: list[Health]
     first: int
+    samples: list[SampleBlock]
 
     @property
     def predictions(self) -> PredictionBlock:
         """All predictions of the stretch."""
         return self.block.predictions
+
+    @property
+    def estimates(self) -> EstimateBlock:
+        """The estimates beside the predictions."""
+        return self.block.estimates
 
     def of(self, stream: Stream) -> ResidualRows:
         """Residuals of one stream."""
@@ -91,6 +100,8 @@ class SessionTotals:
         Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
     tip_sigma : float or None
         The largest of both together, m.
+    load : TipLoadFinder
+        Of the load at the tip that the model does not know.
     """
 
     def __init__(self, joints: int) -> None:
@@ -99,6 +110,7 @@ class SessionTotals:
         self.lost_contacts: NDArray[np.int64] = np.zeros(0, np.int64)
         self.tip_sigmas: Array = np.full(2, np.nan)
         self.tip_sigma: float | None = None
+        self.load = TipLoadFinder()
         self._touching: Array | None = None
 
     def add(self, stretch: Stretch) -> None:
@@ -111,6 +123,7 @@ class SessionTotals:
         if not len(predictions.stamps):
             return
         self.samples += len(predictions.stamps)
+        self.load.add(predictions.stamps, stretch.estimates.load)
         self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
         touching = predictions.clearances[:, :, 3]
         before = touching[:1] if self._touching is None else self._touching
@@ -153,6 +166,7 @@ class Recording:
         self._parts: list[ReportBlock] = []
         self._single: list[Report] = []
         self._health: list[Health] = []
+        self._samples: list[SampleBlock] = []
         self._alarms = Alarms()
         self._newest: int | None = None
         self._first = 0
@@ -179,6 +193,11 @@ class Recording:
                 self._add_health(health)
         if self._take is not None and self._count - self._before >= STRETCH:
             self._complete()
+
+    def add_samples(self, samples: SampleBlock) -> None:
+        """Keep samples for the stretch, if it is to be given away."""
+        if self._take is not None:
+            self._samples.append(samples)
 
     def close(self) -> None:
         """Complete the last stretch; to be called once, after the last `add`."""
@@ -234,12 +253,12 @@ class Recording:
     def _complete(self) -> None:
         """Make a stretch of what came since the last one, add it to the totals, and give it away or keep it."""
         stretch = self._stretch()
-        self._parts, self._health = [], []
+        self._parts, self._health, self._samples = [], [], []
         if stretch is None:
             return
         self.totals.add(stretch)
         if self._errors is not None:
-            self._errors.add(stretch.predictions, self._by_first_clock(self._before))
+            self._errors.add(stretch.predictions, self._by_first_clock(self._before), stretch.estimates)
         self._before = self._count
         if self._take is None:
             self._whole = stretch
@@ -249,7 +268,7 @@ class Recording:
     def _stretch(self) -> Stretch | None:
         self._close_single()
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        return Stretch(self._joints, joined(parts), self._health, self._first) if parts else None
+        return Stretch(self._joints, joined(parts), self._health, self._first, self._samples) if parts else None
 
     @property
     def whole(self) -> Stretch:

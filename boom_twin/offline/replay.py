@@ -28,6 +28,7 @@ from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
+from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
@@ -180,6 +181,7 @@ def replay_into(
                 recording.refused += 1
                 continue
             block, found = step
+            recording.add_samples(block)
             for each in found:
                 recording.add(each)
                 for part in each.all if isinstance(each, Report) else (each,):
@@ -324,6 +326,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         "joint_residual_normalised_mean": totals.normalised.mean,
         "joint_residual_normalised_std": totals.normalised.deviation,
         "tip_acceleration_max_m_s2": totals.acceleration,
+        **_load(totals.load.load),
         **_pins(recording, twin),
         **_steps(twin),
         "output_sha256": sha256_of(file),
@@ -371,6 +374,21 @@ def alarm_as_text(alarm: dict[str, Any]) -> str:
     """An alarm of ``summary.json`` in words."""
     end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
     return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
+
+
+def _load(load: TipLoad | None) -> dict[str, Any]:
+    """The load at the tip that the model does not know; nothing where nothing but strokes was measured."""
+    if load is None:
+        return {}
+    pulses = load.pulses
+    return {
+        "tip_load": load.text,
+        "tip_load_rms_N": load.rms,
+        "tip_load_pulses_N": None if pulses is None else pulses.height,
+        "tip_load_pulses_sigma_N": None if pulses is None else pulses.height_sigma,
+        "tip_load_frequency_Hz": None if pulses is None else pulses.frequency,
+        "tip_load_frequency_sigma_Hz": None if pulses is None else pulses.frequency_sigma,
+    }
 
 
 def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:

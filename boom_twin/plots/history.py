@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,31 @@ class ImuTrace:
     stamps_s: Array
     measured: Array
     predicted: Array
+
+
+@dataclass(frozen=True)
+class EstimateTrace:
+    """The tip as all sensors see it, at the stamps of the predictions (x forward, y up); NaN before anything was measured.
+
+    Attributes
+    ----------
+    displacement, acceleration, load : ndarray, shape (m, 2)
+        Against a rigid boom on the same strokes, m; m/s^2; force that the model does not know, N.
+    displacement_sigmas, acceleration_sigmas, load_sigmas : ndarray, shape (m, 2)
+        Their standard deviations.
+    """
+
+    displacement: Array
+    acceleration: Array
+    load: Array
+    displacement_sigmas: Array
+    acceleration_sigmas: Array
+    load_sigmas: Array
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """All arrays, in the order of the fields."""
+        return tuple(getattr(self, each.name) for each in fields(self))
 
 
 @dataclass(frozen=True)
@@ -164,6 +189,10 @@ class History:
         Of its channels.
     levels : ndarray, shape (h, channels)
         How near each was to an alarm, which is at 1.
+    estimate : EstimateTrace or None
+        None where nothing but strokes was measured.
+    load_text : str
+        Size and main frequency of its load, in words.
     """
 
     stamps_s: Array
@@ -189,3 +218,5 @@ class History:
     level_stamps_s: Array = field(default_factory=lambda: np.zeros(0))
     level_names: tuple[str, ...] = ()
     levels: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    estimate: EstimateTrace | None = None
+    load_text: str = ""

@@ -1,44 +1,50 @@
-"""Picture of the tip over time: displacement, acceleration, and the IMU beside its prediction."""
+"""Picture of the tip over time: displacement, acceleration, the load that is not known, and the IMU beside its prediction."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..types import Array
-from .history import History, ImuTrace, Truth
-from .style import BLUE, GREY, INK, ORANGE, PALE, broken, extent, legend_above, limits, picture, shade_gaps
+from .history import EstimateTrace, History, ImuTrace, Truth
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 WINDOW = 6.0  # s shown enlarged
-TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
-AXES = (("x (forward)", BLUE), ("y (up)", ORANGE))
+TRUTH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 4))}
+AXES = (("x", BLUE), ("y", ORANGE))
+ESTIMATED = (GREEN, PURPLE)
+"""Colours of what all sensors together say of x and y."""
+BAND = 2.0  # standard deviations that are shaded, as their label says
 
 
 def tip_picture(path: Path, session: str, history: History, truth: Truth | None, note: str) -> None:
     """Write ``tip.png``."""
     window = most_active_window(history.stamps_s, history.tip_acceleration)
-    with picture(path, f"{session}: tip motion", note) as figure:
-        grid = figure.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.1])
+    estimate = history.estimate
+    has_load = estimate is not None
+    with picture(path, f"{session}: tip motion", note, (16.0, 12.0 if has_load else 9.0)) as figure:
+        grid = figure.add_gridspec(3 + has_load, 2, height_ratios=[1.0, 1.0, *([0.8] * has_load), 1.1])
         upper = figure.add_subplot(grid[0, :])
-        middle = figure.add_subplot(grid[1, :], sharex=upper)
-        lower = [figure.add_subplot(grid[2, i]) for i in range(2)]
-        beside = _beside(truth)
-        _displacement(upper, history, beside)
-        _acceleration(middle, history, beside)
-        _mark(middle, window)
-        upper.tick_params(labelbottom=False)
-        middle.set_xlabel("time since first sample, s")
+        others = [figure.add_subplot(grid[1 + i, :], sharex=upper) for i in range(1 + has_load)]
+        lower = [figure.add_subplot(grid[2 + has_load, i]) for i in range(2)]
+        _displacement(upper, history, truth)
+        _acceleration(others[0], history, truth)
+        if estimate is not None:
+            _load(others[1], history, estimate)
+        _mark(others[0], window)
+        for axes in (upper, *others[:-1]):
+            axes.tick_params(labelbottom=False)
+        others[-1].set_xlabel("time since first sample, s")
         if history.imu is not None:
             _imu(lower, history.imu, history, window)
         else:
-            _enlarged(lower, history, beside, window)
+            _enlarged(lower, history, truth, window)
 
 
 def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
@@ -63,65 +69,85 @@ def _at(stamps: Array, at: Array, values: Array) -> Array:
     return np.stack([np.interp(stamps, at, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
 
 
-@dataclass(frozen=True)
-class _Beside:
-    """Motion of the tip by another source than the prediction, drawn beside it: as `Truth`, its name and how it is drawn."""
-
-    name: str
-    motion: Truth
-    style: dict[str, Any]
-
-
-def _beside(truth: Truth | None) -> list[_Beside]:
-    return [] if truth is None else [_Beside("truth", truth, TRUTH)]
-
-
-def _displacement(axes: Axes, history: History, beside: list[_Beside]) -> None:
-    shown = 1e3 * history.tip_displacement
-    _lines(axes, history, shown, "predicted ")
+def _displacement(axes: Axes, history: History, truth: Truth | None) -> None:
+    title, shown, estimate = "Displacement, x forward, y up", 1e3 * history.tip_displacement, history.estimate
+    _lines(axes, history, shown)
     arrays = [shown]
-    for each in beside:
-        stamps, position = each.motion.stamps_s, each.motion.tip_position
+    if estimate is not None:
+        arrays += _estimate_lines(axes, history, 1e3 * estimate.displacement, 1e3 * estimate.displacement_sigmas)
+    if truth is not None:
         rigid = history.tip_position - history.tip_displacement
-        real = 1e3 * (_at(history.stamps_s, stamps, position) - rigid)
-        error = 1e3 * rms_difference(history, history.tip_position, stamps, position)
-        _other_lines(axes, history.stamps_s, real, each, f"{each.name} (tip apart by {error:.2g} mm rms)")
+        real = 1e3 * (_at(history.stamps_s, truth.stamps_s, truth.tip_position) - rigid)
+        estimated = None if estimate is None else estimate.displacement + rigid
+        title += _errors(history, (history.tip_position, estimated), (truth.stamps_s, truth.tip_position), (1e3, "mm"))
+        _truth_lines(axes, history.stamps_s, real)
         arrays.append(real)
     axes.set_ylim(*limits(*arrays))
     axes.set_ylabel("displacement, mm")
-    axes.set_title("Tip displacement against a rigid boom on the same strokes")
+    axes.set_title(title)
     _finish(axes, history)
 
 
-def _acceleration(axes: Axes, history: History, beside: list[_Beside]) -> None:
-    _lines(axes, history, history.tip_acceleration, "predicted ")
-    arrays = [history.tip_acceleration]
-    for each in beside:
-        stamps, acceleration = each.motion.stamps_s, each.motion.tip_acceleration
-        error = rms_difference(history, history.tip_acceleration, stamps, acceleration)
-        _other_lines(axes, stamps, acceleration, each, f"{each.name} (apart by {error:.2g} m/s² rms)")
-        arrays.append(acceleration)
+def _acceleration(axes: Axes, history: History, truth: Truth | None) -> None:
+    _lines(axes, history, history.tip_acceleration)
+    title, arrays, estimate = "Acceleration, no gravity", [history.tip_acceleration], history.estimate
+    if estimate is not None:
+        arrays += _estimate_lines(axes, history, estimate.acceleration, estimate.acceleration_sigmas)
+    if truth is not None:
+        estimated = None if estimate is None else estimate.acceleration
+        shown = history.tip_acceleration, estimated
+        title += _errors(history, shown, (truth.stamps_s, truth.tip_acceleration), (1.0, "m/s²"))
+        _truth_lines(axes, truth.stamps_s, truth.tip_acceleration)
+        arrays.append(truth.tip_acceleration)
     axes.set_ylim(*limits(*arrays, around=0.0))
     axes.set_ylabel("acceleration, m/s²")
-    axes.set_title("Tip acceleration (of the point, without gravity)")
+    axes.set_title(title)
     _finish(axes, history)
 
 
-def _lines(axes: Axes, history: History, values: Array, prefix: str) -> None:
+def _load(axes: Axes, history: History, estimate: EstimateTrace) -> None:
+    arrays = _estimate_lines(axes, history, estimate.load, estimate.load_sigmas)
+    axes.set_ylim(*limits(*arrays, around=0.0))
+    axes.set_ylabel("force, N")
+    axes.set_title(f"Load at the tip that the model does not know: {history.load_text}")
+    _finish(axes, history)
+
+
+def _errors(history: History, shown: tuple[Array, Array | None], truth: tuple[Array, Array], unit: tuple[float, str]) -> str:
+    """Errors of prediction and estimate (m, 2) against the truth, its stamps and values (t, 2), for a title."""
+    factor, name = unit
+    errors = [None if values is None else factor * rms_difference(history, values, *truth) for values in shown]
+    told = [f"{kind} {error:.2g}" for kind, error in zip(("prediction", "estimate"), errors, strict=True) if error is not None]
+    return f"; rms error: {', '.join(told)} {name}"
+
+
+def _estimate_lines(axes: Axes, history: History, values: Array, sigmas: Array) -> list[Array]:
+    """Draw an estimate (m, 2) with its band; returns what is to be seen: the lines, and where the band usually ends."""
+    stamps, drawn = broken(history.stamps_s, values, history.gaps)
+    _, deviations = broken(history.stamps_s, sigmas, history.gaps)
+    for i, (name, colour) in enumerate(zip("xy", ESTIMATED, strict=True)):
+        axes.plot(stamps, drawn[:, i], color=colour, linewidth=1.0, label=f"estimated {name}{', ±2 sigma' if i else ''}")
+        low, high = drawn[:, i] - BAND * deviations[:, i], drawn[:, i] + BAND * deviations[:, i]
+        axes.fill_between(stamps, low, high, color=colour, alpha=0.22, linewidth=0)
+    usual = BAND * np.nanmedian(sigmas, axis=0)
+    return [values - usual, values + usual]
+
+
+def _lines(axes: Axes, history: History, values: Array) -> None:
     stamps, drawn = broken(history.stamps_s, values, history.gaps)
     for i, (name, colour) in enumerate(AXES):
-        axes.plot(stamps, drawn[:, i], color=colour, label=prefix + name)
+        axes.plot(stamps, drawn[:, i], color=colour, label=f"predicted {name}")
 
 
-def _other_lines(axes: Axes, stamps: Array, values: Array, each: _Beside, label: str) -> None:
+def _truth_lines(axes: Axes, stamps: Array, values: Array) -> None:
     for i in range(2):
-        axes.plot(stamps, values[:, i], **each.style, label="" if i else label)
+        axes.plot(stamps, values[:, i], color=INK, **TRUTH, label="" if i else "truth")
 
 
 def _finish(axes: Axes, history: History) -> None:
     shade_gaps(axes, history.gaps)
     axes.set_xlim(extent(history.stamps_s))
-    legend_above(axes, 5, 0.99, handlelength=1.6)
+    legend_above(axes, 5, 0.99, handlelength=1.6, columnspacing=1.1)
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:
@@ -150,16 +176,15 @@ def _imu(panels: list[Axes], imu: ImuTrace, history: History, window: tuple[floa
         _window(axes, history, window)
 
 
-def _enlarged(panels: list[Axes], history: History, beside: list[_Beside], window: tuple[float, float]) -> None:
+def _enlarged(panels: list[Axes], history: History, truth: Truth | None, window: tuple[float, float]) -> None:
     inside = (history.stamps_s >= window[0]) & (history.stamps_s <= window[1])
     for i, (axes, (name, colour)) in enumerate(zip(panels, AXES, strict=True)):
         shown = [history.tip_acceleration[inside, i]]
         axes.plot(history.stamps_s[inside], shown[0], color=colour, label="predicted")
-        for each in beside:
-            stamps = each.motion.stamps_s
-            there = (stamps >= window[0]) & (stamps <= window[1])
-            shown.append(each.motion.tip_acceleration[there, i])
-            axes.plot(stamps[there], shown[-1], **each.style, label=each.name)
+        if truth is not None:
+            there = (truth.stamps_s >= window[0]) & (truth.stamps_s <= window[1])
+            shown.append(truth.tip_acceleration[there, i])
+            axes.plot(truth.stamps_s[there], shown[1], color=INK, **TRUTH, label="truth")
         axes.set_ylim(*limits(*shown))
         axes.set_title(f"Tip acceleration {name}")
         axes.set_ylabel("acceleration, m/s²")

@@ -99,6 +99,7 @@ def _head(subject: Subject) -> list[str]:
         ("largest tip displacement, m", float(np.hypot(*subject.history.tip_displacement.T).max())),
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
+        *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
     ]
     scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
     return [
@@ -113,8 +114,10 @@ def _head(subject: Subject) -> list[str]:
 
 
 _AGAINST_TRUTH = (
-    ("tip_error_rms_m", "tip against the truth, m rms"),
-    ("tip_acceleration_error_rms_m_s2", "tip acceleration against the truth, m/s² rms"),
+    ("tip_error_rms_m", "predicted tip against the truth, m rms"),
+    ("tip_estimate_error_rms_m", "estimated tip against the truth, m rms"),
+    ("tip_acceleration_error_rms_m_s2", "predicted tip acceleration against the truth, m/s² rms"),
+    ("tip_estimate_acceleration_error_rms_m_s2", "estimated tip acceleration against the truth, m/s² rms"),
 )
 
 
@@ -218,8 +221,17 @@ def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
     )
 
 
+_ESTIMATE = (
+    "Predicted: from the strokes alone. Estimated: by all sensors together, with a force at the tip that the model does not "
+    "know; the band is two standard deviations."
+)
+
+
 def _tip(subject: Subject, folder: Path) -> list[str]:
-    parts = [heading("Tip"), image(folder / "tip.png", "tip displacement and acceleration")]
+    parts = [heading("Tip")]
+    if subject.history.estimate is not None:
+        parts.append(paragraph(_ESTIMATE, "note"))
+    parts.append(image(folder / "tip.png", "tip displacement and acceleration"))
     return parts + [image(folder / name, name) for name in ("spectrum.png", "posture.png") if (folder / name).is_file()]
 
 

@@ -120,6 +120,11 @@ class EstimateBlock(NamedTuple):
     rows: Array
 
     @property
+    def is_fed(self) -> NDArray[np.bool_]:
+        """Whether anything was measured before, shape (p,); until then the load is exactly zero, the rest the prediction."""
+        return np.asarray(self.load.any(axis=1))
+
+    @property
     def tip(self) -> Array:
         """Place of the tip, shape (p, 3): x, y (m) and the angle of the last head (rad)."""
         return self.rows[:, TIP : TIP + 3]

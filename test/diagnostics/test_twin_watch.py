@@ -14,7 +14,7 @@ from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.scene import load_scene
-from boom_twin.types import Report, Residuals, Sample, Stream
+from boom_twin.types import Estimate, Report, Residuals, Sample, Stream
 
 NAMES = {stream: stream.value for stream in Stream}
 REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in Stream}
@@ -152,3 +152,17 @@ def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
     assert (status.level, status.message) == (Level.WARN, "not active")
     (status,) = module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0)
     assert status.message == "not active"
+
+
+def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
+    rig = Rig()
+    assert "tip load" not in rig.second()
+    for row in range(8000):
+        stamp = 10**18 + row * 5_000_000
+        load = np.array([0.0, 120.0 * (row * 0.005 * 0.5 % 1.0 < 0.5) + 1.0])
+        estimate = Estimate(stamp, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), np.zeros(2))
+        rig.watch.took(Sample(Stream.STROKES, stamp, np.zeros(4)), Report(stamp, True, estimate=estimate), 0.0)
+    status = rig.second()["tip load"]
+    assert status.level == Level.OK and status.message.startswith("pulses of 12")
+    assert status.values["frequency_Hz"] == pytest.approx(0.5, rel=0.02)
+    assert status.values["pulses_N"] == pytest.approx(120.0, rel=0.05)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import shutil
 from pathlib import Path
@@ -16,14 +17,17 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
+from boom_twin.estimation.load_spectrum import tip_load
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
-from boom_twin.monitor.protocol import state
+from boom_twin.monitor.protocol import dump, state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
@@ -35,6 +39,49 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
     stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages])
     assert values == pytest.approx(told, rel=1e-6)
     assert np.abs(np.round(times * 1e9).astype(np.int64) + feed.store.epoch - stamps).max() <= 1
+
+
+def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: Feed, replayed: Path) -> None:
+    roles = (
+        Output.TIP_POSITION,
+        Output.TIP_DISPLACEMENT,
+        Output.ESTIMATE_POSE,
+        Output.ESTIMATE_ACCELERATION,
+        Output.ESTIMATE_LOAD,
+    )
+    topics = {role: load_topics().outputs[role].absolute for role in roles}
+    position, displacement, pose, acceleration, load = (
+        [message for _, _, message in read(scan(replayed / "bag"), {topics[role]: TYPES[role]})] for role in roles
+    )
+    expected = [
+        (
+            d.vector.x + e.pose.pose.position.x - p.point.x,
+            d.vector.z + e.pose.pose.position.z - p.point.z,
+            *np.sqrt([e.pose.covariance[0], e.pose.covariance[14]]),
+            *(a.accel.accel.linear.x, a.accel.accel.linear.z),
+            *np.sqrt([a.accel.covariance[0], a.accel.covariance[14]]),
+            *(f.wrench.force.x, f.wrench.force.z),
+        )
+        for p, d, e, a, f in zip(position, displacement, pose, acceleration, load, strict=True)
+        if f.wrench.force.x or f.wrench.force.z
+    ]
+    times, values = feed.store.tables["estimate"].rows(0, 10**6)
+    assert len(values) == len(expected) > 0.99 * len(position)
+    assert values == pytest.approx(np.array(expected), rel=1e-5, abs=1e-6)
+    found = asyncio.run(Analyst(feed).load_at(14.0))
+    before = tip_load(times[times <= 14.0], values[times <= 14.0, -2:].astype(float))
+    assert before is not None and found == {"kind": "load", "words": f"load at the tip: {before.text}"}
+    assert found["words"].endswith("none above 20 N") and json.loads(dump(found)) == found
+
+
+def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
+    """A session of strokes alone: what is published as estimate is the prediction."""
+    strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (100, 1))
+    stamps = 10**18 + 5_000_000 * np.arange(100)
+    write_session(tmp_path / "strokes", stamps, strokes, np.full((100, 4), np.nan), None, {})
+    feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
+    assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
+    assert asyncio.run(Analyst(feed).load_at(0.5)) is None
 
 
 def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:
@@ -154,7 +201,8 @@ def test_a_session_that_is_damaged_is_shown_up_to_there(replayed: Path, tmp_path
     damaged = shutil.copytree(replayed / "bag", tmp_path / "damaged")
     file = next(damaged.glob("*.mcap"))
     content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 1
+    for place in range(len(content) // 2, len(content) // 2 + 20_000, 50):  # wherever chunks and their indexes lie
+        content[place] ^= 1
     file.write_bytes(content)
     feed = read_all(bag_feed(damaged, load_scene(), Settings()))
     assert "read up to" in feed.trouble and 5.0 < feed.store.newest == feed.end < 35.0

@@ -190,11 +190,24 @@ def test_alarms_of_what_is_shown_are_told_in_words_and_as_bars(page: Any, feed: 
 
 
 def test_the_tip_has_a_band_of_what_it_may_be_off_by(page: Any, feed: Feed) -> None:
-    assert page.locator("#chart-displacement .u-series").count() == 7
+    assert page.locator("#chart-displacement .u-series").count() == 7 + 6  # those of the estimate
     sigma = feed.store.tables["uncertainty"]
     row = sigma.until(FAULT - 2.0) - 1
     assert 0.0 < sigma.rows(row, row + 1)[1].min() < sigma.rows(row, row + 1)[1].max() < 0.1
     assert page.evaluate(f"twin.connection.table('uncertainty').at(0, {row})") == float(sigma.rows(row, row + 1)[1][0, 0])
+
+
+def test_the_estimate_has_its_lines_and_bands_and_the_load_is_told(page: Any) -> None:
+    go(page, 12.0)
+    for name, first in (("displacement", 7), ("acceleration", 3)):
+        labels = page.locator(f"#chart-{name} .u-legend .u-label").all_inner_texts()
+        assert [label for label in labels if label.startswith("estimate")] == ["estimate forward", "estimate up"]
+        data = page.evaluate("name => twin.charts(name).plot.data.map(column => column.filter(v => v != null))", name)
+        estimate, high, low = (np.array(data[first + i]) for i in (0, 2, 3))
+        assert len(estimate) > 100 and (high > estimate).all() and (low < estimate).all()
+    page.keyboard.press("4")
+    page.locator("#load", has_text="load at the tip: none above 20 N").wait_for()
+    page.keyboard.press("1")
 
 
 def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:

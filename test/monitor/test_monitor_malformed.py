@@ -68,8 +68,19 @@ def vector(role: Role, x: float = 0.5) -> Any:
         Output.TIP_UNCERTAINTY: lambda: message.vector,
         Output.TIP_POSITION: lambda: message.point,
         Output.TIP_ACCELERATION: lambda: message.accel.linear,
+        Output.ESTIMATE_POSE: lambda: message.pose.pose.position,
+        Output.ESTIMATE_ACCELERATION: lambda: message.accel.accel.linear,
+        Output.ESTIMATE_LOAD: lambda: message.wrench.force,
         Stream.IMU: lambda: message.linear_acceleration,
     }[role]().x = x
+    return message
+
+
+def uncertain(role: Role, variance: float) -> Any:
+    """An estimate whose x has that variance."""
+    message = vector(role)
+    holder = message.pose if role is Output.ESTIMATE_POSE else message.accel
+    holder.covariance[0] = variance
     return message
 
 
@@ -103,6 +114,9 @@ def event(text: str = "mark") -> Any:
 GOOD: dict[Role, Callable[[], Any]] = {
     **{role: partial(vector, role) for role in (Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION)},
     Output.TIP_UNCERTAINTY: partial(vector, Output.TIP_UNCERTAINTY),
+    Output.ESTIMATE_POSE: partial(uncertain, Output.ESTIMATE_POSE, 1e-6),
+    Output.ESTIMATE_ACCELERATION: partial(uncertain, Output.ESTIMATE_ACCELERATION, 0.01),
+    Output.ESTIMATE_LOAD: partial(vector, Output.ESTIMATE_LOAD),
     Stream.IMU: partial(vector, Stream.IMU),
     Output.JOINT_STATES: lambda: joint_state(JOINTS + CYLINDERS),
     Output.RESIDUALS: lambda: joint_state(JOINTS),
@@ -110,7 +124,7 @@ GOOD: dict[Role, Callable[[], Any]] = {
     Output.HEALTH: health,
     Output.DIAGNOSTICS: lambda: statuses("boom_twin: model"),
 }
-TABLES = {"displacement", "position", "acceleration", "uncertainty", "joints", "shape"}
+TABLES = {"displacement", "position", "acceleration", "uncertainty", "estimate", "joints", "shape"}
 
 
 class Bench:
@@ -164,6 +178,14 @@ MALFORMED: dict[str, tuple[Role | None, Callable[[], Any], str]] = {
     "position at infinity": (Output.TIP_POSITION, lambda: vector(Output.TIP_POSITION, -inf), "a number is -inf"),
     "absurd acceleration": (Output.TIP_ACCELERATION, lambda: vector(Output.TIP_ACCELERATION, 1e300), "a number is 1e+300"),
     "uncertainty of NaN": (Output.TIP_UNCERTAINTY, lambda: vector(Output.TIP_UNCERTAINTY, nan), "a number is nan"),
+    "estimate of NaN": (Output.ESTIMATE_POSE, lambda: vector(Output.ESTIMATE_POSE, nan), "a number is nan"),
+    "negative variance": (Output.ESTIMATE_POSE, lambda: uncertain(Output.ESTIMATE_POSE, -1.0), "a variance is -1"),
+    "infinite variance": (
+        Output.ESTIMATE_ACCELERATION,
+        lambda: uncertain(Output.ESTIMATE_ACCELERATION, inf),
+        "a number is inf",
+    ),
+    "load of NaN": (Output.ESTIMATE_LOAD, lambda: vector(Output.ESTIMATE_LOAD, nan), "a number is nan"),
     "many statuses": (Output.DIAGNOSTICS, lambda: statuses(*["n: m"] * 501), "501 statuses, at most 500"),
     "many nodes": (Output.DIAGNOSTICS, lambda: statuses(*(f"n{i}: m" for i in range(400))), "nodes on one topic"),
     "alarm of no time": (Output.HEALTH, lambda: health(from_s="-5"), "impossible stamp -5 s"),

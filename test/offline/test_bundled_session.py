@@ -10,6 +10,7 @@ import pytest
 
 from boom_twin import Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
+from boom_twin.cli.replay import as_text
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
@@ -34,6 +35,15 @@ def test_tip_follows_the_truth(first):
     assert summary["samples"] == 12000 and summary["dropped"] == 0 and summary["alarms"] == []
     assert summary["tip_error_rms_m"] < 3e-3
     assert summary["tip_acceleration_error_rms_m_s2"] < 0.25
+
+
+def test_the_estimate_is_nearer_to_the_truth_than_the_prediction(first):
+    summary = first[0].summary
+    assert summary["tip_estimate_error_rms_m"] < 0.8 * summary["tip_error_rms_m"]
+    assert summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.6 * summary["tip_acceleration_error_rms_m_s2"]
+    assert summary["tip_load"] == "none above 20 N" and 0.0 < summary["tip_load_rms_N"] < 20.0
+    lines = [line for line in as_text(summary) if line.startswith(("tip error", "acceleration error", "load at the tip"))]
+    assert [line.count("of the estimate") for line in lines] == [1, 1, 0] and lines[2].endswith("none above 20 N")
 
 
 def test_residuals_are_what_is_expected(first):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.plots import AlarmSpan, History, ImuTrace, Truth, replay_pictures
+from boom_twin.plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
 from boom_twin.plots.posture import spread
 from boom_twin.plots.residuals import residual_picture, running_mean
 from boom_twin.plots.session_totals import density
@@ -95,6 +95,24 @@ def test_truth_and_note_are_drawn(tmp_path: Path) -> None:
     )
     assert (noted != plain)[:60].any() and not (noted != plain)[60:].any()
     assert (true != plain)[60:].any()
+
+
+def test_the_estimate_has_its_lines_and_a_panel_of_the_load(tmp_path: Path) -> None:
+    told = replace(history(2, seconds=3.0), residual_names=(), shapes=[])  # just one picture
+    sigmas = [np.full_like(told.tip_displacement, each) for each in (0.002, 0.3, 20.0)]
+    load = 100.0 * np.sign(told.tip_displacement + 0.1)
+    values = told.tip_displacement + 0.02, told.tip_acceleration + 0.5, load
+    shown, wide = (
+        replace(told, load_text="none", estimate=EstimateTrace(*values, *(factor * each for each in sigmas)))
+        for factor in (1.0, 3.0)
+    )
+    late = np.where(np.arange(len(load))[:, None] < 100, np.nan, 1.0)
+    fed_late = replace(told, estimate=EstimateTrace(*(late * each for each in (*values, *sigmas))))
+    found = [pixels(replay_pictures(tmp_path / f"{i}", each)[0]) for i, each in enumerate((told, shown, wide, fed_late))]
+    assert [image.shape[0] for image in found] == [900, 1200, 1200, 1200]
+    assert (found[1] != found[2]).any(), "the band does not follow the deviations"
+    purple = np.abs(found[1] - np.array([0xAA, 0x44, 0x99]) / 255.0).max(axis=2) < 0.02
+    assert all(rows.any() for rows in np.array_split(purple[60:900], 3)), "a panel has no line of the estimate"
 
 
 def test_short_session_has_no_spectrum(tmp_path: Path) -> None:

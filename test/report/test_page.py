@@ -62,6 +62,12 @@ def test_every_part_is_there(replays: tuple[Path, Path], title: str) -> None:
         assert f"<h2>{title}</h2>" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+def test_the_estimate_and_the_load_are_told(replays: tuple[Path, Path]) -> None:
+    for folder in replays:
+        text = outline(folder).text
+        assert "load at the tip that the model does not know" in text and "Estimated: by all sensors together" in text
+
+
 def test_where_the_session_comes_from_is_said_and_escaped(replays: tuple[Path, Path]) -> None:
     text = (replays[0] / "report.html").read_text(encoding="utf-8")
     assert "synthetic session &lt;of a test&gt; &amp; more" in text and "<of a test>" not in text

@@ -109,7 +109,7 @@ def test_rviz_shows_topics_and_namespaces_that_exist() -> None:
     assert manager["Global Options"]["Fixed Frame"] == "base_link"
     shown = {each["Class"].split("/")[1]: each["Topic"] for each in manager["Displays"] if "Topic" in each}
     for kind, topic in shown.items():
-        assert TOPICS[topic["Value"]].type.endswith(f"/{kind}")
+        assert TOPICS[topic["Value"]].type.endswith((f"/{kind}", f"/{kind}Stamped"))
         assert topic["Reliability Policy"].lower() == TOPICS[topic["Value"]].qos.reliability
     (boom,) = (each for each in manager["Displays"] if each["Name"] == "Boom")
     drawn = re.findall(r"^    ``(\w+)``,", ShapeMarkers.__doc__ or "", flags=re.MULTILINE)
@@ -133,7 +133,7 @@ def test_foxglove_shows_topics_and_fields_that_exist() -> None:
     assert sorted(placed) == sorted(panels)
     assert panels["3D!boom"]["topics"].keys() - TOPICS.keys() == {"/robot_description"}
     paths = [row["value"] for panel in panels.values() for row in panel.get("paths", [])]
-    assert len(paths) == 16
+    assert len(paths) == 24
     for path in paths:
         topic, *parts = path.split(".")
         field(TOPICS[topic].type, parts)
@@ -145,7 +145,7 @@ def test_plotjuggler_shows_topics_and_fields_that_exist() -> None:
     """It names the arrays of a JointState by channel."""
     root = ElementTree.parse(CONFIG / "plotjuggler.xml").getroot()
     curves = [curve.attrib["name"] for curve in root.iter("curve")]
-    assert len(curves) == len(set(curves)) == 38
+    assert (len(curves), len(set(curves))) == (48, 44)  # those of the prediction stand beside the estimate again
     for curve in curves:
         (topic,) = (name for name in TOPICS if curve.startswith(f"{name}/"))
         *parts, last = curve.removeprefix(f"{topic}/").split("/")

@@ -27,7 +27,8 @@ from boom_twin.twin.twin import Twin
 from boom_twin.types import Stream
 
 PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
-SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES]
+ESTIMATES = [Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD]
+SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES, *ESTIMATES]
 ASKED: dict[int, Callable[[Any], Any]] = {
     500: lambda remote: remote.set("payload", 35.0),
     900: lambda remote: remote.trigger("rezero/joint_2"),
@@ -139,13 +140,13 @@ def test_what_was_asked_is_in_the_recording(recorded: Path) -> None:
 
 def test_a_replay_of_the_recording_is_the_live_run(recorded: Path, outputs: Any, tmp_path: Path) -> None:
     result = replay(recorded, load_scene(), tmp_path, load_settings(PARAMETERS))
-    live = [data for _, data in outputs[Output.TIP_POSITION]]
     strokes = scan(recorded).find("cylinder_strokes")
     assert strokes is not None
-    if strokes.count != len(live):
+    if strokes.count != len(outputs[Output.TIP_POSITION]):
         pytest.skip("a stroke was lost on the way to the node")
-    topic = load_topics().outputs[Output.TIP_POSITION]
-    assert [data for _, data in _encoded(scan(tmp_path / "bag"), topic.absolute, topic.type)] == live
+    for key in (Output.TIP_POSITION, *ESTIMATES):
+        topic, live = load_topics().outputs[key], [data for _, data in outputs[key]]
+        assert [data for _, data in _encoded(scan(tmp_path / "bag"), topic.absolute, topic.type)] == live, key
     assert {"load": 2, "zero": 2, "reset": 1, "limits": 1}.items() <= result.summary["events"].items()
 
 

@@ -14,11 +14,13 @@ from ...analysis.equilibrium import settle
 from ...analysis.modal import natural_modes
 from ...compiler.compile import compile_scene
 from ...errors import BoomTwinError
+from ...estimation.load_spectrum import tip_load
 from ...scene.kinematics import joint_angles_of_strokes
 from ...scene.schema import Scene
 from ..protocol import SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
 from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
+from .topic_rows import ESTIMATE
 
 COUNT = 6
 WIDTH = 1e-4
@@ -91,6 +93,15 @@ class Analyst:
                 peaks = [self._placed(asdict(peak), natural, time) for peak in result.peaks]
                 self._known = key, ({"kind": "lines", "natural": natural, "peaks": peaks}, block)
             return self._known[1]
+
+    async def load_at(self, time: float) -> dict[str, Any] | None:
+        """Text message ``load`` of what the load at the tip was before `time` (s), in words; None without any."""
+        table = self._feed.store.tables.get(ESTIMATE)
+        if table is None:
+            return None
+        times, values = table.rows(table.until(time - WINDOW), table.until(time))
+        found = await asyncio.to_thread(tip_load, times, values[:, -2:].astype(float))
+        return None if found is None else {"kind": "load", "words": f"load at the tip: {found.text}"}
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import sqrt
 from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
@@ -47,6 +48,15 @@ VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
     Output.TIP_UNCERTAINTY: ("uncertainty", PLANE, attrgetter("vector")),
 }
 """Outputs that are a vector in the plane of the boom: table, its columns, and where the vector is in a message."""
+ESTIMATE = "estimate"
+ESTIMATE_COLUMNS = (
+    "x_m", "z_m", "sigma_x_m", "sigma_z_m", "x_m_s2", "z_m_s2", "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
+)  # fmt: skip
+"""Of the table of estimates: displacement and acceleration of the tip with their deviations, load."""
+JOINED = (
+    Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD,
+)  # fmt: skip
+"""Outputs of which a row of estimates is made, those of one stamp together."""
 
 
 class TopicRows:
@@ -62,6 +72,7 @@ class TopicRows:
     ``joints``         residual of every joint, then the same over its expected deviation; likewise a table of every further
                        stream of sensors, by the stream's name
     ``uncertainty``    standard deviation of the predicted tip, x and z of ``base_link``
+    ``estimate``       see `ESTIMATE_COLUMNS`; the displacement is that of the estimated tip; no row before anything is measured
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
 
@@ -78,6 +89,7 @@ class TopicRows:
         self.dropped = DroppedMessages()
         self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
         self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
+        self._estimates: OrderedDict[int, dict[Output, list[float]]] = OrderedDict()
         self._forces: list[float] = []
         self._strokes: list[float] = []
         self._scene = ""
@@ -95,6 +107,9 @@ class TopicRows:
     def _by_role(self) -> dict[Output, Taker]:
         return {
             **{role: partial(self._take_vector, role) for role in VECTORS},
+            Output.ESTIMATE_POSE: self._take_pose,
+            Output.ESTIMATE_ACCELERATION: self._take_acceleration_estimate,
+            Output.ESTIMATE_LOAD: self._take_load,
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
@@ -127,6 +142,7 @@ class TopicRows:
             self._store.clear()
             self._measured.clear()
             self._residuals.clear()
+            self._estimates.clear()
         for row in step.rows:
             if table == "displacement":
                 self._tell_gap(row.stamp)
@@ -151,8 +167,37 @@ class TopicRows:
 
     def _take_vector(self, role: Output, msg: Any, now: float) -> None:
         table, columns, vector_of = VECTORS[role]
-        vector = vector_of(msg)
-        self._append(table, columns, checks.stamp(msg), checks.numbers((vector.x, vector.z)))
+        vector, stamp = vector_of(msg), checks.stamp(msg)
+        values = checks.numbers((vector.x, vector.z))
+        self._append(table, columns, stamp, values)
+        if role in JOINED:
+            self._join_estimate(role, stamp, values)
+
+    def _take_pose(self, msg: Any, now: float) -> None:
+        place, covariance = msg.pose.pose.position, msg.pose.covariance
+        self._join_estimate(Output.ESTIMATE_POSE, checks.stamp(msg), _with_deviations(place, covariance))
+
+    def _take_acceleration_estimate(self, msg: Any, now: float) -> None:
+        values = _with_deviations(msg.accel.accel.linear, msg.accel.covariance)
+        self._join_estimate(Output.ESTIMATE_ACCELERATION, checks.stamp(msg), values)
+
+    def _take_load(self, msg: Any, now: float) -> None:
+        force = msg.wrench.force
+        self._join_estimate(Output.ESTIMATE_LOAD, checks.stamp(msg), checks.numbers((force.x, force.z)))
+
+    def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
+        """Make the row of an estimate, once all that it is made of is there; forget what has waited long."""
+        if len(self._estimates) > WAITING:
+            self._estimates.popitem(last=False)
+        parts = self._estimates.setdefault(stamp, {})
+        parts[role] = values
+        if len(parts) < len(JOINED):
+            return
+        displacement, position, pose, acceleration, load = (self._estimates[stamp][each] for each in JOINED)
+        del self._estimates[stamp]
+        if any(load):  # exactly zero before anything is measured
+            shown = [d + e - p for d, e, p in zip(displacement, pose, position, strict=False)]
+            self._append(ESTIMATE, ESTIMATE_COLUMNS, stamp, [*shown, *pose[2:], *acceleration, *load])
 
     def _take_event(self, msg: Any, now: float) -> None:
         time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
@@ -223,3 +268,11 @@ class TopicRows:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
         store.set_statuses(now, statuses)
+
+
+def _with_deviations(vector: Any, covariance: Any) -> list[float]:
+    """x and z of a vector, and their standard deviations from a covariance by rows (36,)."""
+    x, z, x2, z2 = checks.numbers((vector.x, vector.z, covariance[0], covariance[14]))
+    if min(x2, z2) < 0.0:
+        raise MalformedError(f"a variance is {min(x2, z2):g}; at least 0 is possible")
+    return [x, z, sqrt(x2), sqrt(z2)]

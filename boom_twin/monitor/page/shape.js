@@ -6,6 +6,9 @@ import { formatNumber } from "./html_table.js";
 const TRACE = 5; // s
 const FULL = 1e5; // N that has the full colour
 const MARGIN = 30; // px
+const ARROW = 0.01; // m of the arrow for a newton of load at the tip
+const HEAD = 9; // px
+const LEAST = 5; // N; no arrow below
 
 export class Shape {
   constructor(connection, view) {
@@ -15,7 +18,8 @@ export class Shape {
     this.canvas = document.getElementById("boom");
     for (const button of document.querySelectorAll("#factors button")) button.onclick = () => this.choose(Number(button.dataset.factor));
     this.choose(10);
-    connection.addEventListener("reset", () => { this.box = null; });
+    connection.addEventListener("reset", () => { this.box = null; document.getElementById("load").textContent = ""; });
+    connection.addEventListener("load", event => { document.getElementById("load").textContent = event.detail.words; });
   }
 
   choose(factor) {
@@ -38,6 +42,7 @@ export class Shape {
     this.drawLine(frame, large, { colour: themeColour("ink"), width: 5 });
     this.drawLine(frame, trace, { colour: lineColour(2), width: 2 });
     forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
+    this.drawLoad(frame, large.at(-1));
     this.describe(bent.at(-1), straight.at(-1), bent, forces);
   }
 
@@ -63,6 +68,22 @@ export class Shape {
     context.clearRect(0, 0, width, height);
     const across = (width - unit * (right - left)) / 2, down = (height - unit * (top - bottom)) / 2;
     return { context, at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)] };
+  }
+
+  // The load that the model does not know, as an arrow that ends at the tip.
+  drawLoad(frame, tip) {
+    const table = this.connection.table("estimate");
+    if (!table?.count) return;
+    const [x, z] = [8, 9].map(column => table.at(column, table.count - 1)), size = Math.hypot(x, z);
+    if (!(size > LEAST)) return;
+    const colour = lineColour(3), tail = [tip[0] - ARROW * x, tip[1] - ARROW * z];
+    this.drawLine(frame, [tail, tip], { colour, width: 4, label: `${size.toFixed(0)} N` });
+    const { context, at } = frame, [px, py] = at(tip), angle = Math.atan2(-z, x);
+    context.beginPath();
+    context.moveTo(px, py);
+    for (const side of [-0.5, 0.5]) context.lineTo(px - 2 * HEAD * Math.cos(angle + side), py - 2 * HEAD * Math.sin(angle + side));
+    context.fillStyle = colour;
+    context.fill();
   }
 
   drawLine({ context, at }, points, { colour, width, dash = [], label }) {

@@ -4,6 +4,7 @@ import { Chart } from "./chart.js";
 import { themeColour } from "./colours.js";
 import { RANKS, SIGNS } from "./lamps.js";
 import { escapeHtml } from "./html_table.js";
+import uPlot from "/page/uplot.js";
 import { decimate, statistics } from "./decimation.js";
 
 const BAND = 2; // deviations that are shaded
@@ -20,8 +21,8 @@ const channels = table => normalised(table).map(column => table.columns[column].
 // Every chart: table, columns (a function of the table), their labels, a factor of the unit. Further streams of residuals follow.
 const residualChart = (name, table, title) => ({ name, table, title, factor: 1, columns: normalised, labels: channels, isResidual: true });
 const CHARTS = [
-  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true },
-  { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"] },
+  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true, estimate: [0, 1, 2, 3] },
+  { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"], estimate: [4, 5, 6, 7] },
   { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
   residualChart("residuals", "joints", "residual, σ"),
 ];
@@ -69,15 +70,25 @@ export class Traces {
     if (!Number.isFinite(to)) return;
     const further = this.connection.residualTables.filter(({ name }) => !this.kinds.some(kind => kind.table === name));
     if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, `${residuals.title}, σ`)));
+    if (this.hasEstimate !== Boolean(this.estimate?.count)) { this.hasEstimate = !this.hasEstimate; this.rebuild(); }
     for (const kind of this.kinds) {
       const table = this.connection.table(kind.table);
       if (!table?.count) continue;
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
-      const [times, ...values] = decimate(table, kind.columns(table), from, to, Math.max(200, chart.element.clientWidth / SLOT));
-      const scaled = kind.factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * kind.factor));
-      chart.draw([times, ...(kind.isBanded ? banded(scaled) : kind.isUncertain ? this.uncertain(times, scaled, kind.factor) : scaled)], from, to);
+      const slots = Math.max(200, chart.element.clientWidth / SLOT), [times, ...values] = scaled(decimate(table, kind.columns(table), from, to, slots), kind.factor);
+      const data = [times, ...(kind.isBanded ? banded(values) : kind.isUncertain ? this.uncertain(times, values, kind.factor) : values)];
+      chart.draw(kind.estimate && this.hasEstimate ? uPlot.join([data, this.estimated(kind, from, to, slots)]) : data, from, to);
     }
+  }
+
+  get estimate() { return this.connection.table("estimate"); }
+
+  // What all sensors together say of the tip: two lines, and the ends of their bands.
+  estimated({ estimate, factor }, from, to, slots) {
+    const [times, x, z, sigmaX, sigmaZ] = scaled(decimate(this.estimate, estimate, from, to, slots), factor);
+    const offset = (values, sigmas, sign) => values.map((value, i) => value === null || sigmas[i] === null ? null : value + sign * BAND * sigmas[i]);
+    return [times, x, z, offset(x, sigmaX, 1), offset(x, sigmaX, -1), offset(z, sigmaZ, 1), offset(z, sigmaZ, -1)];
   }
 
   // The tip's lines, and beside each what it may be off by: as told last before each time.
@@ -92,7 +103,8 @@ export class Traces {
   build(kind, table) {
     const labels = typeof kind.labels === "function" ? kind.labels(table) : kind.labels;
     const plain = () => labels.map((label, i) => ({ label, colour: i }));
-    const options = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
+    const plainOptions = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
+    const options = kind.estimate && this.hasEstimate ? withEstimate(plainOptions) : plainOptions;
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
       axes: [kind === this.kinds.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
@@ -165,6 +177,16 @@ const UNCERTAIN = {
   series: [{ label: "tip forward", colour: 0 }, { label: "tip up", colour: 1 }, ...[0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }))],
   bands: [[3, 4, 0], [5, 6, 1]],
 };
+
+// The same chart with the lines of the estimate and their bands.
+function withEstimate({ series, bands = [] }) {
+  const first = series.length + 1, lines = ["estimate forward", "estimate up"].map((label, i) => ({ label, colour: 2 + i }));
+  const edges = [2, 2, 3, 3].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }));
+  return { series: [...series, ...lines, ...edges], bands: [...bands, [first + 2, first + 3, 2], [first + 4, first + 5, 3]] };
+}
+
+// Times, and all values in the unit that is shown.
+const scaled = ([times, ...values], factor) => [times, ...(factor === 1 ? values : values.map(each => each.map(v => v === null ? null : v * factor)))];
 
 // From measured, predicted, deviation of z, then of x, to what is drawn.
 function banded([measuredZ, predictedZ, sigmaZ, measuredX, predictedX]) {

@@ -1,0 +1,207 @@
+"""Size and main frequency of the estimated load at the tip: a windowed periodogram with an interpolated peak.
+
+The load is averaged in bins of `BIN`, then looked at in windows of `WINDOW`. Hann's window, padded with zeros; the largest
+peak that stands out from its neighbourhood by `STANDS_OUT` is the main frequency, a parabola through the logarithms gives its
+place. With r the power of the peak over that of the neighbourhood and T the length of the window, the standard deviations are
+
+    frequency  0.487 / (T sqrt(r))          amplitude  a share of 1 / sqrt(2 r)
+
+of a sinusoid in noise that is white nearby (the Cramer-Rao bound of Rife and Boorstyn, IEEE Trans. Inf. Theory 20, 1974,
+times 1.53 for the window). The height of pulses is that of rectangular ones, on for half of every period, with this
+fundamental: pi / 2 times its amplitude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import NANO, Array
+
+BIN = 0.05  # s
+WINDOW = 80.0  # s
+SHORTEST = 10.0  # s of load, below which no frequency is looked for
+LEAST = 20.0  # N; a smaller load is none
+LOWEST, HIGHEST = 4.0, 3.0  # cycles in a window; Hz
+STANDS_OUT = 25.0  # power of a peak over that of its neighbourhood
+LOBE = 4  # unpadded lines to each side that belong to a peak
+PADDED = 8  # times as long with zeros
+BREAK = 1.0  # s without an estimate, or back in time, at which a window ends
+
+
+@dataclass(frozen=True, slots=True)
+class Pulses:
+    """The periodic part of a load.
+
+    Attributes
+    ----------
+    height, height_sigma : float
+        Of rectangular pulses, on for half of every period, with the same fundamental, and its standard deviation, N.
+    frequency, frequency_sigma : float
+        Hz.
+    """
+
+    height: float
+    height_sigma: float
+    frequency: float
+    frequency_sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class TipLoad:
+    """A load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
+
+    rms: float
+    pulses: Pulses | None
+
+    @property
+    def text(self) -> str:
+        """In words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, ``45 N rms, no main frequency`` or ``none above 20 N``."""
+        if self.pulses is not None and self.pulses.height >= LEAST:
+            digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
+            sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
+            return f"pulses of {self.pulses.height:.0f} N at {sure}"
+        return f"{self.rms:.0f} N rms, no main frequency" if self.rms >= LEAST else f"none above {LEAST:.0f} N"
+
+
+def find_pulses(load: Array, interval: float) -> Pulses | None:
+    """The strongest periodic part that stands out; None where there is none.
+
+    Parameters
+    ----------
+    load : ndarray, shape (k, 2)
+        N, every `interval` (s).
+    """
+    span = len(load) * interval
+    if span < SHORTEST:
+        return None
+    window = np.hanning(len(load) + 1)[:-1]
+    centred = window[:, None] * (load - window @ load / window.sum())
+    lines = np.fft.rfft(centred, PADDED * len(load), axis=0)
+    frequencies = np.arange(float(len(lines))) / (PADDED * span)
+    peak = _highest(frequencies, np.square(np.abs(lines)).sum(axis=1), span)
+    if peak is None:
+        return None
+    power = np.square(np.abs(lines @ _direction(lines[peak])))
+    peak = peak - 1 + int(np.argmax(power[peak - 1 : peak + 2]))
+    ratio = _prominence(frequencies, power, peak, span)
+    if ratio < STANDS_OUT:
+        return None
+    offset, top = _vertex(np.log(power[peak - 1 : peak + 2]))
+    height = 0.5 * pi * 2.0 * sqrt(float(np.exp(top))) / float(window.sum())
+    frequency = float(frequencies[peak] + offset * frequencies[1])
+    return Pulses(height, height / sqrt(2.0 * ratio), frequency, 0.487 / (span * sqrt(ratio)))
+
+
+def _highest(frequencies: Array, power: Array, span: float) -> int | None:
+    """The highest of the peaks that stand out, as its place."""
+    inner = np.arange(1, len(power) - 1)
+    is_peak = (power[inner] > power[inner - 1]) & (power[inner] >= power[inner + 1]) & (power[inner] > 0.0)
+    is_inside = (frequencies[inner] >= LOWEST / span) & (frequencies[inner] <= HIGHEST)
+    found = inner[is_peak & is_inside]
+    for place in found[np.argsort(-power[found])].tolist():
+        if _prominence(frequencies, power, place, span) >= STANDS_OUT:
+            return int(place)
+    return None
+
+
+def _prominence(frequencies: Array, power: Array, place: int, span: float) -> float:
+    """Power of a peak over the mean of its neighbourhood, half its frequency to twice; of the two sides the larger mean."""
+    at, lobe = frequencies[place], LOBE / span
+    below = (frequencies > 0.5 * at) & (frequencies < at - lobe)
+    above = (frequencies > at + lobe) & (frequencies < max(2.0 * at - lobe, at + 3.0 * lobe))
+    level = max(float(power[side].mean()) for side in (below, above) if side.any())
+    return float(power[place]) / level if level > 0.0 else np.inf
+
+
+def _direction(lines: NDArray[np.complex128]) -> Array:
+    """Unit vector (2,) along which a complex amplitude (2,) is largest."""
+    _, vectors = np.linalg.eigh(np.real(np.outer(lines, lines.conj())))
+    return np.asarray(vectors[:, -1])
+
+
+def _vertex(levels: Array) -> tuple[float, float]:
+    """Place, from -0.5 to 0.5 about the middle one of three `levels`, and height of the parabola through them."""
+    below, top, above = levels
+    bend = below - 2.0 * top + above
+    offset = 0.5 * (below - above) / bend if bend else 0.0
+    return float(offset), float(top - 0.25 * (below - above) * offset)
+
+
+class TipLoadFinder:
+    """Looks for the load in estimates that come in parts, in memory that does not grow with their number.
+
+    The same estimates give the same load, in whatever parts they come.
+    """
+
+    def __init__(self) -> None:
+        self._squares, self._count = 0.0, 0
+        self._strongest: Pulses | None = None
+        self._first: int | None = None  # stamp with which the window begins, ns
+        self._newest = 0
+        self._places: NDArray[np.int64] = np.zeros(0, np.int64)  # bin of every load that is kept
+        self._loads: Array = np.zeros((0, 2))
+
+    def add(self, stamps: NDArray[np.int64], loads: Array) -> None:
+        """Take in loads (k, 2) in N at `stamps` (k,) in ns; exactly zero is what is told before anything is measured."""
+        known = loads.any(axis=1)
+        stamps, loads = stamps[known], loads[known]
+        self._squares += float(np.square(loads).sum())
+        self._count += len(loads)
+        steps = np.diff(stamps, prepend=self._newest) * NANO
+        cuts = np.flatnonzero((steps < 0.0) | (steps > BREAK))
+        for first, last in zip([0, *cuts], [*cuts, len(stamps)], strict=True):
+            if first in cuts:
+                self._close()
+            self._append(stamps[first:last], loads[first:last])
+
+    def _append(self, stamps: NDArray[np.int64], loads: Array) -> None:
+        """Loads on end."""
+        if not len(stamps):
+            return
+        self._newest = int(stamps[-1])
+        self._first = int(stamps[0]) if self._first is None else self._first
+        self._places = np.concatenate([self._places, ((stamps - self._first) * NANO // BIN).astype(np.int64)])
+        self._loads = np.concatenate([self._loads, loads])
+        while len(self._places) and self._places[-1] >= (most := round(WINDOW / BIN)):
+            whole = int(np.searchsorted(self._places, most))
+            self._strongest = _stronger(self._strongest, _pulses_in_bins(self._places[:whole], self._loads[:whole]))
+            self._places, self._loads = self._places[whole:] - most, self._loads[whole:]
+            self._first += round(WINDOW / NANO)
+
+    def _close(self) -> None:
+        """The window ends."""
+        self._strongest = _stronger(self._strongest, _pulses_in_bins(self._places, self._loads))
+        self._first, self._places, self._loads = None, self._places[:0], self._loads[:0]
+
+    @property
+    def load(self) -> TipLoad | None:
+        """Of all estimates so far, pulses from the window where they are highest; None if nothing was ever estimated."""
+        if not self._count:
+            return None
+        newest = _pulses_in_bins(self._places, self._loads)
+        return TipLoad(sqrt(self._squares / self._count), _stronger(self._strongest, newest))
+
+
+def _stronger(one: Pulses | None, other: Pulses | None) -> Pulses | None:
+    return max((each for each in (one, other) if each is not None), key=lambda each: each.height, default=None)
+
+
+def _pulses_in_bins(places: NDArray[np.int64], loads: Array) -> Pulses | None:
+    """Those of loads (k, 2) by the numbers of their bins (k,), ascending; empty bins are bridged."""
+    if not len(places):
+        return None
+    bins, starts, counts = np.unique(places, return_index=True, return_counts=True)
+    means = np.add.reduceat(loads, starts, axis=0) / counts[:, None]
+    every = np.arange(bins[0], bins[-1] + 1)
+    return find_pulses(np.stack([np.interp(every, bins, column) for column in means.T], axis=1), BIN)
+
+
+def tip_load(times: Array, loads: Array) -> TipLoad | None:
+    """The load in estimates (k, 2) in N at `times` (k,) in s; None without any."""
+    finder = TipLoadFinder()
+    finder.add(np.round(np.asarray(times) / NANO).astype(np.int64), np.asarray(loads, float))
+    return finder.load

@@ -1,0 +1,213 @@
+"""Table of a replay: a row for every prediction, with what was measured, its residuals and the estimate; CSV or Parquet.
+
+A row has what was measured up to its stamp and after that of the row before: of every channel the newest value, empty where
+there is none. So a value stands once, and that of a sensor with the stamps of the strokes stands in its own row.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from itertools import chain
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+import numpy as np
+
+from ..errors import UsageError
+from ..twin.blocks import CODES, Integers, SampleBlock
+from ..types import NANO, SENSORS, Array, Stream, channels_of
+from .recording import Stretch
+
+FILE_NAME = "samples"
+DELAY = 2.0
+"""s for which a row waits for residuals that become known late."""
+ESTIMATED = (
+    "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2",
+    "load_x_N", "load_y_N",
+)  # fmt: skip
+"""Names of what is estimated, each with ``estimate_`` before it, and with ``estimate_sigma_`` for its standard deviation."""
+NEVER = np.iinfo(np.int64).min
+VARIANCES = [0, 3, 5]
+"""Places of the variances in an upper triangle by rows."""
+
+
+def predicted_columns(joints: int) -> list[str]:
+    """Names of the columns of a prediction, those that ``boom_twin simulate`` writes: of a boom with so many joints."""
+    numbers = range(1, joints + 1)
+    return [
+        "t_s",
+        *(f"stroke_{i}_m" for i in numbers),
+        *(f"joint_{i}_rad" for i in numbers),
+        *("tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2"),
+        *(f"cylinder_force_{i}_N" for i in numbers),
+    ]
+
+
+def columns_of(joints: int) -> list[str]:
+    """Names of all columns: predicted, measured, residuals, estimated, deviations of the estimate."""
+    residuals = {
+        stream: names for stream, names in _channel_columns(joints, "residual").items() if stream is not Stream.STROKES
+    }
+    return [
+        *predicted_columns(joints),
+        *chain.from_iterable(_channel_columns(joints, "measured").values()),
+        *chain.from_iterable(residuals.values()),
+        *(f"estimate_{name}" for name in ESTIMATED),
+        *(f"estimate_sigma_{name}" for name in ESTIMATED),
+    ]
+
+
+def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
+    """Names of the columns of every stream's channels."""
+    return {
+        stream: [f"{kind}_{name}_{SENSORS[stream].unit_suffix}" for name in names]
+        for stream, names in channels_of(joints).items()
+    }
+
+
+class TableFile(Protocol):
+    """Where rows go."""
+
+    def write(self, rows: Array) -> None:
+        """Append rows, shape (k, columns)."""
+
+    def close(self) -> None:
+        """The table is complete."""
+
+
+class CsvFile:
+    """A CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self._file: IO[str] = path.open("w", encoding="ascii", newline="\n")
+        self._file.write(",".join(columns) + "\n")
+        self._form = ",".join(["%.9f", *["%.9g"] * (len(columns) - 1)]) + "\n"
+
+    def write(self, rows: Array) -> None:
+        """See `TableFile`."""
+        self._file.write("".join(self._form % tuple(row) for row in rows.tolist()).replace("nan", ""))
+
+    def close(self) -> None:
+        """See `TableFile`."""
+        self._file.close()
+
+
+class ParquetFile:
+    """A Parquet file; a row group for every stretch, doubles, nothing for NaN."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self._arrow, parquet = _arrow()
+        self._schema = self._arrow.schema([(name, self._arrow.float64()) for name in columns])
+        self._writer = parquet.ParquetWriter(path, self._schema)
+
+    def write(self, rows: Array) -> None:
+        """See `TableFile`."""
+        arrays = [self._arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in rows.T]
+        self._writer.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
+
+    def close(self) -> None:
+        """See `TableFile`."""
+        self._writer.close()
+
+
+def _arrow() -> tuple[Any, Any]:
+    try:
+        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise UsageError(f"--table parquet needs pyarrow ({error}): pip install pyarrow, or take --table csv.") from None
+
+
+def check_kind(kind: str | None) -> None:
+    """UsageError if tables of that kind cannot be written here; to be called before a long run."""
+    if kind == "parquet":
+        _arrow()
+
+
+class SampleTable:
+    """Writes the table of a replay into a folder; its `add` is what `boom_twin.offline.replay.replay_into` gives stretches to.
+
+    Parameters
+    ----------
+    folder : Path
+    kind : str
+        ``csv`` or ``parquet``.
+    joints : int
+        Of the boom.
+
+    Attributes
+    ----------
+    path : Path
+        Of the file.
+
+    Raises
+    ------
+    UsageError
+        A package that is needed is not there.
+    """
+
+    def __init__(self, folder: Path, kind: str, joints: int) -> None:
+        self.path = folder / f"{FILE_NAME}.{kind}"
+        columns = columns_of(joints)
+        self._file: TableFile = CsvFile(self.path, columns) if kind == "csv" else ParquetFile(self.path, columns)
+        self._measured, self._residuals = (
+            {CODES[stream]: columns.index(names[0]) for stream, names in found.items() if names[0] in columns}
+            for found in (_channel_columns(joints, "measured"), _channel_columns(joints, "residual"))
+        )
+        self._widths = {CODES[stream]: len(names) for stream, names in channels_of(joints).items()}
+        self._stamps: Integers = np.zeros(0, np.int64)  # of the rows that wait, ascending
+        self._rows: Array = np.zeros((0, len(columns)))
+        self._before = NEVER  # stamp of the row before them
+        self._ahead: list[SampleBlock] = []  # samples that may be of rows to come
+
+    def add(self, stretch: Stretch) -> None:
+        """Take the next stretch in; rows of a clock that was set back over earlier stamps begin anew."""
+        stamps, rows, residuals = stretch.predictions.stamps, self._new_rows(stretch), stretch.block.residuals
+        for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) <= 0) + 1):
+            if len(self._stamps) and stamps[part[0]] <= self._stamps[-1]:
+                self._write(len(self._stamps))
+                self._before = NEVER
+            self._stamps = np.concatenate([self._stamps, stamps[part]])
+            self._rows = np.concatenate([self._rows, rows[part]])
+            for block in [*self._ahead, *stretch.samples]:
+                self._fill(self._measured, block.streams, block.stamps, block.values)
+            self._fill(self._residuals, residuals.streams, residuals.stamps, residuals.values)
+        self._ahead = stretch.samples[-2:]  # the rows of a block may come in two stretches
+        self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(DELAY / NANO))))
+
+    def finish(self) -> Path:
+        """Write the rest; returns the file."""
+        self._write(len(self._stamps))
+        self._file.close()
+        return self.path
+
+    def _new_rows(self, stretch: Stretch) -> Array:
+        """What was predicted and estimated; the rest is empty."""
+        p, e = stretch.predictions, stretch.estimates
+        rows = np.full((len(p.stamps), self._rows.shape[1]), np.nan)
+        seconds = (p.stamps - stretch.first) * NANO
+        predicted = np.column_stack([seconds, p.strokes, p.joints, p.tip_position, p.tip_acceleration, p.cylinder_forces])
+        variances = e.tip_covariance[:, VARIANCES], e.acceleration_covariance[:, VARIANCES], e.load_variance
+        estimated = np.column_stack([e.tip, e.acceleration, e.load, *map(np.sqrt, variances)])
+        rows[:, : predicted.shape[1]], rows[:, -estimated.shape[1] :] = predicted, estimated
+        return rows
+
+    def _fill(self, places: dict[int, int], streams: Integers, stamps: Integers, values: Array) -> None:
+        """Put values (k, w) of channels at `stamps` (ns) into the rows that they are of; `places` by stream: first column."""
+        order = np.argsort(stamps, kind="stable")
+        row = np.searchsorted(self._stamps, stamps[order])
+        inside = (row < len(self._stamps)) & (stamps[order] > self._before)
+        order, row = order[inside], row[inside]
+        for code, first in places.items():
+            own = streams[order] == code
+            for channel in range(self._widths[code]):
+                column = values[order[own], channel]
+                known = np.isfinite(column)
+                self._rows[row[own][known], first + channel] = column[known]
+
+    def _write(self, count: int) -> None:
+        """Write the first rows of those that wait."""
+        if count:
+            self._file.write(self._rows[:count])
+            self._before = int(self._stamps[count - 1])
+            self._stamps, self._rows = self._stamps[count:], self._rows[count:]

@@ -1,0 +1,89 @@
+"""Main frequency of the load at the tip against closed forms: right within its deviation, and none where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin.estimation.load_spectrum import LEAST, TipLoadFinder, find_pulses, tip_load
+
+RATE = 200.0
+UP = np.array([0.0, 1.0])
+
+
+def times(seconds: float, rate: float = RATE) -> np.ndarray:
+    """Stamps (k,) in s with the jitter of a sensor."""
+    count = round(seconds * rate)
+    return np.arange(count) / rate + np.random.default_rng(1).uniform(-2e-4, 2e-4, count)
+
+
+def pulses(t: np.ndarray, frequency: float, height: float) -> np.ndarray:
+    """Rectangular pulses, upward, on for half of every period; shape (k, 2)."""
+    return height * ((t * frequency) % 1.0 < 0.5)[:, None] * UP
+
+
+@pytest.mark.parametrize("frequency", [0.2, 0.43, 0.6])
+@pytest.mark.parametrize(("seconds", "rate"), [(40.0, 200.0), (60.0, 50.0), (24.0, 1000.0)])
+def test_rectangular_pulses_give_their_frequency_and_height(frequency: float, seconds: float, rate: float) -> None:
+    t = times(seconds, rate)
+    found = tip_load(t, pulses(t, frequency, 130.0) + 25.0)
+    assert found is not None and found.pulses is not None
+    assert found.pulses.frequency == pytest.approx(frequency, rel=0.02)
+    assert found.pulses.height == pytest.approx(130.0, rel=0.05)
+    assert found.text.startswith(f"pulses of {found.pulses.height:.0f} N at ")
+
+
+def test_a_sine_in_any_direction_gives_its_fundamental() -> None:
+    t = times(60.0)
+    found = tip_load(t, 50.0 * np.sin(2.0 * np.pi * 0.37 * t)[:, None] * np.array([0.6, -0.8]))
+    assert found is not None and found.pulses is not None
+    assert found.pulses.frequency == pytest.approx(0.37, rel=0.002)
+    assert found.pulses.height == pytest.approx(0.5 * np.pi * 50.0, rel=0.01)
+    assert found.rms == pytest.approx(50.0 / np.sqrt(2.0), rel=0.02)
+
+
+def test_the_stated_deviations_are_true_in_white_noise() -> None:
+    chance, off = np.random.default_rng(3), []
+    t = np.arange(800) * 0.05
+    for _ in range(200):
+        wave = 40.0 * np.sin(2.0 * np.pi * 0.43 * t + chance.uniform(0.0, 6.3))[:, None] * UP
+        found = find_pulses(wave + 30.0 * chance.standard_normal((800, 2)), 0.05)
+        assert found is not None
+        off.append(((found.frequency - 0.43) / found.frequency_sigma, (found.height - 20.0 * np.pi) / found.height_sigma))
+    assert np.std(off, axis=0) == pytest.approx(1.0, abs=0.2) and np.abs(np.mean(off, axis=0)).max() < 0.3
+
+
+def test_noise_without_a_period_has_no_main_frequency() -> None:
+    chance, kept = np.random.default_rng(4), np.exp(-0.05)
+    for scale in (1.0, 100.0):
+        gusts = np.zeros((800, 2))
+        for row in range(1, 800):
+            gusts[row] = kept * gusts[row - 1] + scale * np.sqrt(1.0 - kept**2) * chance.standard_normal(2)
+        found = tip_load(np.arange(800) * 0.05, gusts)
+        assert found is not None and found.pulses is None
+        told = "none above 20 N" if scale == 1.0 else f"{found.rms:.0f} N rms, no main frequency"
+        assert found.text == told
+
+
+def test_a_small_load_is_none_and_what_was_never_measured_is_not_told() -> None:
+    t = times(40.0)
+    small = tip_load(t, pulses(t, 0.43, 0.5 * LEAST))
+    assert small is not None and small.text == "none above 20 N"
+    assert tip_load(t, np.zeros((len(t), 2))) is None
+    assert tip_load(t[:0], np.zeros((0, 2))) is None
+
+
+def test_parts_give_what_the_whole_gives() -> None:
+    t = times(300.0)
+    stamps = np.round(t * 1e9).astype(np.int64) + 1_700_000_000 * 10**9
+    loads = pulses(t, 0.31, 90.0) * (t > 100.0)[:, None] + np.random.default_rng(5).standard_normal((len(t), 2))
+    stamps[40_000:] += 5 * 10**9  # a gap
+    whole, parts = TipLoadFinder(), TipLoadFinder()
+    whole.add(stamps, loads)
+    for part in np.array_split(np.arange(len(t)), 23):
+        parts.add(stamps[part], loads[part])
+    assert whole.load is not None and whole.load.pulses is not None and parts.load is not None
+    assert parts.load.pulses == whole.load.pulses and parts.load.rms == pytest.approx(whole.load.rms, rel=1e-12)
+    assert whole.load.pulses.frequency == pytest.approx(0.31, rel=0.02)
+    assert whole.load.pulses.height == pytest.approx(90.0, rel=0.1)
+    assert len(parts._loads) < 80 * RATE + 1
