@@ -6,7 +6,6 @@ there is none. So a value stands once, and that of a sensor with the stamps of t
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
@@ -113,7 +112,10 @@ class ParquetFile:
 
 def _arrow() -> tuple[Any, Any]:
     try:
-        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+        import pyarrow
+        from pyarrow import parquet
+
+        return pyarrow, parquet
     except ImportError as error:
         raise UsageError(f"--table parquet needs pyarrow ({error}): pip install pyarrow, or take --table csv.") from None
 
