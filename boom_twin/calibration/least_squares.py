@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,11 +12,13 @@ from ..errors import BoomTwinError
 from ..scene.kinematics import strokes_of_posture
 from ..types import Array
 from .forward_model import CalibrationProblem
-from .noise_model import NoiseModel, ResidualBlocks, whitening_of
+from .noise_model import NoiseModel, ResidualBlocks, Whitening, whitening_of
 from .sessions import SessionCourse
+from .unknown_load import with_load
 
 MOST = 12  # evaluations of a round
 ROUNDS = 2
+LOADED = 1.15  # misfit from which on an unknown load is looked for
 ENOUGH = 1e-5  # relative change of the sum of squares, and of the unknowns
 HOLD, STILL = 1.0, 1e-3  # a hold of so long (s), in which no stroke moves by more (m)
 HOLDS = 40  # most that are looked at
@@ -49,6 +51,7 @@ class Fit:
     misfit: float
     passes: int
     whitening: NoiseModel
+    load: float
 
     def covariance(self, more: Array | float = 0.0) -> Array:
         """Of the deviations, with the priors, and with `more` information.
@@ -68,33 +71,47 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     A stiffness that is wrong makes the boom swing at a wrong frequency, and after some swings measured and predicted ones are
     out of step, from where least squares do not find back. So the means over holds are fitted first, as equilibria. The noise
     rings at the boom's frequencies, too: it is made anew at the first estimate of the swinging boom, and the fit repeated.
+
+    What is left that noise does not explain is taken for an unknown load at the tip, if it looks like one, and the fit is made
+    anew with it, from the holds on.
     """
     least = np.array([unknown.least for unknown in problem.unknowns])
-    deviations, _ = _minimised(_in_holds(problem), problem.start, least)
+    start, _ = _minimised(_in_holds(problem), problem.start, least)
+    quiet = _in_motion(problem, tell, start, least, False)
+    if quiet.misfit <= LOADED:
+        return quiet
+    loaded = _in_motion(problem, tell, start, least, True)
+    return replace(loaded if loaded.load > 0.0 else quiet, passes=quiet.passes + loaded.passes)
+
+
+def _in_motion(problem: CalibrationProblem, tell: Tell, deviations: Array, least: Array, with_loads: bool) -> Fit:
+    """The fit to the whole motion, from `deviations` on, with an unknown load or without."""
     passes = 0
     for _ in range(ROUNDS):
         noise = problem.noise(deviations)
-        whitening = whitening_of([each[::2] for each in noise], problem.length)
+        alone = whitening_of([each[::2] for each in noise], problem.length)
+        whitenings, load = with_load(problem, deviations, alone) if with_loads else ([Whitening(alone)] * len(noise), 0.0)
 
-        def moving(deviations: Array, whitening: NoiseModel = whitening) -> tuple[Array, Array]:
+        def moving(deviations: Array, whitenings: Sequence[Whitening] = whitenings) -> tuple[Array, Array]:
             tell()
-            return problem.moving(deviations, whitening)
+            return problem.moving(deviations, whitenings)
 
         deviations, more = _minimised(moving, deviations, least)
         passes += more
-    residuals, slopes = problem.moving(deviations, whitening)
+    residuals, slopes = problem.moving(deviations, whitenings)
     freedom = max(int(np.count_nonzero(residuals)) - len(deviations), 1)
     misfit = float(np.sqrt(np.sum(residuals**2) / freedom))
-    return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitening, slopes), misfit, passes, whitening)
+    return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitenings, slopes), misfit, passes, alone, load)
 
 
-def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:
+def _scatter(noise: list[Array], whitenings: Sequence[Whitening], slopes: Array) -> Array:
     """Covariance of J^T w over realisations that the filter was not made from; sessions are independent, so theirs add up."""
     found, first = np.zeros((slopes.shape[1], slopes.shape[1])), 0
-    for each in noise:
+    for each, whitening in zip(noise, whitenings, strict=True):
         white = whitening(each[1::2]).reshape(len(each[1::2]), -1)
-        pulls = white @ slopes[first : first + white.shape[1]]
-        found += pulls.T @ pulls / len(pulls)
+        own = slopes[first : first + white.shape[1]]
+        pulls = white @ own
+        found += pulls.T @ pulls / len(pulls) + whitening.load_scatter(own)
         first += white.shape[1]
     return found
 
