@@ -6,7 +6,7 @@ Deviations from the prediction move in the modes j of the present posture (coord
 
 f (2), N: the force, Phi_j the mode's motion of the tip. Joint angles deviate by Theta_j q_j, the specific force at the tip by
 Phi_j q_j'' and by the turn of the tip against gravity. Modes are made at knots along the strokes' travel and interpolated
-between; a step of an oscillator with its force held is exact.
+between; a step of an oscillator with its force held is exact. Modes above `HIGHEST` follow the force at once.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..estimation.sensor_model import specific_force
 from ..kernels.tables import FRAME_ANGLE
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
 from ..scene.schema import Scene
-from ..types import Array, Stream
+from ..types import Array
 from .sessions import SessionCourse
 
 TRAVEL = 0.03  # m of the strokes, from one knot to the next
@@ -34,12 +34,12 @@ STEP = 0.01  # s, longest of the oscillators
 
 
 class ModesAlong(NamedTuple):
-    """Modes at k instants: omega and decay = 2 zeta omega (k, m), tip (k, m, 3) and turns (k, m, n), sines of the tip's angle.
+    """The lowest m modes at k instants, of a boom with n joints.
 
     Attributes
     ----------
     omega, decay : ndarray, shape (k, m)
-        rad/s; 1/s.
+        Natural frequency, rad/s, and 2 zeta omega, 1/s.
     readings : ndarray, shape (k, m, n + 2)
         Of joint angles, rad, and of the specific force, m/s^2, by the turn of the tip against gravity; per unit of q.
     tip : ndarray, shape (k, m, 2)
@@ -83,7 +83,7 @@ def _at_postures(scene: Scene, strokes: Array) -> ModesAlong:
         angles.append(state.frames[-1, FRAME_ANGLE])
         modes = natural_modes(plan, state, work, MODES, WIDTH)
         before = [mode.motion for mode, _ in found[-1]] if found else [mode.motion for mode in modes]
-        modes = tuple(_turned(mode, (plan.masses * mode.motion) @ old < 0.0) for mode, old in zip(modes, before, strict=False))
+        modes = tuple(_alike(plan.masses, mode, old) for mode, old in zip(modes, before, strict=False))
         found.append([(mode, joint_increments(plan, state, work, mode)) for mode in modes])
     count = min(map(len, found))
     omega = np.array([[2.0 * math.pi * mode.frequency for mode, _ in row[:count]] for row in found])
@@ -97,8 +97,11 @@ def _at_postures(scene: Scene, strokes: Array) -> ModesAlong:
     return ModesAlong(omega, decay, np.concatenate([joints, turned], axis=2), swing[..., :2], felt)
 
 
-def _turned(mode: Mode, round_: bool) -> Mode:
-    return Mode(mode.frequency, -mode.increments, -mode.motion) if round_ else mode
+def _alike(masses: Array, mode: Mode, before: Array) -> Mode:
+    """The mode, turned round if it moves against the one `before`."""
+    if float((masses * mode.motion) @ before) >= 0.0:
+        return mode
+    return Mode(mode.frequency, -mode.increments, -mode.motion)
 
 
 def response(modes: ModesAlong, length: float, pieces: int) -> Array:
@@ -147,6 +150,7 @@ def response(modes: ModesAlong, length: float, pieces: int) -> Array:
 
 
 def _oscillate(omega: Array, decay: Array, h: float) -> tuple[Array, Array, Array, Array]:
+    """As `boom_twin.estimation.tip_estimate.oscillate`, of arrays."""
     half = 0.5 * decay
     wave = np.sqrt(omega**2 - half**2 + 0j)
     c, s, e = np.cos(wave * h).real, (np.sin(wave * h) / wave).real, np.exp(-half * h)

@@ -5,9 +5,10 @@ The force f (2), N, is taken for a Gaussian process of independent components wi
     sigma^2 (exp(-|t - s| / T) + 1),
 
 a Gauss-Markov process as in `boom_twin.estimation.tip_estimate`, and a constant as large: pulses of a pump push one way. So
-what residuals tell of parameters counts only as far as no such force could have made it. With G what f of sigma = 1 N does to
-residuals that are white but for it (`load_response`), their covariance is 1 + sigma^2 G G^T. By the eigenvalues g^2 of G^T G and
-the directions u = G v / g it is whitened directly, and the logarithm of the probability of residuals r is, but for a constant,
+what residuals tell of parameters counts only as far as no such force could have made it. With G what f of sigma = 1 N does
+to residuals that are white but for it (`load_response`), their covariance is 1 + sigma^2 G G^T. By the eigenvalues g^2 and
+vectors v of G^T G and the directions u = G v / g they are whitened directly, and the logarithm of the probability of residuals
+r is, but for a constant,
 
     1/2 sum [ sigma^2 g^2 (u . r)^2 / (1 + sigma^2 g^2) - ln(1 + sigma^2 g^2) ].
 
@@ -18,6 +19,7 @@ sigma is where this is largest (type II maximum likelihood; Rasmussen and Willia
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -48,8 +50,18 @@ class _Seen(NamedTuple):
     squares: Array
 
 
-def with_load(problem: CalibrationProblem, deviations: Array, noise: NoiseModel) -> tuple[list[Whitening], float]:
-    """Filters for every session with the load that residuals at `deviations` tell, and its root mean square, N (0: none)."""
+def with_load(
+    problem: CalibrationProblem, deviations: Array, noise: NoiseModel, level: float | None = None
+) -> tuple[list[Whitening], float]:
+    """Filters for every session with an unknown load, and its sigma, N (0: none).
+
+    Parameters
+    ----------
+    deviations : ndarray, shape (p,)
+        Of the unknowns from their present values, at which the boom is looked at.
+    level : float, optional
+        sigma, N; by default that which the residuals tell.
+    """
     residuals, _ = problem.moving(deviations, [Whitening(noise)] * len(problem.parts))
     boom, channels = problem.boom(deviations), len(problem.channels)
     found, first = [], 0
@@ -58,12 +70,15 @@ def with_load(problem: CalibrationProblem, deviations: Array, noise: NoiseModel)
         white = residuals[first : first + count * channels].reshape(count, channels)
         found.append(_seen(problem, boom, course, blocks, noise, white))
         first += white.size
-    level = _level([window for windows in found for window in windows])
-    return [Whitening(noise, tuple(_at_level(window, level) for window in windows if level > 0.0)) for windows in found], RMS * level
+    if level is None:
+        level = _level([window for windows in found for window in windows])
+    return [Whitening(noise, tuple(_at_level(window, level) for window in windows if level > 0.0)) for windows in found], level
 
 
 def _level(windows: list[_Seen]) -> float:
     """The most probable sigma, N; 0 where none is much more probable than no load."""
+    if not windows:
+        return 0.0
     gains = np.concatenate([window.gains for window in windows])
     squares = np.concatenate([window.squares for window in windows])
     excess = LEVELS[:, None] ** 2 * gains
@@ -83,13 +98,13 @@ def _seen(
     """What a load does in a session, by windows."""
     pieces = math.ceil(problem.length / STEP - 1e-9)
     step = problem.length / pieces
-    modes = modes_along(boom, course, step * (0.5 + np.arange(pieces * len(blocks.times))))
+    modes = modes_along(boom, course, np.asarray(step * (0.5 + np.arange(pieces * len(blocks.times)))))
     if not modes.omega.shape[1]:
         return []
     gaps, order = problem.gaps(blocks), len(noise.past)
     bounds = np.linspace(0, len(white), 1 + math.ceil(len(white) / WINDOW)).astype(int).tolist()
     found = []
-    for first, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, end in pairwise(bounds):
         needed = slice(pieces * first, pieces * (end + order))
         shown = response(ModesAlong(*(each[needed] for each in modes)), problem.length, pieces)[..., problem.used]
         shown = _correlated(shown, problem.length) + gaps[first : end + order]
