@@ -112,9 +112,7 @@ def _with_other_loads(problem: CalibrationProblem, start: Array) -> list[Array]:
     return starts
 
 
-def _in_motion(
-    problem: CalibrationProblem, tell: Tell, deviations: Array, least: Array, rounds: int, with_loads: bool
-) -> Fit:
+def _in_motion(problem: CalibrationProblem, tell: Tell, deviations: Array, least: Array, rounds: int, with_loads: bool) -> Fit:
     """The fit to the whole motion, from `deviations` on, with an unknown load or without."""
     passes = 0
     for _ in range(rounds):

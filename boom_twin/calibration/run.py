@@ -262,6 +262,11 @@ def _without_load(
 
 
 def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
+    if loose := [name for name, each in after.discounted.items() if each > MISFIT]:
+        return [
+            f"On what was held out the residuals of {', '.join(loose)} are more than {MISFIT:g} times what noise and the load "
+            "explain: do not use this result, its intervals are too narrow. Record a quiet session, or a longer one."
+        ]
     worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
     if not worse:
         return []
@@ -273,15 +278,15 @@ def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
 
 def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object]) -> list[str]:
     found = []
-    if fit.level > 0.0:
-        found.append(
-            f"A load of about {fit.load:.0f} N rms at the tip, made by no parameter, was taken into account: what it explains "
-            "is discounted, in the intervals and in what was held out. If nothing shook the boom, suspect a fault."
-        )
     if fit.misfit > MISFIT:
         found.append(
             f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "
             "parameters cannot make (a fault, another boom, a load that changed). Intervals are widened by it."
+        )
+    if fit.level > 0.0:
+        found.append(
+            f"A load of about {fit.load:.0f} N rms at the tip, made by no parameter, was taken into account: what it explains "
+            "is discounted, in the intervals and in what was held out. If nothing shook the boom, suspect a fault."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")
