@@ -47,6 +47,20 @@ def test_the_prediction_is_off_by_what_it_does_not_know(replayed):
     assert not [alarm for alarm in summary["alarms"] if str(alarm["cause"]).endswith(".sensor")]
 
 
+def test_the_estimate_knows_it(replayed):
+    """Tip and acceleration from all sensors, with true deviations, and the load: bounds of 2 mm and 0.2 m/s^2, 15 %, 2 %."""
+    summary, truth = replayed.summary, load_truth(SESSION)
+    assert summary["tip_estimate_error_rms_m"] < 1e-3 < 0.1 * summary["tip_error_rms_m"]
+    assert summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.12
+    estimates = replayed.recording.estimates
+    times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
+    begun = times > QUIET
+    off = (estimates.tip[:, :2] - truth.at(times, truth.position))[begun]
+    assert 0.4 < np.sqrt(np.mean(off**2 / estimates.tip_covariance[begun][:, [0, 3]])) < 1.6
+    assert summary["tip_load_pulses_N"] == pytest.approx(130.0, rel=0.15)
+    assert summary["tip_load_frequency_Hz"] == pytest.approx(0.43, rel=0.02)
+
+
 def test_residuals_tell_of_the_load(replayed):
     """Angles and forces are farther off once the pump runs; averaged over 1 s, the force of cylinder 1 follows its load."""
     truth, first = load_truth(SESSION), int(replayed.recording.predictions.stamps[0])

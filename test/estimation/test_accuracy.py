@@ -1,0 +1,59 @@
+"""Accuracy by sensors: more of them never make it worse, and what is stated is what the twin's own filter comes to."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.cli.accuracy import sensors_of, sets_of
+from boom_twin.errors import UsageError
+from boom_twin.estimation import tip_estimate
+from boom_twin.estimation.accuracy import TipAccuracy, accuracy_at
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Array
+
+SCENE = load_scene()
+ARCH = strokes_of_posture(SCENE, "arch")
+SETS = ([], [Stream.ANGLES], [Stream.ANGLES, Stream.IMU], [Stream.ANGLES, Stream.IMU, Stream.IMU])
+
+
+@pytest.fixture(scope="module")
+def found() -> list[TipAccuracy]:
+    return [accuracy_at(SCENE, ARCH, chosen) for chosen in SETS]
+
+
+def test_more_sensors_are_never_worse(found: list[TipAccuracy]) -> None:
+    for fewer, more in pairwise(found):
+        for before, after in zip(fewer, more, strict=True):
+            assert (after <= before * (1.0 + 1e-9)).all()
+    assert np.hypot(*found[1].tip[:2]) < 0.2 * np.hypot(*found[0].tip[:2]), "angles tell where the tip is"
+    assert np.hypot(*found[2].acceleration) < 0.2 * np.hypot(*found[1].acceleration), "an IMU tells how it accelerates"
+
+
+def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same sensors on a twin whose load level is held: its covariance after 20 s of readings of a boom at rest."""
+    stated, twin = accuracy_at(SCENE, ARCH, [Stream.ANGLES]), Twin(SCENE)
+    rng, angles = np.random.default_rng(1), None
+    estimates = []
+    for k in range(4000):
+        report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, ARCH + 2e-5 * rng.normal(size=4)))
+        assert report.prediction is not None and report.estimate is not None
+        angles = report.prediction.joints if angles is None else angles
+        twin._modes.filter.level[0] = tip_estimate.USUAL_LOAD
+        twin.update(Sample(Stream.ANGLES, 5_000_000 * k, _noisy(angles, rng)))
+        estimates.append(np.sqrt(report.estimate.tip_covariance[[0, 3, 5]]))
+    assert estimates[-1] == pytest.approx(stated.tip, rel=0.1)
+
+
+def _noisy(angles: Array, rng: np.random.Generator) -> Array:
+    return np.asarray(angles + 1.745e-4 * rng.normal(size=len(angles)))
+
+
+def test_names_of_sensors() -> None:
+    assert sensors_of("angles, imu,imu") == [Stream.ANGLES, Stream.IMU, Stream.IMU]
+    assert len(sets_of([Stream.ANGLES, Stream.IMU, Stream.IMU])) == 6
+    with pytest.raises(UsageError, match="'radar' is no sensor"):
+        sensors_of("angles,radar")
