@@ -201,7 +201,7 @@ def test_the_estimate_has_its_lines_and_bands_and_the_load_is_told(page: Any) ->
     go(page, 12.0)
     for name, first in (("displacement", 7), ("acceleration", 3)):
         labels = page.locator(f"#chart-{name} .u-legend .u-label").all_inner_texts()
-        assert [label for label in labels if label.startswith("estimate")] == ["estimate forward", "estimate up"]
+        assert [label for label in labels if label.startswith("est.")] == ["est. forward", "est. up"]
         data = page.evaluate("name => twin.charts(name).plot.data.map(column => column.filter(v => v != null))", name)
         estimate, high, low = (np.array(data[first + i]) for i in (0, 2, 3))
         assert len(estimate) > 100 and (high > estimate).all() and (low < estimate).all()

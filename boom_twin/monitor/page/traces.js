@@ -180,7 +180,7 @@ const UNCERTAIN = {
 
 // The same chart with the lines of the estimate and their bands.
 function withEstimate({ series, bands = [] }) {
-  const first = series.length + 1, lines = ["estimate forward", "estimate up"].map((label, i) => ({ label, colour: 2 + i }));
+  const first = series.length + 1, lines = ["est. forward", "est. up"].map((label, i) => ({ label, colour: 2 + i }));
   const edges = [2, 2, 3, 3].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }));
   return { series: [...series, ...lines, ...edges], bands: [...bands, [first + 2, first + 3, 2], [first + 4, first + 5, 3]] };
 }
