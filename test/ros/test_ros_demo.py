@@ -31,6 +31,8 @@ def test_a_short_demonstration(spawn: Callable[..., Any], tmp_path: Path) -> Non
     assert demo.end() == 0, demo.said()
     rows = dict(line.split("  ", 1) for line in demo.said().splitlines() if "  " in line)
     position, acceleration = re.findall(r"[\d.]+(?= mm| m/s)", rows["tip error, prediction"])
+    place, motion = re.findall(r"[\d.]+(?= mm| m/s)", rows["tip error, estimate"])
+    assert float(place) <= float(position) and float(motion) < float(acceleration)
     assert 0.0 < float(position) < 5.0 and 0.0 < float(acceleration) < 1.0
     assert " N rms" in rows["residual cylinder_force_4"] and " mrad rms" in rows["residual joint_1"]
     sent, arrived = int(rows["stroke samples sent"]), int(rows["predictions received"])

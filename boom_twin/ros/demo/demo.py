@@ -45,6 +45,10 @@ TIP_SOURCES: dict[str, tuple[tuple[Output, Callable[[Any], Any]], tuple[Output, 
         (Output.TIP_POSITION, attrgetter("point")),
         (Output.TIP_ACCELERATION, attrgetter("accel.linear")),
     ),
+    "estimate": (
+        (Output.ESTIMATE_POSE, attrgetter("pose.pose.position")),
+        (Output.ESTIMATE_ACCELERATION, attrgetter("accel.accel.linear")),
+    ),
 }
 """Who tells how the tip moves: outputs of its position and its acceleration, and where the vector is in their messages."""
 
