@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..estimation.tip_estimate import LOAD_TIME
+from ..estimation.tip_estimate import LOAD_TIME, MOST_LOAD
 from ..scene.schema import Scene
 from ..types import Array
 from .forward_model import CalibrationProblem
@@ -33,7 +33,7 @@ from .noise_model import LoadWindow, NoiseModel, ResidualBlocks, Whitening
 from .sessions import SessionCourse
 
 WINDOW = 800  # blocks, at most
-LEVELS = np.geomspace(0.3, 1000.0, 120)  # N, of sigma, that are tried
+LEVELS = np.geomspace(0.3, MOST_LOAD, 120)  # N, of sigma, that are tried; what would need more is no load
 CLEAR = 10.0  # by which a load makes residuals more probable, as a logarithm, before it is believed
 WEAK = 1e-4  # variance over that of noise, below which a direction is left out
 CHUNK = 64  # forces whose response is whitened at once
