@@ -17,7 +17,7 @@ from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array, Stream, channels_of, sensor_kind, stream_of
-from .noise_model import ResidualBlocks, Whitening
+from .noise_model import NoiseModel, ResidualBlocks
 from .sessions import SessionCourse
 from .unknowns import Unknown
 
@@ -52,7 +52,8 @@ class ForwardModel:
 
     def __init__(self, scene: Scene, trials: Sequence[Values]) -> None:
         self._scene, self._gravity = scene, gravity_in_base(scene)
-        self._batch = Batch([compile_scene(with_parameters(scene, _of_scene(trial))) for trial in trials])
+        own = [{name: value for name, value in trial.items() if not name.endswith(".zero")} for trial in trials]
+        self._batch = Batch([compile_scene(with_parameters(scene, values)) for values in own])
         strokes = channels_of(len(scene.joints))[Stream.STROKES]
         self._zeros = np.array([[trial.get(f"{name}.zero", 0.0) for name in strokes] for trial in trials])
 
@@ -94,11 +95,6 @@ class ForwardModel:
     def _readings(self, rows: Array) -> Readings:
         found = taken_apart(self._batch.plans[0], rows)
         return {stream: reading(found, self._gravity) for stream, reading in READINGS.items()}
-
-
-def _of_scene(trial: Values) -> dict[str, float]:
-    """Those that are no zeros of sensors."""
-    return {name: value for name, value in trial.items() if not name.endswith(".zero")}
 
 
 DIFFERENCE = 1e-4  # of a prior deviation, for derivatives; swings fall out of step within a few thousandths
@@ -161,25 +157,18 @@ class CalibrationProblem:
         """Values of the unknowns by name."""
         return {unknown.name: unknown.value(float(d)) for unknown, d in zip(self.unknowns, deviations, strict=True)}
 
-    def moving(self, deviations: Array, whitenings: Sequence[Whitening]) -> tuple[Array, Array]:
-        """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p); a filter for each session."""
+    def moving(self, deviations: Array, whitening: NoiseModel) -> tuple[Array, Array]:
+        """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
         forward = ForwardModel(self.scene, self._trials(deviations))
         residuals, slopes = [], []
-        for (course, blocks), whitening in zip(self.parts, whitenings, strict=True):
+        for course, blocks in self.parts:
             means = blocks.averaged(forward.move(course))
             predicted, slope = self._with_slopes(means, deviations)
             left = blocks.measured[:, self.used] - predicted
+            gaps = np.where(np.isfinite(left), 0.0, np.nan)
             residuals.append(whitening(left).ravel())
-            slopes.append(-whitening(slope + self.gaps(blocks)).reshape(len(self.unknowns), -1))
+            slopes.append(-whitening(slope + gaps).reshape(len(self.unknowns), -1))
         return np.concatenate(residuals), np.concatenate(slopes, axis=1).T
-
-    def boom(self, deviations: Array) -> Scene:
-        """The scene with these values of its parameters."""
-        return with_parameters(self.scene, _of_scene(self.values(deviations)))
-
-    def gaps(self, blocks: ResidualBlocks) -> Array:
-        """NaN where a channel that is used has no value, else 0; shape (b, c)."""
-        return np.where(np.isfinite(blocks.measured[:, self.used]), 0.0, np.nan)
 
     def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
         """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""

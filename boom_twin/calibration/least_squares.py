@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,14 +12,11 @@ from ..errors import BoomTwinError
 from ..scene.kinematics import strokes_of_posture
 from ..types import Array
 from .forward_model import CalibrationProblem
-from .noise_model import NoiseModel, ResidualBlocks, Whitening, whitening_of
+from .noise_model import NoiseModel, ResidualBlocks, whitening_of
 from .sessions import SessionCourse
-from .unknown_load import RMS, with_load
 
 MOST = 12  # evaluations of a round
 ROUNDS = 2
-PAYLOADS = (-8.0, 8.0, 16.0)  # kg beside that of the holds, from which a fit with an unknown load starts, too
-LOADED = 1.15  # misfit from which on an unknown load is looked for
 ENOUGH = 1e-5  # relative change of the sum of squares, and of the unknowns
 HOLD, STILL = 1.0, 1e-3  # a hold of so long (s), in which no stroke moves by more (m)
 HOLDS = 40  # most that are looked at
@@ -44,11 +41,6 @@ class Fit:
         Root mean square of the white residuals, 1 where noise alone is left; what is above 1 counts as noise.
     passes : int
     whitening : NoiseModel
-        Of the noise alone.
-    level : float
-        Of the unknown load at the tip that was taken into account, N, see `unknown_load`; 0 for none.
-    evidence : float
-        Logarithm of the probability of the residuals, but for a constant.
     """
 
     deviations: Array
@@ -57,13 +49,6 @@ class Fit:
     misfit: float
     passes: int
     whitening: NoiseModel
-    level: float
-    evidence: float
-
-    @property
-    def load(self) -> float:
-        """Root mean square of the unknown load, N."""
-        return RMS * self.level
 
     def covariance(self, more: Array | float = 0.0) -> Array:
         """Of the deviations, with the priors, and with `more` information.
@@ -83,66 +68,33 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     A stiffness that is wrong makes the boom swing at a wrong frequency, and after some swings measured and predicted ones are
     out of step, from where least squares do not find back. So the means over holds are fitted first, as equilibria. The noise
     rings at the boom's frequencies, too: it is made anew at the first estimate of the swinging boom, and the fit repeated.
-
-    What is left that noise does not explain is taken for an unknown load at the tip, if it looks like one, and the fit is made
-    anew with it, from the holds on.
     """
     least = np.array([unknown.least for unknown in problem.unknowns])
-    start, _ = _minimised(_in_holds(problem), problem.start, least)
-    quiet = _in_motion(problem, tell, start, least, ROUNDS, False)
-    if quiet.misfit <= LOADED:
-        return quiet
-    tried = [_in_motion(problem, tell, each, least, 1, True) for each in _with_other_loads(problem, start)]
-    best = max(tried, key=lambda fit: fit.evidence)
-    loaded = _in_motion(problem, tell, best.deviations, least, ROUNDS, True)
-    passes = sum(fit.passes for fit in (quiet, *tried, loaded))
-    return replace(loaded if loaded.level > 0.0 else quiet, passes=passes)
-
-
-def _with_other_loads(problem: CalibrationProblem, start: Array) -> list[Array]:
-    """Starts with other payloads than that of the holds, of which a constant force at the tip is a part.
-
-    A boom with a wrong payload swings at a wrong frequency, and what it then leaves passes for an unknown load.
-    """
-    starts = [start]
-    for i, unknown in enumerate(problem.unknowns):
-        if unknown.name == "tip.payload":
-            at = start[i] + np.array(PAYLOADS) / unknown.kind.prior
-            starts += [np.where(np.arange(len(start)) == i, each, start) for each in at[at > unknown.least]]
-    return starts
-
-
-def _in_motion(problem: CalibrationProblem, tell: Tell, deviations: Array, least: Array, rounds: int, with_loads: bool) -> Fit:
-    """The fit to the whole motion, from `deviations` on, with an unknown load or without."""
+    deviations, _ = _minimised(_in_holds(problem), problem.start, least)
     passes = 0
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         noise = problem.noise(deviations)
-        alone = whitening_of([each[::2] for each in noise], problem.length)
-        whitenings, level = with_load(problem, deviations, alone) if with_loads else ([Whitening(alone)] * len(noise), 0.0)
+        whitening = whitening_of([each[::2] for each in noise], problem.length)
 
-        def moving(deviations: Array, whitenings: Sequence[Whitening] = whitenings) -> tuple[Array, Array]:
+        def moving(deviations: Array, whitening: NoiseModel = whitening) -> tuple[Array, Array]:
             tell()
-            return problem.moving(deviations, whitenings)
+            return problem.moving(deviations, whitening)
 
         deviations, more = _minimised(moving, deviations, least)
         passes += more
-    residuals, slopes = problem.moving(deviations, whitenings)
+    residuals, slopes = problem.moving(deviations, whitening)
     freedom = max(int(np.count_nonzero(residuals)) - len(deviations), 1)
     misfit = float(np.sqrt(np.sum(residuals**2) / freedom))
-    spread = sum(float(np.log1p(window.excess).sum()) for whitening in whitenings for window in whitening.windows)
-    gain = float(np.linalg.slogdet(alone.matrix)[1]) * len(residuals) / len(alone.matrix)
-    evidence = gain - 0.5 * spread - 0.5 * float(residuals @ residuals)
-    return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitenings, slopes), misfit, passes, alone, level, evidence)
+    return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitening, slopes), misfit, passes, whitening)
 
 
-def _scatter(noise: list[Array], whitenings: Sequence[Whitening], slopes: Array) -> Array:
+def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:
     """Covariance of J^T w over realisations that the filter was not made from; sessions are independent, so theirs add up."""
     found, first = np.zeros((slopes.shape[1], slopes.shape[1])), 0
-    for each, whitening in zip(noise, whitenings, strict=True):
+    for each in noise:
         white = whitening(each[1::2]).reshape(len(each[1::2]), -1)
-        own = slopes[first : first + white.shape[1]]
-        pulls = white @ own
-        found += pulls.T @ pulls / len(pulls) + whitening.load_scatter(own)
+        pulls = white @ slopes[first : first + white.shape[1]]
+        found += pulls.T @ pulls / len(pulls)
         first += white.shape[1]
     return found
 

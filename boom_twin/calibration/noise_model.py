@@ -129,60 +129,6 @@ class NoiseModel:
         return np.asarray((values - values @ self.past.sum(axis=0).T) @ self.matrix.T)
 
 
-@dataclass(frozen=True)
-class LoadWindow:
-    """What an unknown load adds to white residuals of blocks `first` to `end` (not included), k directions in all.
-
-    Attributes
-    ----------
-    first, end : int
-    directions : ndarray, shape ((end - first) c, k)
-        Orthonormal.
-    excess : ndarray, shape (k,)
-        Variances along them, those of noise being 1.
-    """
-
-    first: int
-    end: int
-    directions: Array
-    excess: Array
-
-    def whitened(self, white: Array) -> Array:
-        """Of residuals (.., blocks, c) of the window that are white but for the load, those that are white with it."""
-        flat = white.reshape(*white.shape[:-2], -1)
-        share = 1.0 - 1.0 / np.sqrt(1.0 + self.excess)
-        return np.asarray((flat - ((flat @ self.directions) * share) @ self.directions.T).reshape(white.shape))
-
-    def scatter(self, slopes: Array) -> Array:
-        """Covariance (p, p) of J^T w by the load, w and the slopes J (blocks c, p) as `whitened` gives them."""
-        seen = self.directions.T @ slopes
-        return np.asarray(seen.T @ ((self.excess / (1.0 + self.excess))[:, None] * seen))
-
-
-@dataclass(frozen=True)
-class Whitening:
-    """Whitens the residuals of one session: of noise, and in windows of an unknown load if there is one."""
-
-    noise: NoiseModel
-    windows: tuple[LoadWindow, ...] = ()
-
-    def __call__(self, residuals: Array) -> Array:
-        """White residuals, as `NoiseModel` shapes them."""
-        white = self.noise(residuals)
-        for window in self.windows:
-            rows = slice(window.first, window.end)
-            white[..., rows, :] = window.whitened(white[..., rows, :])
-        return white
-
-    def load_scatter(self, slopes: Array) -> Array:
-        """Covariance (p, p) of J^T w by the load, J (blocks c, p) being white slopes."""
-        channels = len(self.noise.matrix)
-        found = np.zeros((slopes.shape[1], slopes.shape[1]))
-        for window in self.windows:
-            found += window.scatter(slopes[window.first * channels : window.end * channels])
-        return found
-
-
 def whitening_of(noise: Sequence[Array], length: float) -> NoiseModel:
     """Fit the filter to realisations, each of shape (k, b, c), of blocks of `length` (s)."""
     order = max(1, round(MEMORY / length))

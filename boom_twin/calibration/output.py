@@ -165,7 +165,6 @@ def as_object(found: Calibration) -> dict[str, Any]:
         "not_told": [str(group) for group in found.groups],
         "held_out": found.held_out,
         "misfit": found.misfit,
-        "load": found.load,
         "passes": found.passes,
         "remarks": list(found.remarks),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
 from .noise_model import block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
 from .unknowns import Unknown, unknowns_of, usual_names
-from .validation import HeldOutResult, discounted, judged
+from .validation import HeldOutResult, judged
 
 KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 MOVED = 0.01  # m, least travel of some stroke
@@ -70,8 +70,6 @@ class Calibration:
         What the sessions do not tell.
     misfit : float
         Root mean square of the white residuals of the fit; 1 where the model explains all but noise.
-    load : float
-        Root mean square of the unknown load at the tip that was taken into account, N; 0 for none.
     passes : int
     sessions : tuple of MeasuredSession
     held_out : str
@@ -89,7 +87,6 @@ class Calibration:
     estimates: tuple[Estimate, ...]
     groups: tuple[InseparableUnknowns, ...]
     misfit: float
-    load: float
     passes: int
     sessions: tuple[MeasuredSession, ...]
     held_out: str
@@ -160,14 +157,11 @@ def calibrate(
     before = judged(scene, settings, mounts, sessions[-1], {}, kept_from)
     progress(0.9, "held out, after")
     after = judged(better, settings, mounts, sessions[-1], zeros, kept_from)
-    if fit.level > 0.0:
-        progress(0.95, "held out, load")
-        before, after = _without_load(problem, fit, groups, sessions[-1], mapped, settings, kept_from, (before, after))
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
-        better, zeros, estimates, tuple(groups), fit.misfit, fit.load, fit.passes, tuple(sessions), held_out, before, after,
-        mapped, tuple(_remarks(problem, fit, sessions, mounts) + _worse(before, after)),
+        better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
+        tuple(_remarks(problem, fit, sessions, mounts) + _worse(before, after)),
     )  # fmt: skip
 
 
@@ -242,31 +236,7 @@ def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Inseparab
     return tuple(found)
 
 
-def _without_load(
-    problem: CalibrationProblem, fit: Fit, groups: Sequence[InseparableUnknowns], session: MeasuredSession, mapped: Mapped,
-    settings: Settings, start: int, judged: tuple[HeldOutResult, HeldOutResult],
-) -> tuple[HeldOutResult, HeldOutResult]:  # fmt: skip
-    """What was held out before and after with the load discounted, which is in these residuals too."""
-    joints, course = len(problem.scene.joints), course_of(session, settings)
-    streams = tuple(problem.parts[0][1].means)
-    blocks = blocks_of(session, course, problem.length, streams, mapped.topics.mounts(joints))
-    names = channel_names(joints, streams)
-    whole = CalibrationProblem(problem.scene, problem.unknowns, [(course, blocks)], names, settings)
-    if whole.channels != problem.channels:
-        return judged
-    untold = {name for group in groups for name in group.names}
-    told = [unknown.name not in untold for unknown in problem.unknowns]
-    trials = [whole.start, np.where(told, fit.deviations, whole.start)]
-    left = discounted(whole, fit, trials, start)
-    return replace(judged[0], discounted=left[0]), replace(judged[1], discounted=left[1])
-
-
 def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
-    if loose := [name for name, each in after.discounted.items() if each > MISFIT]:
-        return [
-            f"On what was held out the residuals of {', '.join(loose)} are more than {MISFIT:g} times what noise and the load "
-            "explain: do not use this result, its intervals are too narrow. Record a quiet session, or a longer one."
-        ]
     worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
     if not worse:
         return []
@@ -282,11 +252,6 @@ def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredS
         found.append(
             f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "
             "parameters cannot make (a fault, another boom, a load that changed). Intervals are widened by it."
-        )
-    if fit.level > 0.0:
-        found.append(
-            f"A load of about {fit.load:.0f} N rms at the tip, made by no parameter, was taken into account: what it explains "
-            "is discounted, in the intervals and in what was held out. If nothing shook the boom, suspect a fault."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,10 +13,7 @@ from ..scene.schema import Scene
 from ..twin.driver import drive
 from ..twin.twin import Twin
 from ..types import NANO, Array, Mount, Residuals, Stream
-from .forward_model import CalibrationProblem
-from .least_squares import Fit
 from .sessions import MeasuredSession
-from .unknown_load import with_load
 
 
 @dataclass(frozen=True)
@@ -30,21 +27,16 @@ class HeldOutResult:
         s after the first of them.
     values, sigmas : ndarray, shape (k, c)
         In the unit of the sensor, and expected.
-    discounted : dict of str to float
-        Root mean square by channel once noise and an unknown load are discounted; empty if none was taken into account.
     """
 
     names: tuple[str, ...]
     times: Array
     values: Array
     sigmas: Array
-    discounted: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def spread(self) -> Array:
         """Root mean square of the normalised residuals of every channel, shape (c,); 1 where all is as expected."""
-        if self.discounted:
-            return np.array([self.discounted.get(name, np.nan) for name in self.names])
         return np.array([_rms(column) for column in (self.values / self.sigmas).T])
 
 
@@ -86,24 +78,6 @@ def judged(
         values[row, at : at + len(residuals.names)] = residuals.values
         sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
     return HeldOutResult(names, times, values, sigmas)
-
-
-def discounted(problem: CalibrationProblem, fit: Fit, trials: Sequence[Array], start: int) -> list[dict[str, float]]:
-    """White residuals of the one session of `problem` from stamp `start` on, with the noise and the load of a fit.
-
-    Returns
-    -------
-    list of dict of str to float
-        Root mean square by channel, for every trial of the unknowns' deviations.
-    """
-    whitenings, _ = with_load(problem, fit.deviations, fit.whitening, fit.level)
-    ((course, blocks),) = problem.parts
-    late = blocks.times[len(fit.whitening.past) :] >= (start - course.start) * NANO
-    found = []
-    for deviations in trials:
-        white = problem.moving(deviations, whitenings)[0].reshape(len(late), -1)[late]
-        found.append(dict(zip(problem.channels, map(_rms, np.where(white == 0.0, np.nan, white).T), strict=True)))
-    return found
 
 
 def _rms(values: Array) -> float:
