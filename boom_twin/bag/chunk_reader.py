@@ -78,15 +78,20 @@ def _groups(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
 
 
 def _overlapping(chunks: ChunkTable) -> Iterator[list[ChunkPlace]]:
-    """Groups of chunks, each later than the one before; within a group in the order of the file."""
+    """Groups of chunks, each later than the one before; within a group in the order of the file.
+
+    A chunk that begins when the group ends is of the group if it stands before one of its chunks: of equal times the order of
+    the file counts.
+    """
     group: list[ChunkPlace] = []
-    end = 0
+    end = last = 0
     for index in chunks.by_time():
-        if group and index.message_start_time >= end:
+        start, place = index.message_start_time, index.chunk_start_offset
+        if group and (start > end or (start == end and place > last)):
             yield sorted(group, key=attrgetter("chunk_start_offset"))
-            group = []
+            group, last = [], 0
         group.append(index)
-        end = max(end, index.message_end_time)
+        end, last = max(end, index.message_end_time), max(last, place)
     yield sorted(group, key=attrgetter("chunk_start_offset"))
 
 

@@ -133,7 +133,8 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
         "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
     }
     figures = sorted({name for row in rows for name in row} - types.keys())
-    types |= dict.fromkeys(figures, pa.float64())
+    words = {name for row in rows for name, value in row.items() if isinstance(value, str)}
+    types |= {name: pa.string() if name in words else pa.float64() for name in figures}
     columns = [pa.array([row.get(name) for row in rows], kind) for name, kind in types.items()]
     sink = pa.BufferOutputStream()
     pq.write_table(pa.table(columns, schema=pa.schema(list(types.items()))), sink)

@@ -78,9 +78,12 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
     """Continuous system x' = A x + white noise of density Q, from the equations in the module's text."""
     n, count, size = len(f.softness), int(f.status[tip.COUNT]), int(tip.states_of(f))
     a, q = np.zeros((size, size)), np.zeros((size, size))
-    for first, time, sigma in ((tip.LOAD, tip.LOAD_TIME, f.level[0]), (tip.ERROR, tip.JERK_TIME, tip.JERKY)):
-        for k in (first, first + 1):
-            a[k, k], q[k, k] = -1.0 / time, 2.0 * sigma**2 / time
+    for k in (0, 1):
+        for place, time, variance in (
+            (tip.LOAD + k, tip.LOAD_TIME, f.level[0] ** 2),
+            (tip.ERROR + k, tip.JERK_TIME, f.pushes[k]),
+        ):
+            a[place, place], q[place, place] = -1.0 / time, 2.0 * variance / time
     for i in range(n):
         q[tip.SHARES + i, tip.SHARES + i] = tip.SOFTENING**2
     places = [0, 1, *range(tip.SHARES, tip.SHARES + 2 * n)]

@@ -26,5 +26,5 @@ def test_duration_and_errors_go_by_the_time_that_passed(shift):
     assert recording.by_first_clock == slice(120)
     times = np.arange(120) * 0.005
     position = predictions.tip_position[:120]
-    errors = TipTruth(times, position, np.zeros((120, 2))).errors(predictions, recording.by_first_clock)
+    errors = TipTruth(times, position, np.zeros((120, 2)), None).errors(predictions, recording.by_first_clock)
     assert errors["tip_error_rms_m"] == pytest.approx(0.0, abs=1e-9)

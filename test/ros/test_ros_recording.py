@@ -100,12 +100,13 @@ def _flat(value: Any) -> Iterator[str]:
 
 
 def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
-    asked = {topic.absolute for topic in [*TOPICS.inputs.values(), *TOPICS.outputs.values()]}
-    assert values.keys() == asked
+    sent = [topic for stream, topic in TOPICS.inputs.items() if stream is not Stream.FORCES]
+    assert values.keys() == {topic.absolute for topic in [*sent, *TOPICS.outputs.values()]}
     sheet = YAML(typ="safe").load((recorded / "session.yaml").read_text())
     assert {count["topic"]: count["written"] for count in sheet["counts"]} == {
         **{name: len(messages) for name, messages in values.items()},
         TOPICS.events.absolute: 0,
+        TOPICS.inputs[Stream.FORCES].absolute: 0,
     }
     assert len(list(recorded.glob("*.mcap"))) >= 3
     assert sheet["scene"] == default_text() + "# a copy\n"  # as the node told it
@@ -147,7 +148,7 @@ def again(recorded: Path, values: Values, tmp_path_factory: pytest.TempPathFacto
     answered = {tuple(message[1:3]) for message in values[TOPICS.outputs[Output.TIP_POSITION].absolute]}
     session, accepted = scan(recorded), tmp_path_factory.mktemp("accepted") / "bag"
     keys = {topic.absolute: stream for stream, topic in TOPICS.inputs.items()}
-    wanted = {name: TYPES[stream] for name, stream in keys.items()}
+    wanted = {name: TYPES[stream] for name, stream in keys.items() if stream is not Stream.FORCES}  # none is sent here
     with SessionWriter(accepted, {stream.value: topic for stream, topic in TOPICS.inputs.items()}) as writer:
         for name, log_time, data, message in read_both(session, wanted):
             if keys[name] is not Stream.STROKES or tuple(list(_flat(message))[:2]) in answered:

@@ -265,10 +265,16 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
-            status, count, _ = advance(
-                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, keep
-            )
-            total += count
+            may_use = keep
+            while True:
+                status, count, _ = advance(
+                    t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, may_use
+                )
+                total += count
+                if status == OK or not may_use:
+                    break
+                forget_all(work)
+                may_use = False  # once more from the step's beginning, with tangents made anew
             at += 1
             if status != OK:
                 return status, row, total, jolt, shake

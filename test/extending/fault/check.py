@@ -14,7 +14,7 @@ from boom_twin.messages.topic_table import load_topics
 from boom_twin.validation.rig.faults import parse, spoil
 from boom_twin.validation.rig.session import RigSession
 
-ANGLE, ONSET, LAST, NANO = 0.15, 4.0, 12.0, 1e-9
+ANGLE, ONSET, LAST, NANO = 0.15, 4.0, 20.0, 1e-9
 RECORDED = (Stream.STROKES, Stream.ANGLES, Stream.IMU)
 session, topics, scene, found = scan(Path(sys.argv[1])), load_topics().inputs, load_scene(), {stream: [] for stream in RECORDED}
 streams, decoder = {f"/{topics[stream].name}": stream for stream in RECORDED}, SampleDecoder(len(scene.joints))
