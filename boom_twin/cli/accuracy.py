@@ -49,7 +49,8 @@ def words(chosen: tuple[Stream, ...]) -> str:
 def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
     """The accuracy at every posture: as values for ``--json``, and as lines."""
     values: dict[str, Any] = {}
-    lines = ["", "Accuracy of the estimate at rest, while an unknown load of about 60 N acts at the tip (standard deviations)"]
+    acting = "an unknown load of 1 % of the boom's weight acts at the tip"
+    lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:

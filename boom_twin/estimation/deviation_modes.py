@@ -17,6 +17,7 @@ from ..errors import BoomTwinError
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
 from ..scene.schema import Scene
+from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
 from .sensor_model import Mounting
 from .tip_estimate import (
@@ -31,6 +32,8 @@ from .tip_estimate import (
     DeviationFilter,
 )
 
+LOADS = np.array([0.0023, 0.031, 0.0092])
+"""See `DeviationFilter.loads`, as shares of the boom's weight: 15, 200 and 60 N of the 6.5 kN of the default one."""
 HIGHEST = 25.0  # Hz; what is faster follows a load without vibration of its own
 WIDTH = 1e-3  # relative accuracy of frequencies
 POSTURE_STEP = 0.03  # m of stroke after which the modes are made anew
@@ -66,7 +69,7 @@ class DeviationModes:
         """A new run: nothing is known of the deviation."""
         f = self.filter
         f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = 0
-        f.level[0], self._at[:] = USUAL_LOAD, math.inf
+        f.level[0], self._at[:] = f.loads[USUAL_LOAD], math.inf
         f.last[:], f.spread[:] = 0.0, 0.0
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
@@ -151,7 +154,8 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n), 
         pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
-        spread=np.zeros((2, 2)), level=np.full(1, USUAL_LOAD), last=np.zeros(len(noise)), now=np.zeros(4),
+        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * explain(scene).mass * math.hypot(*scene.gravity),
+        last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip
 
 

@@ -48,11 +48,11 @@ from ..types import NANO, Array
 MODES = 6  # at most
 LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
-LEAST_LOAD, MOST_LOAD, USUAL_LOAD = 15.0, 200.0, 60.0  # N, of the load's standard deviation
+LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
 SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
 AGILITY = 1.0  # 1/s, by which the load's level follows the innovations
-UNLIKELY = 4.0  # innovations beyond so many deviations count less, in proportion: a spike moves little
+UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
 INEXACT = 0.05  # share of the deviation that modes and static corrections may be wrong by
@@ -89,6 +89,7 @@ class DeviationFilter(NamedTuple):
     coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m. variances : (n,) of the strokes' estimates, m^2.
     pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. last : (c,) innovations. level : (1,) N.
+    loads : (3,) least and largest level, and the usual one that it begins with, N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
     now : (4,) see `ANGLE`.
@@ -124,6 +125,7 @@ class DeviationFilter(NamedTuple):
     rows: Array
     spread: Array
     level: Array
+    loads: Array
     last: Array
     now: Array
 
@@ -161,6 +163,18 @@ def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
     steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
     for _ in range(steps):
         step_state(f, h / steps)
+    if not is_finite(f):
+        start_state(f)
+        f.status[FED] = 0
+
+
+@inner
+def is_finite(f):
+    """Whether state and variances are numbers: readings near the largest that are taken may have driven them beyond."""
+    total = 0.0
+    for k in range(states_of(f)):
+        total += abs(f.x[k]) + f.p[k, k]
+    return math.isfinite(total)
 
 
 @inner
@@ -172,7 +186,7 @@ def start_state(f):
         for b in range(f.x.shape[0]):
             f.p[k, b] = 0.0
     for b in range(2):
-        add_unknown(f, b, USUAL_LOAD)
+        add_unknown(f, b, f.loads[USUAL_LOAD])
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
     for i in range(n):
         if f.softness[i] > 0.0:
@@ -180,7 +194,7 @@ def start_state(f):
         add_unknown(f, 2 + n + i, f.sections_off[i])
     for j in range(f.status[COUNT]):
         at = size - 2 * (f.status[COUNT] - j)
-        swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * USUAL_LOAD / (f.omega[j] * f.omega[j])
+        swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
         f.p[at, at] += swing * swing
         f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
     f.status[STARTED] = 1
@@ -441,7 +455,7 @@ def take_angles(f, residuals, first, stamp):
     if count > 0 and stamp > f.status[ANGLES_STAMP]:
         h = min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP)
         level = f.level[0] * math.exp(AGILITY * h * alike / math.sqrt(count))
-        f.level[0] = min(max(level, LEAST_LOAD), MOST_LOAD)
+        f.level[0] = min(max(level, f.loads[LEAST_LOAD]), f.loads[MOST_LOAD])
         f.status[ANGLES_STAMP] = stamp
 
 
@@ -502,7 +516,7 @@ def correct(f, channel, residual, variance, age):
     alike = min(max(innovation * f.last[channel], -ALIKE), ALIKE)
     f.last[channel] = innovation
     if abs(innovation) > UNLIKELY:
-        spread *= abs(innovation) / UNLIKELY
+        spread *= (innovation / UNLIKELY) ** 2
     for k in range(size):
         share = gain[k] / spread
         x[k] += share * off

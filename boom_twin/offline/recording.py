@@ -284,6 +284,11 @@ class Recording:
         return self.whole.predictions
 
     @property
+    def estimates(self) -> EstimateBlock:
+        """The estimates beside them."""
+        return self.whole.estimates
+
+    @property
     def health(self) -> list[Health]:
         """All that was told of the rig's health, see `whole`."""
         return self.whole.health

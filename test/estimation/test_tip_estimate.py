@@ -325,3 +325,35 @@ def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
         e = estimates[-1]
         errors.append((e.tip[:2] - truth["tip"]) / np.sqrt(e.tip_covariance[[0, 3]]))
     assert 0.3 < math.sqrt(float(np.mean(np.square(errors)))) < 1.6
+
+
+def test_absurd_readings_leave_an_estimate(scene: Scene) -> None:
+    """A sensor that reads millions for a while; afterwards the estimate is where it was."""
+    samples, truth = pseudo_session(scene, scene, 6.0, 4)
+    twin, ends = Twin(scene), []
+    for sample in samples:
+        is_spoilt = sample.stream is Stream.ANGLES and 1_000_000_000 < sample.stamp < 1_500_000_000
+        report = twin.update(Sample(sample.stream, sample.stamp, sample.values + 9e6) if is_spoilt else sample)
+        if report.estimate is not None:
+            assert np.isfinite(row_of(report.estimate)).all()
+            ends.append(report.estimate)
+    assert np.abs(ends[-1].tip[:2] - truth["tip"]).max() < 5e-3
+
+
+@pytest.mark.parametrize("drop", ["k", "beam"])
+def test_a_boom_without_springs_or_beams_has_one_too(scene: Scene, drop: str) -> None:
+    """Incompressible cylinders, or rigid sections on springs: fewer modes, no shares of what is not there."""
+    content = scene.model_dump(exclude_none=True)
+    if drop == "k":
+        for joint in content["joints"]:
+            joint["cylinder"].pop("k"), joint["cylinder"].pop("d", None)
+    else:
+        content["modes"] = 0
+    other = Scene.model_validate(content)
+    samples, _ = pseudo_session(other, other, 2.0, 5)
+    twin = Twin(other)
+    estimates = [report.estimate for report in map(twin.update, samples) if report.estimate is not None]
+    f = twin._modes.filter
+    assert np.isfinite(row_of(estimates[-1])).all() and (estimates[-1].tip_covariance[[0, 3, 5]] > 0.0).all()
+    if drop == "k":
+        assert not f.x[tip.SHARES : tip.SHARES + 4].any()
