@@ -151,7 +151,7 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         softness=np.array([0.0 if joint.cylinder.k is None else 1.0 / joint.cylinder.k for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
-        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n), 
+        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
         pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
         spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * explain(scene).mass * math.hypot(*scene.gravity),
