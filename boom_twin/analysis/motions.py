@@ -56,12 +56,12 @@ class Motion:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         x = np.clip(np.asarray(times, float) / self.rise, 0.0, 1.0)[:, None]
-        place, rate, _ = _quintic(x)
+        place, rate, _ = quintic(x)
         return self.first + place * self.travel, rate / self.rise * self.travel
 
     def at(self, time: float) -> tuple[Array, Array, Array]:
         """Strokes (m), rates (m/s) and accelerations (m/s^2), each (n,), at one `time` (s)."""
-        place, rate, bend = _quintic(min(max(time / self.rise, 0.0), 1.0))
+        place, rate, bend = quintic(min(max(time / self.rise, 0.0), 1.0))
         return self.first + place * self.travel, rate / self.rise * self.travel, bend / self.rise**2 * self.travel
 
 
@@ -101,7 +101,7 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     return Motion(label, angles, first, travel, RISE, duration)
 
 
-def _quintic(x: T) -> tuple[T, T, T]:
+def quintic(x: T) -> tuple[T, T, T]:
     """From 0 to 1 over x in [0, 1] with two derivatives, which vanish at both ends."""
     y = 1.0 - x
     return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x)

@@ -28,6 +28,7 @@ from .tip_estimate import (
     ACCELERATION_COVARIANCE,
     FORCE_VARIANCE,
     TIP_COVARIANCE,
+    VARIANCES,
     WIDTH,
     advance_estimate,
     take_angles,
@@ -90,9 +91,9 @@ def accuracy_at(
     noise = stroke_noise(plan, live, work, spectrum)
     modes.begin()
     modes.refresh(strokes, angles, noise)
-    row = boom.compiled.row
+    row, results = boom.compiled.row, first_row(plan, live)
     row[:] = 0.0
-    row[: len(first_row(plan, live))] = first_row(plan, live)
+    row[: len(results)] = results
     boom.variances[:] = SHARE * settings.stroke_variance * quietest[0] / rate
     moments, out = boom.compiled.bending @ live.z, np.zeros(WIDTH)
     counts = np.array([sum(each is stream for each in sensors) for stream in SENSORS])
@@ -101,7 +102,7 @@ def accuracy_at(
     run_covariance(
         modes.filter, live, row, size, moments, gravity, counts, round(SECOND / rate), round(SETTLED * rate), zeros, out
     )
-    tip, acceleration = (out[np.array([0, 3, 5]) + first] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
+    tip, acceleration = (out[first + np.array(VARIANCES)] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
     return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))
 
 

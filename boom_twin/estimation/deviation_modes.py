@@ -129,11 +129,12 @@ class DeviationModes:
         f.decay[j] = 2.0 * damping_ratio(plan, mode) * f.omega[j]
         f.forces[j] = sign * mode.increments[plan.tables.cylinders.z]
         f.bending[j] = sign * (self._bending @ mode.increments)
-        frames = sign * along(plan, state, self._work, mode.increments, lambda: state.frames.copy())
-        f.relative[:, j] = _relative(state.frames, frames)
-        f.turns[j] = sign * along(
-            plan, state, self._work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints
-        )
+
+        def read() -> Array:
+            return np.concatenate([state.frames.ravel(), taken_apart(plan, first_row(plan, state)).joints])
+
+        frames, f.turns[j] = np.split(sign * along(plan, state, self._work, mode.increments, read), [state.frames.size])
+        f.relative[:, j] = _relative(state.frames, frames.reshape(state.frames.shape))
         return np.asarray(sign * mode.motion)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis.drive import PASSES, TOLERANCE
 from ..analysis.equilibrium import settle
+from ..analysis.motions import quintic
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..errors import SolverError, UsageError
@@ -112,8 +113,8 @@ class _TestMove:
         scheme = prepare(GENERALISED_ALPHA, self._rho, step, self._weights)
         for k in range(1, count + 1):
             x = min(max((start + k * step) / RISE, 0.0), 1.0)
-            lengths = self._first + self._way * (x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
-            rates = self._way * (30.0 * x**2 * (1.0 - x) ** 2 / RISE)
+            share, rate, _ = quintic(x)
+            lengths, rates = self._first + share * self._way, rate / RISE * self._way
             status, _, _ = advance(t, state, work, scheme, lengths, rates, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
             if status != OK:
                 raise SolverError("the test move cannot be stepped")

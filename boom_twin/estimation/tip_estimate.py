@@ -66,6 +66,8 @@ WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
 """First places in a row of an estimate: x, y, angle of the tip (3); their second derivatives (3); load (2); covariances of the
 first two, upper triangles by rows (6 each); variances of the load (2). SI."""
+VARIANCES = [0, 3, 5]
+"""Places of the variances in such a triangle."""
 
 COUNT, STARTED, FED, STAMP, ANGLES_STAMP = range(5)  # of `status`
 ANGLE, FELT_X, FELT_Y, STEP = range(4)
@@ -133,7 +135,13 @@ class DeviationFilter(NamedTuple):
 @inner
 def states_of(f):
     """Number of states: the first places, and those of the modes that there are."""
-    return SHARES + 2 * f.softness.shape[0] + 2 * f.status[COUNT]
+    return mode_place(f, f.status[COUNT])
+
+
+@inner
+def mode_place(f, j):
+    """Place in the state of the coordinate of mode j; its rate is behind it."""
+    return SHARES + 2 * f.softness.shape[0] + 2 * j
 
 
 @inner
@@ -180,7 +188,7 @@ def is_finite(f):
 @inner
 def start_state(f):
     """What is not known at the start: load and shares, with the deflection that they have caused, and vibration beside."""
-    n, size = f.softness.shape[0], states_of(f)
+    n = f.softness.shape[0]
     for k in range(f.x.shape[0]):
         f.x[k] = 0.0
         for b in range(f.x.shape[0]):
@@ -193,7 +201,7 @@ def start_state(f):
             add_unknown(f, 2 + i, SCENE_ERROR)
         add_unknown(f, 2 + n + i, f.sections_off[i])
     for j in range(f.status[COUNT]):
-        at = size - 2 * (f.status[COUNT] - j)
+        at = mode_place(f, j)
         swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
         f.p[at, at] += swing * swing
         f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
@@ -207,7 +215,7 @@ def add_unknown(f, b, deviation):
     clear(f.row, size)
     f.row[input_place(b)] = deviation
     for j in range(f.status[COUNT]):
-        at = size - 2 * (f.status[COUNT] - j)
+        at = mode_place(f, j)
         f.row[at] = deviation * f.coupling[j, b] / (f.omega[j] * f.omega[j])
     for k in range(size):
         for i in range(size):
@@ -273,7 +281,7 @@ def follow_errors(f):
 
 @inner
 def oscillate(omega, decay, h):
-    """What position and rate of q'' + decay q' + omega^2 q = 0 become within h (s): a 2 by 2 matrix by rows."""
+    """What position and rate of q'' + decay q' + omega^2 q = 0 become within h (s): a 2 by 2 matrix by rows, exact."""
     half = 0.5 * decay
     wave2 = omega * omega - half * half
     if wave2 > 0.0:
@@ -285,7 +293,7 @@ def oscillate(omega, decay, h):
         if wave > 0.0:
             s = math.sinh(wave * h) / wave
     e = math.exp(-half * h)
-    return e * (c + half * s), e * s, -omega * omega * e * s, e * (c - half * s)
+    return e * (c + half * s), e * s, e * (-omega * omega * s), e * (c - half * s)
 
 
 @inner
@@ -295,7 +303,7 @@ def step_state(f, h):
     x, p, row = f.x, f.p, f.row
     step_inputs(f, 0.5 * h, size)
     for j in range(f.status[COUNT]):
-        c, at = f.coupling[j], size - 2 * (f.status[COUNT] - j)
+        c, at = f.coupling[j], mode_place(f, j)
         a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], h)
         g1, g2 = (1.0 - a11) / (f.omega[j] * f.omega[j]), -a21 / (f.omega[j] * f.omega[j])
         force = 0.0
@@ -367,7 +375,7 @@ def read_tip(f, axis, row):
     for i in range(n):
         row[SHARES + i] = f.lever[i, axis] * f.drawn[i]
     for j in range(f.status[COUNT]):
-        at, still = size - 2 * (f.status[COUNT] - j), f.tip[j, axis] / (f.omega[j] * f.omega[j])
+        at, still = mode_place(f, j), f.tip[j, axis] / (f.omega[j] * f.omega[j])
         row[at] = f.tip[j, axis]
         for i in range(n):
             row[SHARES + i] -= still * f.coupling[j, 2 + i]
@@ -383,7 +391,7 @@ def read_angle(f, i, row):
             row[SHARES + k] = f.drawn[k] / f.slopes[k]
             variance += f.variances[k] / (f.slopes[k] * f.slopes[k])
     for j in range(f.status[COUNT]):
-        at, still = size - 2 * (f.status[COUNT] - j), f.turns[j, i] / (f.omega[j] * f.omega[j])
+        at, still = mode_place(f, j), f.turns[j, i] / (f.omega[j] * f.omega[j])
         row[at] = f.turns[j, i]
         for k in range(n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
@@ -398,7 +406,7 @@ def read_force(f, i, row):
     n, size = f.softness.shape[0], states_of(f)
     clear(row, size)
     for j in range(f.status[COUNT]):
-        at, still = size - 2 * (f.status[COUNT] - j), f.forces[j, i] / (f.omega[j] * f.omega[j])
+        at, still = mode_place(f, j), f.forces[j, i] / (f.omega[j] * f.omega[j])
         row[at] = f.forces[j, i]
         for k in range(2 * n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
@@ -411,7 +419,7 @@ def read_acceleration(f, x, y, turn, turned, row):
     clear(row, size)
     row[ERROR], row[ERROR + 1] = x, y
     for j in range(f.status[COUNT]):
-        at = size - 2 * (f.status[COUNT] - j)
+        at = mode_place(f, j)
         along = x * f.tip[j, 0] + y * f.tip[j, 1] + turn * f.tip[j, 2]
         row[at] = -f.omega[j] * f.omega[j] * along + turned * f.tip[j, 2]
         row[at + 1] = -f.decay[j] * along
@@ -430,22 +438,26 @@ def clear(row, size):
 
 
 @inner
-def feed(f):
-    """From now on the filter runs: something was measured, and what cylinders may be off by will show."""
-    if f.status[FED] == 0:
+def age_of(f, stamp):
+    """Age (s) of what was measured at `stamp` (ns). The filter runs from the first reading on that is not too old.
+
+    What cylinders may be off by will then show.
+    """
+    age = (f.status[STAMP] - stamp) * NANO
+    if f.status[FED] == 0 and age <= OLDEST:
         f.status[FED] = 1
         for i in range(f.softness.shape[0]):
             if f.softness[i] > 0.0:
                 add_unknown(f, 2 + i, SOFT)
+    return age
 
 
 @inner
 def take_angles(f, residuals, first, stamp):
     """Use what angle sensors read at `stamp` (ns) less what they should have read (rad, NaN = not measured)."""
-    age = (f.status[STAMP] - stamp) * NANO
+    age = age_of(f, stamp)
     if age > OLDEST:
         return
-    feed(f)
     alike, count = 0.0, 0
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
@@ -462,10 +474,9 @@ def take_angles(f, residuals, first, stamp):
 @inner
 def take_imu(f, residuals, first, stamp):
     """Likewise of the tip IMU's x and z, m/s^2."""
-    age = (f.status[STAMP] - stamp) * NANO
+    age = age_of(f, stamp)
     if age > OLDEST:
         return
-    feed(f)
     c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
     if usable(f, first, residuals[0]):
         read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
@@ -478,10 +489,9 @@ def take_imu(f, residuals, first, stamp):
 @inner
 def take_forces(f, residuals, first, stamp):
     """Likewise of the cylinder forces, N."""
-    age = (f.status[STAMP] - stamp) * NANO
+    age = age_of(f, stamp)
     if age > OLDEST:
         return
-    feed(f)
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
             read_force(f, i, f.row)
@@ -501,7 +511,7 @@ def correct(f, channel, residual, variance, age):
     x, p, row, gain = f.x, f.p, f.row, f.gain
     if age > 0.0:
         for j in range(f.status[COUNT]):
-            at = size - 2 * (f.status[COUNT] - j)
+            at = mode_place(f, j)
             a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
             row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
     spread, off = variance, residual

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
+from ..estimation.tip_estimate import VARIANCES
 from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
 from ..plots.extreme_rows import ExtremeRows
 from ..plots.health import slow_part
@@ -203,7 +204,8 @@ def _estimate_trace(stretch: Stretch) -> EstimateTrace:
     estimates, predictions = stretch.estimates, stretch.predictions
     fed = estimates.is_fed[:, None]
     rigid = predictions.tip_position - predictions.tip_displacement
-    variances = estimates.tip_covariance[:, [0, 3]], estimates.acceleration_covariance[:, [0, 3]], estimates.load_variance
+    xy = VARIANCES[:2]
+    variances = estimates.tip_covariance[:, xy], estimates.acceleration_covariance[:, xy], estimates.load_variance
     told = estimates.tip[:, :2] - rigid, estimates.acceleration[:, :2], estimates.load
     return EstimateTrace(*(np.where(fed, each, np.nan) for each in (*told, *map(np.sqrt, variances))))
 

@@ -14,6 +14,7 @@ from typing import IO, Any, Protocol
 import numpy as np
 
 from ..errors import UsageError
+from ..estimation.tip_estimate import VARIANCES
 from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, Array, Stream, channels_of
 from .recording import Stretch
@@ -27,8 +28,6 @@ ESTIMATED = (
 )  # fmt: skip
 """Names of what is estimated, each with ``estimate_`` before it, and with ``estimate_sigma_`` for its standard deviation."""
 NEVER = np.iinfo(np.int64).min
-VARIANCES = [0, 3, 5]
-"""Places of the variances in an upper triangle by rows."""
 
 
 def predicted_columns(joints: int) -> list[str]:

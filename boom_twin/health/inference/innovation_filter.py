@@ -29,6 +29,7 @@ import numpy as np
 from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
 from ...estimation.sensor_model import Reading, specific_force
+from ...estimation.tip_estimate import oscillate
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
 
@@ -91,14 +92,7 @@ def modes_of(
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
     """What position and velocity of eta'' + decay eta' + omega^2 eta = 0 become within h (s); shape (2, 2), exact."""
-    half = 0.5 * decay
-    wave2 = omega * omega - half * half
-    wave = math.sqrt(abs(wave2))
-    if wave2 > 0.0:
-        c, s = math.cos(wave * h), math.sin(wave * h) / wave
-    else:
-        c, s = math.cosh(wave * h), (math.sinh(wave * h) / wave if wave > 0.0 else h)
-    return math.exp(-half * h) * np.array([[c + half * s, s], [-omega * omega * s, c - half * s]])
+    return np.array(oscillate(omega, decay, h)).reshape(2, 2)
 
 
 def _shown(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> Array:
