@@ -41,6 +41,11 @@ class Process:
     def pid(self) -> int:
         return self._child.pid
 
+    def processor_s(self) -> float:
+        """Processor time of the child so far, s: unlike the clock, it stands still while other processes have the cores."""
+        fields = Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def said(self) -> str:
         return self._log.read_text()
 
