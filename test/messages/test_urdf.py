@@ -17,7 +17,7 @@ from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy
 from boom_twin.messages.urdf import urdf
 from boom_twin.scene.kinematics import PassiveJoints, skeleton, strokes_of_posture
-from boom_twin.scene.load import example_text, examine_text
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children

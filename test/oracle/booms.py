@@ -98,9 +98,8 @@ def vary_cylinders(joints, seed):
             bore = float(rng.uniform(0.06, 0.12))
             lines = {name: float(rng.uniform(3e-4, 2e-3)) for name in ("cap_line", "rod_line")}
             del joint["cylinder"]["k"]
-            joint["cylinder"]["oil"] = {
-                "bore": bore, "rod": bore * float(rng.uniform(0.5, 0.75)), "bulk_modulus": float(rng.uniform(0.8e9, 1.7e9)), **lines
-            }  # fmt: skip
+            rod, modulus = bore * float(rng.uniform(0.5, 0.75)), float(rng.uniform(0.8e9, 1.7e9))
+            joint["cylinder"]["oil"] = {"bore": bore, "rod": rod, "bulk_modulus": modulus, **lines}
 
 
 def turn_over(joint):

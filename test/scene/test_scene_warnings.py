@@ -46,7 +46,7 @@ UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (j(1, "cylinder", "oil"), OIL | {"bore": 100.0}, "joints[1].cylinder.oil.bore", ("mm?", "100 mm is 0.1")),
     (j(1, "cylinder", "oil"), OIL | {"bulk_modulus": 1.5}, "joints[1].cylinder.oil.bulk_modulus", ("GPa", "1.4e9")),
     (j(1, "cylinder", "oil"), OIL | {"cap_line": 2.0}, "joints[1].cylinder.oil.cap_line", ("litres?", "1e-3")),
-    (j(1, "cylinder", "oil"), OIL | {"rod_line": 0.0}, "joints[1].cylinder.oil.rod_line", ("full stroke, 0.42 m", "incompressible")),
+    (j(1, "cylinder", "oil"), OIL | {"rod_line": 0.0}, "joints[1].cylinder.oil.rod_line", ("full stroke, 0.42 m",)),
     (("gravity",), [0.0, -1.62], "gravity", ("9.81", "[0.0, -9.81]")),
     (("gravity",), [0.0, 9.81], "gravity", ("upwards",)),
     (("postures", "bent"), [1.05, 0.35, -0.52, -1.4], "postures.bent", ("radians?", "degrees")),
