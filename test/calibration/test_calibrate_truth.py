@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.sessions import ENCODERS, cut_to, made, off
+from calibration.sessions import ENCODERS, Made, cut_to, made, off
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
 from boom_twin.calibration.output import write_scene
 from boom_twin.scene.edit import anew, parameter
 from boom_twin.scene.schema import Oil
+from boom_twin.validation import rig
 
 
 def expected(name, truth, zeros):
@@ -106,7 +107,9 @@ def test_oil_gets_another_bulk_modulus(two_sections, tmp_path):
     cylinder = first.cylinder.model_copy(update={"k": None, "oil": oil})
     scene = two_sections.model_copy(update={"joints": (first.model_copy(update={"cylinder": cylinder}), *rest)})
     truth = off(scene, 0.9, 1.1)
-    bag = made(truth, "arch", 24.0, 4).write(tmp_path / "bag", 1, imu=False)
+    programme = rig.random_programme(truth, "arch", 24.0, 4)
+    rows = rig.simulate(truth, programme, 24.0, 2e-3, 2e-3, 6)
+    bag = Made(truth, programme, rows).write(tmp_path / "bag", 1, imu=False)
     found = calibrate([bag], scene, Choice(zeros="angles"))
     write_scene(found, scene, anew(scene), tmp_path / "new.yaml", "by a test")
     now = load_scene(tmp_path / "new.yaml").joints[0].cylinder
