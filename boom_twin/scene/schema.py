@@ -93,9 +93,9 @@ class CylinderPart(Part):
 class Oil(Part):
     """Oil shut in both chambers: diameters of piston and rod (m), bulk modulus (Pa), oil in the lines of each side (m^3)."""
 
-    bore: Positive
+    bore: Annotated[float, Field(ge=1e-3, le=LARGEST, allow_inf_nan=False)]
     rod: Positive
-    bulk_modulus: Positive
+    bulk_modulus: Annotated[float, Field(ge=1e7, le=1e11)]
     cap_line: NotNegative
     rod_line: NotNegative
 
@@ -107,7 +107,7 @@ class Oil(Part):
     @property
     def rod_area(self) -> float:
         """Area of the piston on the side of the rod, m^2."""
-        return 0.25 * math.pi * (self.bore**2 - self.rod**2)
+        return 0.25 * math.pi * (self.bore - self.rod) * (self.bore + self.rod)
 
 
 class Cylinder(Part):
@@ -152,7 +152,7 @@ class Joint(Part):
     cylinder: Cylinder
 
     @property
-    def turn(self) -> float:
+    def side_sign(self) -> float:
         """Side of D->E on which the links meet: 1 left, -1 right."""
         return -1.0 if self.side == "right" else 1.0
 

@@ -139,7 +139,7 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Iterator[Finding]:
     place, oil = ("joints", i, "cylinder"), cylinder.oil
     if cylinder.d is not None and not cylinder.is_compressible:
         bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
-        remedy = "Give k, stiffness of the oil spring in N/m, or `oil`, or remove d."
+        remedy = "Give k, stiffness of the oil spring in N/m, or remove d."
         yield fault(draft, (*place, "d"), cylinder.d, bound, remedy)
     if oil is None:
         return
@@ -222,8 +222,6 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
     elif key == "k" and value < 1e4:
         yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
-    elif key == "bulk_modulus" and not 1e8 <= value <= 1e10:
-        yield warning(draft, place, value, "not from 1e8 to 1e10 Pa: GPa, MPa or bar?", "Give Pa: oil has 1.4e9 to 1.7e9.")
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
