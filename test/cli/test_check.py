@@ -46,9 +46,7 @@ def test_check_takes_a_file_and_prints_its_warnings(tmp_path: Path, capsys: pyte
     assert "Warnings: 1\n" in out and "joints[0].cylinder.k = 40.0: less than 1e4 N/m: kN/mm?" in out
 
 
-def test_the_z_fold_example_is_printed_and_checks_without_a_warning(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_z_fold_example_is_printed_and_checks_without_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scene", "--example", "five_section_z_fold"]) == 0
     path = tmp_path / "z.yaml"
     path.write_text(capsys.readouterr().out, encoding="utf-8")
