@@ -24,6 +24,7 @@ from boom_twin.plots.boom import (
 from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Joint, section_depth
 
 SURROGATE = "drawn from the default scene (surrogate parameters)"
@@ -199,6 +200,35 @@ def _rod_pin(axes: Any, joint: JointPins) -> None:
         leader(axes, middle, "R[1], left of Q→E (here −)", (-70, 92))
 
 
+def side_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
+    """Joint `i` (0-based) at angle `phi` (rad), and the same turned over, at the opposite angle."""
+    part = scene.joints[i]
+    points = {key: (point[0], -point[1]) for key in ("C", "D", "E", "R") if (point := getattr(part, key)) is not None}
+    joints = [*scene.joints[:i], part.model_copy(update=points | {"side": "right"}), *scene.joints[i + 1 :]]
+    over = scene.model_copy(update={"joints": tuple(joints)})
+    x = sum(section.length for section in scene.sections[:i])
+    panels = [((x - 1.05, x + 0.75), (-0.72, 0.52)), ((x - 1.05, x + 0.75), (-0.52, 0.72))]
+    title = "side: Q lies to the left of D→E, or to the right of it"
+    with sheet(path, title, panels, 4.6) as both:
+        for axes, drawn, turn, told in zip(both, (scene, over), (phi, -phi), ("left (default)", "right"), strict=True):
+            angles = np.zeros(len(scene.sections))
+            angles[i] = turn
+            bones = skeleton(drawn, angles)
+            _linkage(axes, drawn, bones, i)
+            _side(axes, bones.joints[i], f"side: {told}", float(np.sign(-turn)))
+
+
+def _side(axes: Any, joint: JointPins, told: str, up: float) -> None:
+    """The arrow from D to E, and names; `up` is 1 where the links are above the section, -1 where they are below."""
+    assert joint.d is not None and joint.e is not None and joint.q is not None
+    look = {"arrowstyle": "-|>", "color": ORANGE, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 4, "mutation_scale": 20}
+    axes.annotate("", tuple(joint.e), tuple(joint.d), arrowprops=look, zorder=11)
+    for point, text, offset in ((joint.d, "D", (-16, -14)), (joint.e, "E", (15, -6)), (joint.q, "Q", (0, 18))):
+        name(axes, point, text, (offset[0], up * offset[1]))
+    name(axes, joint.barrel_pin, "C", (0, up * 20))
+    name(axes, joint.pivot + np.array([-0.45, -up * 0.35]), told, (0, 0), ORANGE)
+
+
 def main() -> None:
     """Write every picture into the folder that is given, by default beside this script."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else __file__)
@@ -211,6 +241,10 @@ def main() -> None:
     for i, degrees in ((1, -42.0), (2, -42.0), (3, -42.0)):
         assert np.isfinite(stroke_curve(scene, i, np.radians([degrees]))).all()
         six_bar_figure(scene, i, float(np.radians(degrees)), out / f"symbols_b{i}.png")
+    side_figure(scene, 1, float(np.radians(-42.0)), out / "symbols_side.png")
+    example, _ = examine_text(example_text("five_section_z_fold"), "example")
+    title = "Five-section Z-fold boom, posture arch: at rest under gravity"
+    boom_picture(example, statics(example, posture="arch"), out / "z_fold_arch.png", title, "synthetic parameters")
 
 
 if __name__ == "__main__":

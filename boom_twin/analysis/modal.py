@@ -29,6 +29,7 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
+from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.tables import OK, SENTENCES, Condensed, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
@@ -56,11 +57,14 @@ class Mode:
         Of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
     motion : ndarray, shape (histories,)
         Of every mass point and angle.
+    drives : ndarray, shape (n,)
+        Lengths of the drives at the equilibrium, m.
     """
 
     frequency: float
     increments: Array
     motion: Array
+    drives: Array
 
 
 def constraints(plan: Plan) -> int:
@@ -92,8 +96,8 @@ def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array
 
 def _drive(plan: Plan, state: State, work: Work) -> Array:
     """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
-    t = plan.tables
-    return np.array([work.position[c.history] - c.compliance * state.z[c.z] for c in t.cylinders])
+    cylinders = plan.tables.cylinders
+    return np.asarray(work.position[cylinders.history] - plan.compliances(state.drives[0]) * state.z[cylinders.z])
 
 
 def _negative_eigenvalues(blocks: Array) -> int:
@@ -158,7 +162,7 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
         if not 0.0 < size < math.inf:
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
         motion, increments = motion / size, increments / size
-    return Mode(omega / (2.0 * math.pi), increments, motion)
+    return Mode(omega / (2.0 * math.pi), increments, motion, state.drives[0].copy())
 
 
 def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -> Array:
@@ -345,8 +349,9 @@ def damping_ratio(plan: Plan, mode: Mode) -> float:
     """Of critical, by the power that oil dampers and beams take from the mode at its own frequency."""
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
     loss = 0.0
-    for cylinder in t.cylinders:
-        loss += cylinder.lag * cylinder.compliance * mode.increments[cylinder.z] ** 2
+    for cylinder, drive in zip(t.cylinders, mode.drives, strict=True):
+        compliance, lag = compliance_and_lag(cylinder, t.oils, drive)
+        loss += lag * compliance * mode.increments[cylinder.z] ** 2
     for row, beam in enumerate(t.beams):
         q = mode.increments[beam.z : beam.z + beam.bending]
         loss += beam.beta * float(q @ t.stiffness[row, : len(q), : len(q)] @ q)

@@ -11,6 +11,7 @@ from ..errors import Fault
 from ..estimation.stroke_filter import filter_band
 from ..scene import Scene
 from ..scene.load import DEFAULT_NAME, examine
+from ..scene.oil_spring import STATIONS
 from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
@@ -83,6 +84,7 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "stroke_lag_at_rest_s": [float(lags[0]) for _, lags in _bands()],
         "stroke_low_m": [joint.stroke_low for joint in joints],
         "stroke_high_m": [joint.stroke_high for joint in joints],
+        "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
         "warnings": [str(oddity) for oddity in oddities],
     }
@@ -106,6 +108,8 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
     lines += ["", "Sections", *_indent(_sections(account))]
     lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
+    if any(joint.k_over_stroke for joint in account.joints):
+        lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_indent(_over_stroke(account))]
     if scene.clearance is not None and account.pins:
         lines += ["", _clearance_title(scene.clearance), *_indent(_pins(account))]
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
@@ -155,15 +159,24 @@ def _cylinders(account: Account) -> list[str]:
         low, high = joint.range_deg
         used = f"{joint.stroke_low:.3f} to {joint.stroke_high:.3f}"
         reach = [f"{low:g} to {high:g}", used, f"{joint.max_stroke:g}"]
-        rows.append([f"joint {joint.number}", joint.kind, *reach, _oil(joint)])
+        kind = f"{joint.kind}, right" if joint.side == "right" else joint.kind
+        rows.append([f"joint {joint.number}", kind, *reach, _oil(joint)])
     return _table(rows, left=6)
 
 
 def _oil(joint: JointAccount) -> str:
-    if joint.k is None:
-        return "incompressible"
     damping = f"d = {joint.d / 1e3:.4g} kN s/m" if joint.d else "no damping"
-    return f"k = {joint.k / 1e6:.4g} kN/mm, {damping}"
+    if joint.k_over_stroke:
+        return f"by the oil over the stroke, {damping}"
+    return "incompressible" if joint.k is None else f"k = {joint.k / 1e6:.4g} kN/mm, {damping}"
+
+
+def _over_stroke(account: Account) -> list[str]:
+    rows = [["of the full stroke", *(f"{share:.0%}" for share in STATIONS)]]
+    for joint in account.joints:
+        if joint.k_over_stroke:
+            rows.append([f"cylinder {joint.number}", *(f"{k / 1e6:.4g}" for k in joint.k_over_stroke)])
+    return _table(rows)
 
 
 def _clearance_title(clearance: Clearance) -> str:

@@ -1,21 +1,23 @@
-"""`boom_twin scene`: the default scene file, as it stands or with play in its pins."""
+"""`boom_twin scene`: the default scene file, as it stands or with play in its pins, or an example."""
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
 
-from ..scene.load import clearance_text, default_text
+from ..scene.load import clearance_text, default_text, example_names, example_text
 from ..scene.yaml_reader import with_end_mark
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("--clearance", action="store_true", help="with play in the pins between rods and boom")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--clearance", action="store_true", help="with play in the pins between rods and boom")
+    which.add_argument("--example", metavar="NAME", choices=example_names(), help=f"another boom: {', '.join(example_names())}")
 
 
 def run(args: Namespace) -> int:
     """Print the file."""
-    text = default_text()
+    text = default_text() if args.example is None else example_text(args.example)
     sys.stdout.write(with_end_mark(f"{text}\n{clearance_text()}") if args.clearance else text)
     return 0

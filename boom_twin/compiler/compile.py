@@ -15,9 +15,10 @@ from ..kernels import tables as program
 from ..kernels.elements import beam_shapes as modes
 from ..kernels.elements import cylinder
 from ..kernels.elements import pin_contact as contact
-from ..kernels.elements.linkage import LINK_L, LINK_R, LINKAGE
+from ..kernels.elements.linkage import LINK_L, LINK_R
 from ..kernels.tables import Tables
 from ..scene.kinematics import gravity_in_base, linkage
+from ..scene.oil_spring import oil_record
 from ..scene.schema import Cylinder, Pin, RigidPart, Scene
 from ..scene.segmentation import SAME_PLACE, flexible_parts
 from ..types import Array
@@ -130,6 +131,7 @@ class _Builder:
             if own is not None and (own.mass or own.inertia):
                 history = self._point(own.mass, own.inertia)
                 self.layout.add("parts", end=end, history=history, com=own.com, mass=own.mass, inertia=own.inertia)
+        oil = -1 if part.oil is None else self.layout.add("oils", **_fields(oil_record(part)))
         self.layout.add(
             "cylinders",
             z=z,
@@ -141,6 +143,7 @@ class _Builder:
             closed_length=part.closed_length,
             compliance=0.0 if part.k is None else 1.0 / part.k,
             lag=0.0 if part.k is None or part.d is None else part.d / part.k,
+            oil=oil,
         )
 
     # -- sections -------------------------------------------------------------------------------------------------
@@ -296,7 +299,7 @@ def _rod(mass_per_length: float, x0: float, x1: float) -> RigidPart:
 
 
 def _fields(row: np.record) -> dict[str, float]:
-    return {name: row[name] for name in LINKAGE.names or ()}
+    return {name: row[name] for name in row.dtype.names or ()}
 
 
 def _stacked(parts: list[tuple[Array, Array, Array, Array, Array]]) -> dict[str, Array]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels.elements import pin_contact as contact
+from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
 from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Work
@@ -92,6 +93,11 @@ class Plan:
     def joints(self) -> int:
         """Number of joints, and of sections."""
         return len(self.tables.joints)
+
+    def compliances(self, drives: Array) -> Array:
+        """1/k (m/N; 0 if incompressible) of the cylinders with their `drives` so long (m); both of shape (n,)."""
+        t = self.tables
+        return np.array([compliance_and_lag(row, t.oils, drive)[0] for row, drive in zip(t.cylinders, drives, strict=True)])
 
     def state(self, depth: int = DEPTH) -> State:
         """A fresh state, all zero; `depth` rows of history."""

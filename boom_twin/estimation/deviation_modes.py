@@ -16,6 +16,7 @@ from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
+from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
@@ -117,6 +118,7 @@ class DeviationModes:
         for j, mode in enumerate(modes):
             is_turned = j < len(self._motions) and float((plan.masses * mode.motion) @ self._motions[j]) < 0.0
             kept.append(self._put(j, mode, -1.0 if is_turned else 1.0))
+        f.softness[:] = plan.compliances(plan.closed_lengths + strokes)
         f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
         first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
         self._motions, f.status[COUNT] = kept, len(modes)
@@ -149,7 +151,7 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         relative=np.zeros((frames, MODES, 3)), forces=np.zeros((MODES, n)), bending=np.zeros((MODES, len(places))),
         sections=np.array([each.section for each in places], np.int64),
         sections_off=np.array([settings.section_deviation * scene.is_flexible(i) for i in range(n)]),
-        softness=np.array([0.0 if joint.cylinder.k is None else 1.0 / joint.cylinder.k for joint in scene.joints]),
+        softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
         lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),

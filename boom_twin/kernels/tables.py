@@ -12,7 +12,7 @@ import numpy as np
 
 from ..types import Array
 from .elements.beam import BEAM as BEAM_ROW
-from .elements.cylinder import CYLINDER, CYLINDER_PART
+from .elements.cylinder import CYLINDER, CYLINDER_PART, OIL
 from .elements.linkage import LINKAGE
 from .elements.pin_contact import CLEARANCE
 from .jit import by_reference
@@ -77,6 +77,7 @@ RECORDS = {
     "outlets": OUTLET,
     "cylinders": CYLINDER,
     "parts": CYLINDER_PART,
+    "oils": OIL,
     "clearances": CLEARANCE,
 }
 """What a row of every record array of `Tables` is."""
@@ -101,6 +102,7 @@ class Tables(NamedTuple):
     outlets: np.recarray
     cylinders: np.recarray
     parts: np.recarray
+    oils: np.recarray
     clearances: np.recarray  # pins that are not ideal, see `kernels.elements.pin_contact`
     gravity: Array  # (2,), m/s^2
     moving: Array  # (unknowns,): 1 for coordinates, 0 for forces

@@ -49,7 +49,7 @@ def _beam_damping(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 
 def _compliance(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _cylinder(scene, i, "k", "d") if scene.joints[i].cylinder.k is not None else ()
+    return _cylinder(scene, i, "k", "oil", "d") if scene.joints[i].cylinder.is_compressible else ()
 
 
 def _oil_damping(scene: Scene, i: int) -> tuple[Edit, ...]:

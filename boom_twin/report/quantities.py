@@ -226,8 +226,8 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
 
 
 def digest(scene: Scene) -> str:
-    """Of everything in a scene."""
-    return sha256(scene.model_dump_json().encode()).hexdigest()
+    """Of everything that a scene names."""
+    return sha256(scene.model_dump_json(exclude_none=True).encode()).hexdigest()
 
 
 BOX = 2.4

@@ -1,7 +1,8 @@
 """Change a scene: single parameters by name, keys as an editor would change them, the text with comments kept, another load.
 
 ``cylinder_i.k`` (N/m), ``cylinder_i.d`` (N s/m), ``section_i.EI`` (N m^2), ``section_i.beta`` (s), ``section_i.mass`` (kg, of
-all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m).
+all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m). k of a cylinder with `oil` is that at half its
+stroke; to change it changes the bulk modulus, and with that k by the same factor over the whole stroke.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from ruamel.yaml.error import YAMLError
 from ..config.yaml_text import with_value, yaml_text
 from ..errors import SceneError, UsageError
 from .load import structure
-from .schema import CylinderPart, RigidPart, Scene, Section, Tip
+from .oil_spring import middle_stiffness
+from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 from .yaml_reader import Place, parse, with_end_mark, words
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
@@ -30,7 +32,8 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
     """Every parameter that `scene` has; payload and line fill always, for they may be nothing."""
     names = []
     for i, joint in enumerate(scene.joints):
-        names += [f"cylinder_{i + 1}.{key}" for key in ("k", "d") if getattr(joint.cylinder, key) is not None]
+        names += [f"cylinder_{i + 1}.k"] if joint.cylinder.is_compressible else []
+        names += [f"cylinder_{i + 1}.d"] if joint.cylinder.d is not None else []
     for i, section in enumerate(scene.sections):
         names += [f"section_{i + 1}.EI"] if scene.is_flexible(i) else []
         names += [f"section_{i + 1}.beta"] if scene.is_flexible(i) and section.beta else []
@@ -52,7 +55,8 @@ def parameter(scene: Scene, name: str) -> float:
     if owner == "line_fill":
         return scene.line_fill or 0.0
     if owner == "cylinder":
-        return float(getattr(scene.joints[index].cylinder, key))
+        cylinder = scene.joints[index].cylinder
+        return middle_stiffness(cylinder) if key == "k" else float(cylinder.d or 0.0)
     section = scene.sections[index]
     if key == "EI":
         assert section.I is not None
@@ -86,12 +90,19 @@ def _with_one(scene: Scene, name: str, value: float) -> Scene:
         raise UsageError(f"{name} = {value:g}: must be finite and {'above 0' if least_is_open else 'at least 0'}.")
     place, part = cast(Place, (owner,)), cast(Any, value)
     if owner == "cylinder":
-        place = ("joints", index, "cylinder", key)
+        place, part = ("joints", index, "cylinder"), _cylinder(scene.joints[index].cylinder, key, value)
     elif owner == "section":
         place, part = ("sections", index), _section(scene, scene.sections[index], key, value)
     elif owner == "tip":
         part = (scene.tip or Tip()).model_copy(update={"payload": value})
     return cast(Scene, _with(scene, place, part))
+
+
+def _cylinder(cylinder: Cylinder, key: str, value: float) -> Cylinder:
+    if key == "k" and (oil := cylinder.oil) is not None:
+        modulus = oil.bulk_modulus * value / middle_stiffness(cylinder)
+        return cylinder.model_copy(update={"oil": oil.model_copy(update={"bulk_modulus": modulus})})
+    return cylinder.model_copy(update={key: value})
 
 
 def _section(scene: Scene, section: Section, key: str, value: float) -> Section:

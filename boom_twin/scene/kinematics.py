@@ -39,7 +39,7 @@ def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.rec
     row["cx"], row["cy"] = joint.C  # type: ignore[misc]  # validated: B has C, D, E, lL, lR
     row["dx"], row["dy"] = joint.D  # type: ignore[misc]
     row["ex"], row["ey"] = joint.E  # type: ignore[misc]
-    row["length_l"], row["length_r"] = joint.lL, joint.lR
+    row["length_l"], row["length_r"], row["side"] = joint.lL, joint.lR, joint.side_sign
     if joint.kind == "B1":
         row["mount"], row["along"] = LINK_L, joint.lL
     elif joint.kind == "B2":

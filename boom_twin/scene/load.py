@@ -102,16 +102,26 @@ DEFAULT_NAME = "default scene"
 
 def default_text() -> str:
     """Text of the package's default scene."""
-    return _text("scene.yaml")
+    return _text("msg_config", "scene.yaml")
 
 
 def clearance_text() -> str:
     """Text of the package's block `clearance`, which can follow the default scene."""
-    return _text("clearance.yaml")
+    return _text("msg_config", "clearance.yaml")
 
 
-def _text(name: str) -> str:
-    return (files("boom_twin") / "msg_config" / name).read_text(encoding="utf-8")
+def example_names() -> tuple[str, ...]:
+    """Names of the package's example scenes."""
+    return tuple(sorted(file.name.removesuffix(".yaml") for file in (files("boom_twin") / "examples").iterdir()))
+
+
+def example_text(name: str) -> str:
+    """Text of one of the package's example scenes."""
+    return _text("examples", f"{name}.yaml")
+
+
+def _text(folder: str, name: str) -> str:
+    return (files("boom_twin") / folder / name).read_text(encoding="utf-8")
 
 
 def load_scene(source: str | Path | None = None) -> Scene:

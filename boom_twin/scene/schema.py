@@ -90,22 +90,52 @@ class CylinderPart(Part):
     com: NotNegative
 
 
+class Oil(Part):
+    """Oil shut in both chambers: diameters of piston and rod (m), bulk modulus (Pa), oil in the lines of each side (m^3)."""
+
+    bore: Annotated[float, Field(ge=1e-3, le=LARGEST, allow_inf_nan=False)]
+    rod: Positive
+    bulk_modulus: Annotated[float, Field(ge=1e7, le=1e11)]
+    cap_line: NotNegative
+    rod_line: NotNegative
+
+    @property
+    def cap_area(self) -> float:
+        """Area of the piston, m^2."""
+        return 0.25 * math.pi * self.bore**2
+
+    @property
+    def rod_area(self) -> float:
+        """Area of the piston on the side of the rod, m^2."""
+        return 0.25 * math.pi * (self.bore - self.rod) * (self.bore + self.rod)
+
+
 class Cylinder(Part):
-    """Drive with oil spring k (N/m) and damper d (N s/m); no k means incompressible. Lengths in m."""
+    """Drive with oil spring and damper d (N s/m); lengths in m.
+
+    The spring is a number k (N/m), or follows from `oil` over the stroke; neither means incompressible.
+    """
 
     k: Positive | None = None
+    oil: Oil | None = None
     d: NotNegative | None = None
     closed_length: Positive
     max_stroke: Positive
     barrel: CylinderPart | None = None
     rod: CylinderPart | None = None
 
+    @property
+    def is_compressible(self) -> bool:
+        """Whether it has an oil spring."""
+        return self.k is not None or self.oil is not None
+
 
 class Joint(Part):
     """What turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
 
     C, D relative to the outboard pivot of the section before, E to the pivot of its own section (m); link lengths
-    lL, lR (m) and masses mL, mR (kg); R places the rod pin on a link (B2, B3). ``range_deg`` is in degrees.
+    lL, lR (m) and masses mL, mR (kg); R places the rod pin on a link (B2, B3). ``range_deg`` is in degrees. ``side`` of D->E on
+    which the links meet, seen from D to E; not named: left.
     """
 
     kind: Literal["A", "B1", "B2", "B3"]
@@ -113,12 +143,18 @@ class Joint(Part):
     C: Point | None = None
     D: Point | None = None
     E: Point | None = None
+    side: Literal["left", "right"] | None = None
     lL: Positive | None = None
     lR: Positive | None = None
     R: Point | None = None
     mL: NotNegative | None = None
     mR: NotNegative | None = None
     cylinder: Cylinder
+
+    @property
+    def side_sign(self) -> float:
+        """Side of D->E on which the links meet: 1 left, -1 right."""
+        return -1.0 if self.side == "right" else 1.0
 
 
 class ContactLaw(Part):

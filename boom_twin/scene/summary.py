@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .kinematics import stroke_range
+from .oil_spring import stiffness_over_stroke
 from .schema import IDEAL_BELOW, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits
 
@@ -59,7 +60,7 @@ def _absent_in_joint(joint: Joint) -> dict[str, str]:
     absent = {}
     if joint.kind != "A":
         absent = {key: "massless link" for key in ("mL", "mR") if not getattr(joint, key)}
-    if cylinder.k is None:
+    if not cylinder.is_compressible:
         absent["cylinder.k"] = "incompressible: the stroke drives the joint"
     elif not cylinder.d:
         absent["cylinder.d"] = "no damping in the oil spring"
@@ -117,7 +118,8 @@ class JointAccount:
 
     ``stroke_low``, ``stroke_high`` are reached over ``range_deg`` where links close and the cylinder reaches. The joint
     of kind A has two unknowns (angle of the section, cylinder force), a six-bar six (angles of section and two links,
-    two components of the pin force, cylinder force).
+    two components of the pin force, cylinder force). ``k_over_stroke`` (N/m) is at
+    `boom_twin.scene.oil_spring.STATIONS` for a cylinder with oil, else empty. ``side`` is empty for kind A.
     """
 
     number: int
@@ -127,7 +129,9 @@ class JointAccount:
     stroke_high: float
     max_stroke: float
     k: float | None
+    k_over_stroke: tuple[float, ...]
     d: float | None
+    side: str
     link_mass: float
     barrel_mass: float
     rod_mass: float
@@ -216,7 +220,9 @@ def _joint(scene: Scene, i: int) -> JointAccount:
         stroke_high=high,
         max_stroke=cylinder.max_stroke,
         k=cylinder.k,
+        k_over_stroke=() if cylinder.oil is None else stiffness_over_stroke(cylinder),
         d=cylinder.d,
+        side="" if joint.kind == "A" else joint.side or "left",
         link_mass=(joint.mL or 0.0) + (joint.mR or 0.0),
         barrel_mass=cylinder.barrel.mass if cylinder.barrel is not None else 0.0,
         rod_mass=cylinder.rod.mass if cylinder.rod is not None else 0.0,

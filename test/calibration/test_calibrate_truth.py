@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.sessions import ENCODERS, cut_to, made, off
+from calibration.sessions import ENCODERS, Made, cut_to, made, off
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
-from boom_twin.scene.edit import parameter
+from boom_twin.calibration.output import write_scene
+from boom_twin.scene.edit import anew, parameter
+from boom_twin.scene.schema import Oil
+from boom_twin.validation import rig
 
 
 def expected(name, truth, zeros):
@@ -95,3 +98,20 @@ def test_two_sections_without_an_imu(short, two_sections, tmp_path):
         assert abs(wrong[f"cylinder_{i}.k"]) < 0.02 * parameter(short.truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
     judge(found, 2)
+
+
+def test_oil_gets_another_bulk_modulus(two_sections, tmp_path):
+    """Cylinder 1 has oil: the factor on its stiffness is found, and written where the scene has it."""
+    oil = Oil(bore=0.105, rod=0.07, bulk_modulus=1.5e9, cap_line=1e-3, rod_line=1e-3)
+    first, *rest = two_sections.joints
+    cylinder = first.cylinder.model_copy(update={"k": None, "oil": oil})
+    scene = two_sections.model_copy(update={"joints": (first.model_copy(update={"cylinder": cylinder}), *rest)})
+    truth = off(scene, 0.9, 1.1)
+    programme = rig.random_programme(truth, "arch", 24.0, 4)
+    rows = rig.simulate(truth, programme, 24.0, 2e-3, 2e-3, 6)
+    bag = Made(truth, programme, rows).write(tmp_path / "bag", 1, imu=False)
+    found = calibrate([bag], scene, Choice(zeros="angles"))
+    write_scene(found, scene, anew(scene), tmp_path / "new.yaml", "by a test")
+    now = load_scene(tmp_path / "new.yaml").joints[0].cylinder
+    assert now.k is None and now.oil.bulk_modulus == pytest.approx(0.9 * 1.5e9, rel=0.03)
+    assert now.oil.model_copy(update={"bulk_modulus": 1.5e9}) == oil

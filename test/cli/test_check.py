@@ -46,6 +46,17 @@ def test_check_takes_a_file_and_prints_its_warnings(tmp_path: Path, capsys: pyte
     assert "Warnings: 1\n" in out and "joints[0].cylinder.k = 40.0: less than 1e4 N/m: kN/mm?" in out
 
 
+def test_the_z_fold_example_is_printed_and_checks_without_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "--example", "five_section_z_fold"]) == 0
+    path = tmp_path / "z.yaml"
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "Warnings: none" in out
+    assert "joint 3  B2, right" in out and "by the oil over the stroke, d = 1100 kN s/m" in out
+    assert "cylinder 1          829.8  166.4  114.3  117.7  271.9" in out
+
+
 def test_check_json_is_one_flat_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "--json", _scene(tmp_path, "k: 40.0e+6", "k: 40.0")]) == 0
     out = capsys.readouterr().out

@@ -34,9 +34,9 @@ ROWS, SPAN = 6, 0.05  # of the short simulation, s
 
 @cache
 def bases() -> dict[str, str]:
-    """Whole scenes: as packaged, with clearance, with five sections."""
-    text = printed("scene")[1]
-    return {"default": text, "clearance": printed("scene", "--clearance")[1], "five": _five(text)}
+    """Whole scenes: as packaged, with clearance, with five sections, with mirrored linkages and oil."""
+    text, example = printed("scene")[1], printed("scene", "--example", "five_section_z_fold")[1]
+    return {"default": text, "clearance": printed("scene", "--clearance")[1], "five": _five(text), "z fold": example}
 
 
 def _five(text: str) -> str:

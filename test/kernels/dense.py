@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from boom_twin.kernels.elements.cylinder import compliance_and_lag
 from boom_twin.kernels.tables import JOINT_B
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
@@ -67,8 +68,8 @@ class Dense:
             total[joint.z + 3 : joint.z + 5] = at[histories + 2 * k : histories + 2 * k + 2]
         for i, cylinder in enumerate(t.cylinders):
             speed = rates[cylinder.history] - self.drive_rate[i]
-            law = at[cylinder.history] - self.drive[i] + cylinder.lag * speed - cylinder.compliance * z[cylinder.z]
-            total[cylinder.z] = law
+            compliance, lag = compliance_and_lag(cylinder, t.oils, self.drive[i])
+            total[cylinder.z] = at[cylinder.history] - self.drive[i] + lag * speed - compliance * z[cylinder.z]
         return total
 
     def left_by(self, z, dz):

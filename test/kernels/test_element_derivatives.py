@@ -39,11 +39,12 @@ HATS = rng.normal(size=7)
 PARTS = np.zeros(2, cylinder.CYLINDER_PART).view(np.recarray)
 PARTS[0] = (cylinder.BARREL, 1, 0.3, 22.0, 1.1)
 PARTS[1] = (cylinder.ROD, 4, 0.4, 14.0, 0.6)
+OILS = np.zeros(0, cylinder.OIL).view(np.recarray)
 
 
 def cylinder_row(compliance, lag):
     rows = np.zeros(1, cylinder.CYLINDER).view(np.recarray)
-    rows[0] = (0, 0, 0, 2, 0, 0, 1.0, compliance, lag)
+    rows[0] = (0, 0, 0, 2, 0, 0, 1.0, compliance, lag, -1)
     return rows[0]
 
 
@@ -51,7 +52,7 @@ def cylinder_forces(z, row, drive=1.2, drive_rate=0.3):
     g, h, position = np.zeros(5), np.zeros((5, 5)), np.zeros(7)
     cylinder.place_cylinder(row, PARTS, *z[:4], np.zeros(7), position)
     motion = Motion(GAIN, RATE, HATS, 0.1 * HATS)
-    cylinder.cylinder_terms(row, PARTS, *z, drive, drive_rate, motion, GRAVITY, position, g, h)
+    cylinder.cylinder_terms(row, PARTS, OILS, *z, drive, drive_rate, motion, GRAVITY, position, g, h)
     return g, h
 
 

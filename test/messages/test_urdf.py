@@ -17,6 +17,7 @@ from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy
 from boom_twin.messages.urdf import urdf
 from boom_twin.scene.kinematics import PassiveJoints, skeleton, strokes_of_posture
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
@@ -70,11 +71,12 @@ def booms() -> dict[str, Scene]:
         "default": scene,
         "one": scene.model_copy(update={"sections": sections[:1], "joints": joints[:1]}),
         "shuffled": scene.model_copy(update={"base": base, "joints": tuple(joints[i] for i in order)}),
+        "z fold": examine_text(example_text("five_section_z_fold"), "example")[0],
         "rigid": scene.model_copy(update={"sections": (sections[0], rigid, *sections[2:])}),
     }
 
 
-@pytest.fixture(scope="module", params=["default", "one", "shuffled", "rigid"])
+@pytest.fixture(scope="module", params=["default", "one", "shuffled", "z fold", "rigid"])
 def boom(request: pytest.FixtureRequest) -> tuple[Scene, Element]:
     scene = booms()[request.param]
     return scene, ElementTree.fromstring(urdf(scene))

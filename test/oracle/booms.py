@@ -45,6 +45,7 @@ def random_boom(seed):
     joints += [_joint(spec["joints"][i], rng) for i in rng.integers(1, 4, count - 1)]
     for joint, before in zip(joints[1:], sections, strict=False):
         _place_barrel_pin(joint, before, rng)
+    vary_cylinders(joints, seed)
     spec |= {"sections": sections, "joints": joints}
     spec["base"] |= {"pivot": [0.3, 0.8], "cylinder_pin": [0.75, -0.45], "inclination": float(rng.uniform(-0.2, 0.2))}
     spec["modes"] = int(rng.integers(2, 5))
@@ -85,6 +86,47 @@ def _joint(joint, rng):
         if rng.random() < 0.3:
             joint.pop(part, None)
     return joint
+
+
+def vary_cylinders(joints, seed):
+    """Turn some six-bars over to the other side, and give some cylinders oil instead of k; drawn apart from all else."""
+    rng = np.random.default_rng([seed, 1])
+    for joint in joints:
+        if joint["kind"] != "A" and rng.random() < 0.4:
+            turn_over(joint)
+        if "k" in joint["cylinder"] and rng.random() < 0.4:
+            bore = float(rng.uniform(0.06, 0.12))
+            lines = {name: float(rng.uniform(3e-4, 2e-3)) for name in ("cap_line", "rod_line")}
+            del joint["cylinder"]["k"]
+            rod, modulus = bore * float(rng.uniform(0.5, 0.75)), float(rng.uniform(0.8e9, 1.7e9))
+            joint["cylinder"]["oil"] = {"bore": bore, "rod": rod, "bulk_modulus": modulus, **lines}
+
+
+def turn_over(joint):
+    """Reflect a joint in the axis of the section before: what was above it is below, and angles turn the other way."""
+    joint["range_deg"] = [-joint["range_deg"][1], -joint["range_deg"][0]]
+    if joint["kind"] != "A":
+        joint["side"] = "left" if joint.get("side") == "right" else "right"
+    for key in ("C", "D", "E", "R"):
+        if key in joint:
+            joint[key] = [joint[key][0], -joint[key][1]]
+
+
+def mirrored(spec):
+    """The boom reflected in the base's x axis, with its gravity."""
+    spec = deepcopy(spec)
+    for owner, keys in ((spec, ("gravity",)), (spec["base"], ("pivot", "cylinder_pin")), (spec["sections"][0], ("rod_pin",))):
+        for key in keys:
+            owner[key] = [owner[key][0], -owner[key][1]]
+    spec["base"]["inclination"] = -spec["base"].get("inclination", 0.0)
+    for section in spec["sections"]:
+        for part in ("root", "head"):
+            if part in section:
+                section[part]["com"] = [section[part]["com"][0], -section[part]["com"][1]]
+    for joint in spec["joints"]:
+        turn_over(joint)
+    spec["postures"] = {name: [-angle for angle in angles] for name, angles in spec["postures"].items()}
+    return spec
 
 
 def _place_barrel_pin(joint, before, rng):

@@ -29,6 +29,7 @@ def random_scene(seed: int) -> Scene:
         section.pop("rod_pin", None)
     chosen[0]["rod_pin"] = [0.60, -0.12]
     mounted = [_joint(dict(joints[0]), rng), *(_joint(joints[i], rng) for i in rng.integers(1, 4, count - 1))]
+    booms.vary_cylinders(mounted, seed)
     document: dict[str, Any] = booms.document()
     document |= {"sections": chosen, "joints": mounted, "postures": {}}
     document["base"] = document["base"] | {"inclination": float(rng.uniform(-0.1, 0.1))}

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from boom_twin.kernels.elements.cylinder import compliance_and_lag
+
 X, V = -4, -3  # rows of positions and velocities in a history
 
 
@@ -28,9 +32,18 @@ def weight(plan, state):
 
 def oil(plan, state, drive):
     """Energy of the oil springs at drive lengths (n,), J."""
-    stretch = state.history[X, plan.tables.cylinders.history] - drive
-    compliance = plan.tables.cylinders.compliance
-    return float(sum(0.5 * s**2 / c for s, c in zip(stretch, compliance, strict=True) if c > 0.0))
+    return float(0.5 * stiffness(plan, drive) @ stretch(plan, state, drive) ** 2)
+
+
+def stretch(plan, state, drive):
+    """Of the oil springs, m, shape (n,)."""
+    return state.history[X, plan.tables.cylinders.history] - drive
+
+
+def stiffness(plan, drive):
+    """Of the oil springs, N/m, shape (n,); 0 of incompressible cylinders, which store nothing."""
+    compliance = plan.compliances(drive)
+    return np.divide(1.0, compliance, out=np.zeros_like(compliance), where=compliance > 0.0)
 
 
 def total(plan, state, drive):
@@ -39,8 +52,14 @@ def total(plan, state, drive):
 
 
 def power_of_drives(plan, state, drive_rate):
-    """Power that the drives put in, W: a drive that lengthens against compression (N < 0) does work."""
-    return float(-state.z[plan.tables.cylinders.z] @ drive_rate)
+    """Power that the drives put in, W: a drive that lengthens against compression (N < 0) does work.
+
+    So does one whose oil gets stiffer on its way: the spring is as long as before, and stores more.
+    """
+    drive, step = state.drives[0], 1e-6
+    stiffening = (stiffness(plan, drive + step) - stiffness(plan, drive - step)) / (2.0 * step)
+    stiffened = 0.5 * stiffening * stretch(plan, state, drive) ** 2
+    return float((stiffened - state.z[plan.tables.cylinders.z]) @ drive_rate)
 
 
 def dissipation(plan, state, drive_rate):
@@ -52,6 +71,7 @@ def dissipation(plan, state, drive_rate):
         if beam.axial:
             loss += beam.beta * beam.axial_stiffness * rates[beam.z + beam.bending] ** 2
     for i, cylinder in enumerate(t.cylinders):
-        if cylinder.compliance > 0.0:
-            loss += cylinder.lag / cylinder.compliance * (rates[cylinder.history] - drive_rate[i]) ** 2
+        compliance, lag = compliance_and_lag(cylinder, t.oils, state.drives[0, i])
+        if compliance > 0.0:
+            loss += lag / compliance * (rates[cylinder.history] - drive_rate[i]) ** 2
     return float(loss)

@@ -43,7 +43,7 @@ class Lagrange:
                 turning.append(np.sqrt(size) * (v @ axis.h @ v))
         jacobian = np.array(rows)
         force = -energy.g - jacobian.T @ np.array(turning) - self._damping(boom, v, rate)
-        driven = [b for joint, b in zip(self.scene.joints, bend, strict=True) if joint.cylinder.k is None]
+        driven = [b for joint, b in zip(self.scene.joints, bend, strict=True) if not joint.cylinder.is_compressible]
         demand = np.concatenate([np.zeros(closures), driven]) - np.array([v @ c.h @ v for c in constraints])
         g = np.array([c.g for c in constraints]).reshape(-1, n)
         matrix = np.block([[jacobian.T @ jacobian, g.T], [g, np.zeros((len(g),) * 2)]])

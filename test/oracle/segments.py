@@ -10,6 +10,7 @@ from scipy.linalg import eigh, null_space
 from boom_twin.errors import SolverError
 from boom_twin.validation.reference.segments.boom import Segments
 from boom_twin.validation.reference.segments.equilibrium import energy, equilibrium
+from boom_twin.validation.reference.segments.geometry import oil_stiffness
 
 
 def mass_matrix(boom):
@@ -46,7 +47,7 @@ def cylinder_forces(scene, boom, drive, multipliers):
     rigid = iter(multipliers)
     return np.array(
         [
-            next(rigid) if joint.cylinder.k is None else joint.cylinder.k * (length.v - reference)
+            oil_stiffness(joint.cylinder, reference) * (length.v - reference) if joint.cylinder.is_compressible else next(rigid)
             for joint, length, reference in zip(scene.joints, boom.lengths, drive, strict=True)
         ]
     )

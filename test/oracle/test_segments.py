@@ -116,7 +116,9 @@ def test_random_booms_cover_what_they_promise():
     sections = [section for scene in scenes for section in scene.sections]
     assert {len(scene.sections) for scene in scenes} == {1, 2, 3, 4, 5}
     assert {joint.kind for joint in joints} == {"A", "B1", "B2", "B3"}
-    assert any(joint.cylinder.k is None for joint in joints) and any(joint.mL is None for joint in joints[1:])
+    assert any(not joint.cylinder.is_compressible for joint in joints) and any(joint.mL is None for joint in joints[1:])
+    assert {(joint.side or "left") for joint in joints if joint.kind != "A"} == {"left", "right"}
+    assert any(joint.cylinder.oil is not None for joint in joints) and any(joint.cylinder.k is not None for joint in joints)
     assert any(section.beam is None for section in sections) and any(section.modes == 0 for section in sections)
     assert any(section.root is None for section in sections) and any(section.rho_I is None for section in sections)
 

@@ -111,6 +111,9 @@ def scaled(spec, length, mass):
         for key, factor in (("closed_length", s), ("max_stroke", s), ("k", m / s), ("d", m / s)):
             if key in cylinder:
                 cylinder[key] *= factor
+        for key, factor in (("bore", s), ("rod", s), ("bulk_modulus", m / s**2), ("cap_line", s**3), ("rod_line", s**3)):
+            if "oil" in cylinder:
+                cylinder["oil"][key] *= factor
         for key in ("barrel", "rod"):
             if key in cylinder:
                 part(cylinder[key])

@@ -99,6 +99,8 @@ UNKNOWN_KEYS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (("clearance",), {"law": "hertz"}, "clearance.law", ("`law` is a key of clearance.contact",)),
 ]
 
+OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 1e-3}
+
 CONTRADICTIONS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (s(1, "A"), GONE, "sections[1].A", ("is absent", "a section with a beam needs it", "m^2", "leave out `beam`")),
     (s(1, "I"), GONE, "sections[1].I", ("is absent", "m^4")),
@@ -114,6 +116,16 @@ CONTRADICTIONS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (j(2, "R"), GONE, "joints[2].R", ("is absent", "kind B2 needs it", "rod pin on its link")),
     (j(3, "R"), GONE, "joints[3].R", ("is absent", "kind B3 needs it")),
     *((j(1, key), GONE, f"joints[1].{key}", ("is absent", "kind B1 needs it")) for key in ("C", "D", "E", "lL", "lR")),
+    (j(0, "side"), "left", "joints[0].side", ("kind A has no links", "Remove `side`")),
+    (j(1, "side"), "up", "joints[1].side", ("'up'", "'left' or 'right'", "where the links meet")),
+    (j(1, "cylinder", "oil"), OIL, "joints[1].cylinder.oil", ("k = 3e+07 N/m too", "Remove k, or remove oil")),
+    (j(1, "cylinder", "oil"), OIL | {"rod": 0.1}, "joints[1].cylinder.oil.rod", ("thinner than the bore, 0.1 m", "diameters")),
+    (j(1, "cylinder", "oil"), OIL | {"bulk_modulus": 1.5}, "joints[1].cylinder.oil.bulk_modulus", ("not be less than 1e+07",)),
+    (j(1, "cylinder", "oil"), OIL | {"bore": 1e-9}, "joints[1].cylinder.oil.bore", ("not be less than 0.001", "piston, m")),
+    (j(1, "cylinder", "oil"), {"bore": 0.1}, "joints[1].cylinder.oil.bulk_modulus", ("is absent", "Pa")),
+    (j(1, "cylinder", "oil"), OIL | {"rod_line": -1.0}, "joints[1].cylinder.oil.rod_line", ("not be less than 0", "m^3")),
+    (j(1, "cylinder", "oil"), OIL | {"Bore": 0.1}, "joints[1].cylinder.oil.Bore", ("unknown key", "`bore`")),
+    (j(1, "cylinder", "max_stroke"), GONE, "joints[1].cylinder.max_stroke", ("is absent", "the largest stroke, m")),
     (j(1, "cylinder", "k"), GONE, "joints[1].cylinder.d", ("90000.0", "incompressible", "Give k", "remove d")),
     (j(1, "range_deg"), [10, -165], "joints[1].range_deg", ("low < high", "lower angle first")),
     (j(1, "range_deg"), [-165, 400], "joints[1].range_deg", ("360",)),

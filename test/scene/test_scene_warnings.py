@@ -27,6 +27,8 @@ def j(i: int, *rest: str | int) -> Place:
     return ("joints", i, *rest)
 
 
+OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 1e-3}
+
 UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (("material", "E"), 206.0, "material.E", ("GPa", "206 GPa are 2.06e+11")),
     (("material", "E"), 206000.0, "material.E", ("MPa", "206000 MPa are 2.06e+11")),
@@ -41,6 +43,9 @@ UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (("tip",), {"payload": 4e5}, "tip.payload", ("grams?",)),
     (j(1, "mL"), 4e6, "joints[1].mL", ("grams?",)),
     (j(1, "cylinder", "k"), 30.0, "joints[1].cylinder.k", ("kN/mm?", "30 kN/mm are 3e+07")),
+    (j(1, "cylinder", "oil"), OIL | {"bore": 100.0}, "joints[1].cylinder.oil.bore", ("mm?", "100 mm is 0.1")),
+    (j(1, "cylinder", "oil"), OIL | {"cap_line": 2.0}, "joints[1].cylinder.oil.cap_line", ("litres?", "1e-3")),
+    (j(1, "cylinder", "oil"), OIL | {"rod_line": 0.0}, "joints[1].cylinder.oil.rod_line", ("full stroke, 0.42 m",)),
     (("gravity",), [0.0, -1.62], "gravity", ("9.81", "[0.0, -9.81]")),
     (("gravity",), [0.0, 9.81], "gravity", ("upwards",)),
     (("postures", "bent"), [1.05, 0.35, -0.52, -1.4], "postures.bent", ("radians?", "degrees")),
@@ -61,6 +66,8 @@ def test_an_odd_value_warns_and_loads(bench: Any, place: Place, value: Any, path
     def edit(values: Any) -> None:
         if path.startswith("joints"):
             values["postures"] = {"arch": values["postures"]["arch"]}
+        if "oil" in place:
+            del values["joints"][1]["cylinder"]["k"]
         put(values, place, value)
 
     texts = [str(oddity) for oddity in bench.oddities(edit) if oddity.path == path]

@@ -5,6 +5,9 @@ d = R - C, l = |d|, e = d/l, n = e turned by 90 degrees, gamma = angle of e. Bar
     N = k (l - l_ref) + dv (l' - l_ref')       written as a compliance, so that k -> infinity is the rigid drive:
     0 = [l - l_ref + tau (l' - l_ref') - N/k] / (1 + tau C),   tau = dv/k,   l' = C l + D.
 
+k is a number, or follows from the oil in both chambers (`oil_compliance`) at the stroke of the drive: the oil is shut in there,
+and k is therefore the same throughout a step, whatever the step solves for.
+
 First and second derivatives by d:  dl = e.dd,  d2l = n n^T/l;  dgamma = n.dd/l,  d2gamma = -(e n^T + n e^T)/l^2;  for a
 constant force s, d(s.e) = (s.n) n.dd/l and d2(s.e) = -[(s.e) n n^T + (s.n)(e n^T + n e^T)]/l^2.
 """
@@ -31,6 +34,17 @@ CYLINDER = np.dtype(
         ("closed_length", float),  # m
         ("compliance", float),  # 1/k, m/N; 0 = incompressible
         ("lag", float),  # tau = damping over stiffness, s
+        ("oil", np.int64),  # row of OIL, which then gives compliance and lag; -1: they are as above
+    ]
+)  # fmt: skip
+
+OIL = np.dtype(
+    [
+        ("bulk_modulus", float),  # Pa
+        ("cap_area", float), ("rod_area", float),  # of the piston, m^2
+        ("cap_line", float), ("rod_line", float),  # oil beside that in the cylinder's travel, m^3
+        ("max_stroke", float),  # m
+        ("damping", float),  # N s/m
     ]
 )  # fmt: skip
 
@@ -43,6 +57,28 @@ CYLINDER_PART = np.dtype(
         ("inertia", float),  # about the centre, kg m^2
     ]
 )
+
+
+@inner
+def oil_compliance(oil, stroke):
+    """1/k (m/N) of the oil shut in at `stroke` (m): two columns, each of compliance V/(B A^2), that act side by side.
+
+    Beyond the end stops, which noise of the strokes may reach, it stays as it is there.
+    """
+    travel = min(max(stroke, 0.0), oil.max_stroke)
+    cap = (oil.cap_line + oil.cap_area * travel) / (oil.cap_area * oil.cap_area)
+    rod = (oil.rod_line + oil.rod_area * (oil.max_stroke - travel)) / (oil.rod_area * oil.rod_area)
+    return cap * rod / ((cap + rod) * oil.bulk_modulus)
+
+
+@inner
+def compliance_and_lag(row, oils, drive):
+    """1/k (m/N) and tau (s) of a cylinder whose drive is `drive` (m) long."""
+    if row.oil < 0:
+        return row.compliance, row.lag
+    oil = oils[row.oil]
+    compliance = oil_compliance(oil, drive - row.closed_length)
+    return compliance, oil.damping * compliance
 
 
 @inner
@@ -71,7 +107,7 @@ def place_cylinder(row, parts, cx, cy, rx, ry, before, position):
 
 
 @inner
-def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion, gravity, position, g, h):
+def cylinder_terms(row, parts, oils, cx, cy, rx, ry, force, drive, drive_rate, motion, gravity, position, g, h):
     """Gradient g, shape (5,), and tangent h, shape (5, 5), over (x_C, y_C, x_R, y_R, N).
 
     `motion` holds A, C, x_hat and D (see `boom_twin.kernels.tables.Motion`); `drive`, `drive_rate` are l_ref, l_ref'.
@@ -114,9 +150,10 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
         d_en -= (f_n + torque) / (length * length)
     gx, gy = force * ex + d_n * nx, force * ey + d_n * ny
     g[END_C], g[END_C + 1], g[END_R], g[END_R + 1] = gcx - gx, gcy - gy, grx + gx, gry + gy
-    lead = 1.0 + row.lag * motion.rate
+    compliance, lag = compliance_and_lag(row, oils, drive)
+    lead = 1.0 + lag * motion.rate
     speed = motion.rate * length + motion.offset[row.history] - drive_rate
-    g[AXIAL] = (length - drive + row.lag * speed - row.compliance * force) / lead
+    g[AXIAL] = (length - drive + lag * speed - compliance * force) / lead
     if not motion.renew:
         return
     _fill(h, END_C, END_C, ex, ey, cc_ee, d_en, cc_nn + d_nn)
@@ -125,7 +162,7 @@ def cylinder_terms(row, parts, cx, cy, rx, ry, force, drive, drive_rate, motion,
     _fill(h, END_R, END_C, ex, ey, 0.0, -d_en, cr_nn - d_nn)
     h[AXIAL, END_C], h[AXIAL, END_C + 1], h[AXIAL, END_R], h[AXIAL, END_R + 1] = -ex, -ey, ex, ey
     h[END_C, AXIAL], h[END_C + 1, AXIAL], h[END_R, AXIAL], h[END_R + 1, AXIAL] = -ex, -ey, ex, ey
-    h[AXIAL, AXIAL] = -row.compliance / lead
+    h[AXIAL, AXIAL] = -compliance / lead
 
 
 @inner

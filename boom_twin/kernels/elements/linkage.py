@@ -4,7 +4,8 @@ All points in the frame of the carrier (the base for A; the section before for B
 carrier's axes; `phi` is the angle of the turned section against the carrier.
 
     A:  R = Rot(phi) (rx, ry), the rod pin on the turned section.
-    B:  E = Rot(phi) (ex, ey); Q = intersection, left of D->E, of the circles (D, lL) and (E, lR); the rod pin sits on a link:
+    B:  E = Rot(phi) (ex, ey); Q = intersection of the circles (D, lL) and (E, lR) to the left of D->E, or to the right of it
+        (`side`); the rod pin sits on a link:
         R = base + along u + left n, with base = D, u = (Q - D)/lL on link L, and base = E, u = (Q - E)/lR on link R.
         B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
         B3's R from Q towards E.
@@ -32,26 +33,27 @@ LINKAGE = np.dtype(
         ("dx", float), ("dy", float),  # pivot D of link L, m
         ("ex", float), ("ey", float),  # pin E of link R; of DIRECT the rod pin, m
         ("length_l", float), ("length_r", float),  # m
+        ("side", float),  # 1: Q left of D->E; -1: right of it
         ("along", float), ("left", float),  # place of the rod pin on its link, m
     ]
 )  # fmt: skip
 
 
 @inner
-def joint_pin(dx, dy, ex, ey, length_l, length_r):
-    """Pin Q left of D->E at distance length_l from D and length_r from E; NaN if the circles do not meet."""
-    vx, vy = ex - dx, ey - dy
+def joint_pin(row, ex, ey):
+    """Pin Q on its side of D->E, at distance length_l from D and length_r from E; NaN if the circles do not meet."""
+    vx, vy = ex - row.dx, ey - row.dy
     distance2 = vx * vx + vy * vy
-    foot = (length_l * length_l - length_r * length_r + distance2) / (2.0 * distance2)
-    height = np.sqrt(length_l * length_l / distance2 - foot * foot)
-    return dx + foot * vx - height * vy, dy + foot * vy + height * vx
+    foot = (row.length_l * row.length_l - row.length_r * row.length_r + distance2) / (2.0 * distance2)
+    height = row.side * np.sqrt(row.length_l * row.length_l / distance2 - foot * foot)
+    return row.dx + foot * vx - height * vy, row.dy + foot * vy + height * vx
 
 
 @inner
 def link_angles(row, phi):
     """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
     ex, ey = turned(phi, row.ex, row.ey)
-    qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
+    qx, qy = joint_pin(row, ex, ey)
     return np.arctan2(qy - row.dy, qx - row.dx), np.arctan2(qy - ey, qx - ex)
 
 
@@ -62,7 +64,7 @@ def cylinder_length(row, phi):
     if row.mount == DIRECT:
         rx, ry, drx, dry = ex, ey, -ey, ex
     else:
-        qx, qy = joint_pin(row.dx, row.dy, ex, ey, row.length_l, row.length_r)
+        qx, qy = joint_pin(row, ex, ey)
         lx, ly = qx - row.dx, qy - row.dy
         mx, my = qx - ex, qy - ey
         # dQ = w (-ly, lx) with (Q-E).dQ = (Q-E).dE, dE = (-ey, ex)

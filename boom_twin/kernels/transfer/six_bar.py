@@ -122,7 +122,7 @@ def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g
     linkage, cylinder, pins = t.linkages[index], t.cylinders[index], state.pins[index]
     own_g, own_h = work.own_g, work.own_h
     cylinder_terms(
-        cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
+        cylinder, t.parts, t.oils, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[index], drive_rate[index], motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
     condense_ends(t, state, work, condensed, cylinder, own_g, own_h)

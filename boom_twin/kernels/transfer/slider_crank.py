@@ -20,7 +20,7 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
     g, h = work.own_g, work.own_h
     cylinder_terms(
-        cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
+        cylinder, t.parts, t.oils, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[0], drive_rate[0], motion, t.gravity, work.position, g, h,
     )  # fmt: skip
     condense_ends(t, state, work, condensed, cylinder, g, h)

@@ -291,7 +291,7 @@ def tables_of(b, i):
         operations=b.operations[i], joints=b.joints[i], linkages=b.linkages[i], links=b.links[i], offsets=b.offsets[i],
         bodies=b.bodies[i], beams=b.beams[i], psi=b.psi[i], weights=b.weights[i], stiffness=b.stiffness[i],
         point_mass=b.point_mass[i], point_rotary=b.point_rotary[i], outlets=b.outlets[i], cylinders=b.cylinders[i],
-        parts=b.parts[i], clearances=b.clearances[i],
+        parts=b.parts[i], oils=b.oils[i], clearances=b.clearances[i],
         gravity=b.gravity[i], moving=b.moving[i], scale=b.scale[i], tip=b.tip,
     )  # fmt: skip
 

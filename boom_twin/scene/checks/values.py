@@ -10,14 +10,14 @@ from pydantic import BaseModel
 
 from ...errors import ABSENT
 from ..glossary import MEANING
-from ..schema import Joint, Point, Section
+from ..schema import Cylinder, Joint, Oil, Point, Section
 from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
 BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
 LINK_KEYS = ("C", "D", "E", "lL", "lR")
-SIX_BAR_ONLY = (*LINK_KEYS, "R", "mL", "mR")
+SIX_BAR_ONLY = (*LINK_KEYS, "side", "R", "mL", "mR")
 NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
 """Keys of a joint by its kind."""
 
@@ -107,10 +107,7 @@ def joints(draft: Draft) -> Iterator[Finding]:
             yield from _kind(draft, i, joint)
             yield from _keys_of_kind(draft, i, joint)
             yield from _range(draft, i, joint)
-            if joint.cylinder.d is not None and joint.cylinder.k is None:
-                bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
-                remedy = "Give k, stiffness of the oil spring in N/m, or remove d."
-                yield fault(draft, ("joints", i, "cylinder", "d"), joint.cylinder.d, bound, remedy)
+            yield from _oil_spring(draft, i, joint.cylinder)
 
 
 def _kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
@@ -136,6 +133,26 @@ def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
             why = "has no links" if joint.kind == "A" else "has its rod pin where the links meet"
             bound = f"a joint of kind {joint.kind} {why}"
             yield fault(draft, (*place, key), value, bound, f"Remove `{key}`, or choose another kind.")
+
+
+def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Iterator[Finding]:
+    place, oil = ("joints", i, "cylinder"), cylinder.oil
+    if cylinder.d is not None and not cylinder.is_compressible:
+        bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
+        remedy = "Give k, stiffness of the oil spring in N/m, or remove d."
+        yield fault(draft, (*place, "d"), cylinder.d, bound, remedy)
+    if oil is None:
+        return
+    if cylinder.k is not None:
+        bound = f"the cylinder has k = {cylinder.k:g} N/m too, and its stiffness is either a number or that of the oil"
+        yield fault(draft, (*place, "oil"), oil.model_dump(), bound, "Remove k, or remove oil.")
+    if oil.rod >= oil.bore:
+        bound = f"the rod must be thinner than the bore, {oil.bore:g} m"
+        yield fault(draft, (*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m.")
+    for key, end in (("cap_line", "stroke 0"), ("rod_line", f"its full stroke, {cylinder.max_stroke:g} m")):
+        if getattr(oil, key) == 0.0:
+            bound = f"no oil is left there at {end}, and the cylinder is incompressible"
+            yield warning(draft, (*place, "oil", key), 0.0, bound, f"Give {MEANING[Oil][key]}: hoses and dead space.")
 
 
 def _range(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
@@ -164,6 +181,10 @@ SUSPECTS: dict[str, tuple[float, str, str]] = {
     "inclination": (1.0, "more than 1 rad: degrees?", "Give radians: 5 degrees are 0.0873."),
     "closed_length": (50.0, "more than 50 m: mm?", "Give lengths in m."),
     "max_stroke": (50.0, "more than 50 m: mm?", "Give lengths in m."),
+    "bore": (1.0, "more than 1 m: mm?", "Give the diameter in m: 100 mm is 0.1."),
+    "rod": (1.0, "more than 1 m: mm?", "Give the diameter in m: 70 mm is 0.07."),
+    "cap_line": (0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
+    "rod_line": (0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
 }
 
 

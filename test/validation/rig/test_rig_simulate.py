@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
@@ -18,14 +19,6 @@ def slider_crank_length(document, angle):
     x = rod[0] * np.cos(angle) - rod[1] * np.sin(angle) - pin[0]
     y = rod[0] * np.sin(angle) + rod[1] * np.cos(angle) - pin[1]
     return np.hypot(x, y)
-
-
-def mean_frequency(times, signal):
-    """Of the rising zero crossings of a signal about its mean (Hz)."""
-    signal = signal - signal.mean()
-    rising = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
-    crossings = times[rising] - signal[rising] * (times[1] - times[0]) / (signal[rising + 1] - signal[rising])
-    return (len(crossings) - 1) / (crossings[-1] - crossings[0])
 
 
 def test_drive_at_rest_stays_at_rest(document):

@@ -16,7 +16,7 @@ import numpy as np
 
 from ....scene.schema import Scene
 from ....types import Array
-from .geometry import Bodies, Linkages, gravity_in_base
+from .geometry import Bodies, Linkages, gravity_in_base, oil_stiffness
 from .kinematics import Quantities, carried, chain_points, fixed, joined, segment_tables, spans
 
 Drive = Callable[[float], tuple[Array, Array, Array]]
@@ -42,8 +42,7 @@ class Equations:
         self.linkages = Linkages(scene.joints[1:])
         self.bodies = Bodies(scene)
         cylinders = [joint.cylinder for joint in scene.joints]
-        self.rigid = np.array([cylinder.k is None for cylinder in cylinders])
-        self.k = np.array([cylinder.k or 0.0 for cylinder in cylinders])
+        self.rigid = np.array([not cylinder.is_compressible for cylinder in cylinders])
         self.d = np.array([cylinder.d or 0.0 for cylinder in cylinders])
         self.mass = np.concatenate([self.tables.mass, self.bodies.mass])
         self.inertia = np.concatenate([self.tables.inertia, self.bodies.inertia])
@@ -116,7 +115,7 @@ class Equations:
         """
         placed, n = self.place(q, v), self.size
         levers, g = placed.lengths.jacobian, placed.lengths.jacobian[self.rigid]
-        elastic = np.diag(self.tables.stiffness) + (levers.T * self.k) @ levers
+        elastic = np.diag(self.tables.stiffness) + (levers.T * self._stiffness(placed.lengths.value)) @ levers
         damping = np.diag(self.tables.damping) + (levers.T * self.d) @ levers
         matrix = self._bordered(self._mass_matrix(placed), g) if len(g) else self._mass_matrix(placed)
         right = np.zeros((len(matrix), 2 * n))
@@ -129,7 +128,12 @@ class Equations:
     def _spring_forces(self, time: float, placed: PlacedBoom) -> Array:
         """Forces (N) of the oil springs and dampers; 0 for incompressible cylinders."""
         length, rate, _ = self.drive(time)
-        return np.asarray(self.k * (placed.lengths.value - length) + self.d * (placed.lengths.rate - rate))
+        k = self._stiffness(length)
+        return np.asarray(k * (placed.lengths.value - length) + self.d * (placed.lengths.rate - rate))
+
+    def _stiffness(self, lengths: Array) -> Array:
+        """Of the oil springs, N/m, of drives so long (m)."""
+        return np.array([oil_stiffness(j.cylinder, float(at)) for j, at in zip(self.scene.joints, lengths, strict=True)])
 
     def _generalised(self, placed: PlacedBoom, q: Array, v: Array) -> Array:
         """Forces on the coordinates: weight, inertia forces at zero second derivatives, springs of the segments."""

@@ -8,6 +8,7 @@ from ....errors import SolverError
 from ....types import Array
 from .boom import SegmentBoom, Segments
 from .equations import Jet
+from .geometry import oil_stiffness
 
 PASSES = 60
 SETTLED = 1e-11  # m and rad, largest increment
@@ -23,10 +24,10 @@ def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[
     constraints = list(boom.closures)
     for joint, length, reference in zip(model.scene.joints, boom.lengths, drive, strict=True):
         stretch = length - float(reference)
-        if joint.cylinder.k is None:
-            constraints.append(stretch)
+        if joint.cylinder.is_compressible:
+            terms.append(0.5 * oil_stiffness(joint.cylinder, float(reference)) * (stretch * stretch))
         else:
-            terms.append(0.5 * joint.cylinder.k * (stretch * stretch))
+            constraints.append(stretch)
     for term in terms:
         v, g, h = v + term.v, g + term.g, h + term.h
     return Jet(v, g, h), constraints

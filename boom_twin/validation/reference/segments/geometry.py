@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ....scene.schema import CylinderPart, Joint, Point, RigidPart, Scene
+from ....scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart, Scene
 from ....types import Array
 
 
@@ -74,9 +74,10 @@ class Linkages:
         self.e = np.array([complex(*joint.E) for joint in joints if joint.E])
         self.left = np.array([joint.lL for joint in joints], dtype=float)
         self.right = np.array([joint.lR for joint in joints], dtype=float)
+        self.side = np.array([_side(joint) for joint in joints])
 
     def angles(self, phi: Array) -> tuple[Angles, Angles]:
-        """Links L (from D) and R (from E) at joint angles `phi` (rad), shape (joints,); Q lies left of D->E.
+        """Links L (from D) and R (from E) at joint angles `phi` (rad), shape (joints,).
 
         The diagonal D->E has length r and heading a; by the law of cosines L is turned from it by an angle that depends on
         r alone, and R from its reverse likewise.
@@ -90,10 +91,10 @@ class Linkages:
         r1 = u1 / (2.0 * r)
         span = Angles(r, r1, u2 / (2.0 * r) - r1**2 / r)
         a = Angles(np.angle(gap), inner.imag / square, bend.imag / square - inner.imag * u1 / square**2)
-        left, right = _opening(span, self.left, self.right), _opening(span, self.right, self.left)
+        left, right, side = _opening(span, self.left, self.right), _opening(span, self.right, self.left), self.side
         return (
-            Angles(a.value + left.value, a.first + left.first, a.second + left.second),
-            Angles(a.value + np.pi - right.value, a.first - right.first, a.second - right.second),
+            Angles(a.value + side * left.value, a.first + side * left.first, a.second + side * left.second),
+            Angles(a.value + np.pi - side * right.value, a.first - side * right.first, a.second - side * right.second),
         )
 
 
@@ -181,14 +182,29 @@ def gravity_in_base(scene: Scene) -> Array:
 
 
 def link_headings(joint: Joint, relative: float) -> tuple[float, float]:
-    """Angles of links L and R against the head before, for a relative joint angle; Q lies left of D->E."""
+    """Angles of links L and R against the head before, for a relative joint angle."""
     assert joint.D is not None and joint.E is not None and joint.lL is not None and joint.lR is not None
     d = complex(*joint.D)
     e = complex(*joint.E) * np.exp(1j * relative)
     gap = e - d
     along = (joint.lL**2 - joint.lR**2 + abs(gap) ** 2) / (2.0 * abs(gap))
-    q = d + gap / abs(gap) * complex(along, math.sqrt(joint.lL**2 - along**2))
+    q = d + gap / abs(gap) * complex(along, _side(joint) * math.sqrt(joint.lL**2 - along**2))
     return float(np.angle(q - d)), float(np.angle(q - e))
+
+
+def _side(joint: Joint) -> float:
+    """1 where pin Q lies left of D->E, -1 where it lies right of it."""
+    return {"left": 1.0, "right": -1.0}[joint.side or "left"]
+
+
+def oil_stiffness(cylinder: Cylinder, length: float) -> float:
+    """Stiffness (N/m) of the oil spring of a drive that is `length` (m) long; 0 of an incompressible cylinder."""
+    if cylinder.oil is None:
+        return cylinder.k or 0.0
+    oil, stroke = cylinder.oil, length - cylinder.closed_length
+    cap, rod = 0.25 * math.pi * oil.bore**2, 0.25 * math.pi * (oil.bore - oil.rod) * (oil.bore + oil.rod)
+    volumes = oil.cap_line + cap * stroke, oil.rod_line + rod * (cylinder.max_stroke - stroke)
+    return oil.bulk_modulus * (cap**2 / volumes[0] + rod**2 / volumes[1])
 
 
 def _rod(density: float, turning: float, a: float, b: float) -> RigidPart:

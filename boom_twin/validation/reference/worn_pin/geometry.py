@@ -76,11 +76,12 @@ def dot(a: complex, b: complex) -> float:
 
 
 def links(joint: Document, phi: float) -> tuple[Turn, Turn]:
-    """Headings of links L and R (`Turn`) at a joint angle phi; `joint` as in a scene's file. Pin Q is left of D->E."""
+    """Headings of links L and R (`Turn`) at a joint angle phi; `joint` as in a scene's file."""
     d, e, long, short = complex(*joint["D"]), complex(*joint["E"]) * exp(1j * phi), joint["lL"], joint["lR"]
     gap = e - d
     along = (abs(gap) ** 2 + long**2 - short**2) / (2.0 * abs(gap))
-    a = complex(along, sqrt(long**2 - along**2)) * gap / abs(gap)
+    height = sqrt(long**2 - along**2)
+    a = complex(along, -height if joint.get("side") == "right" else height) * gap / abs(gap)
     b = a - gap
     first = _solved(a, b, e)
     second = _solved(a, b, 1j * (e - a * first[0] ** 2 + b * first[1] ** 2))

@@ -23,6 +23,7 @@ from . import masses
 from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
 from .module import exudyn, items
+from .oil import oil_stiffness
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
 from .system import Boom, BuiltSection, Frame, Station, gravity_in_base, section_frames
@@ -177,13 +178,16 @@ def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
 def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float) -> None:
     """Oil spring and damper between the pins, or the drive length itself where the scene names no oil spring."""
     length = cylinder.closed_length + stroke
-    if cylinder.k is None:
+    if not cylinder.is_compressible:
         drive = boom.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[*pins], distance=length))
         boom.drives.append((int(drive), "distance"))
         return
     drive = boom.system.AddObject(
         items.ObjectConnectorSpringDamper(
-            markerNumbers=[*pins], referenceLength=length, stiffness=cylinder.k, damping=cylinder.d or 0.0
+            markerNumbers=[*pins],
+            referenceLength=length,
+            stiffness=float(oil_stiffness(cylinder, np.array(stroke))),
+            damping=cylinder.d or 0.0,
         )
     )
     boom.drives.append((int(drive), "referenceLength"))

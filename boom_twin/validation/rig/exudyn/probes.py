@@ -83,7 +83,7 @@ def _force(boom: Boom, index: int, number: int, at_rest: bool) -> Array:
     (seen in 1.13.6).
     """
     force = _data(boom, number, at_rest)[:, 1]
-    return -force if at_rest and boom.scene.joints[index].cylinder.k is None else force
+    return -force if at_rest and not boom.scene.joints[index].cylinder.is_compressible else force
 
 
 def _at_tip(boom: Boom, kind: Any) -> int:

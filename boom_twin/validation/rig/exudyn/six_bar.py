@@ -76,7 +76,7 @@ def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
     assert joint.C and joint.D and joint.E and joint.lL and joint.lR
     hinge = (length + joint.D[0], joint.D[1])
     start, end = frames[index - 1].point(hinge), frames[index].point(joint.E)
-    apex = _left_apex(start, end, joint.lL, joint.lR)
+    apex = _apex(start, end, joint.lL, joint.lR, joint.side == "right")
     half_left, half_right = (joint.lL / 2, 0.0), (joint.lR / 2, 0.0)
     left = Link(joint.mL or 0.0, joint.lL, _between(start, apex), half_left, (-joint.lL / 2, 0.0))
     right = Link(joint.mR or 0.0, joint.lR, _between(apex, end), (-joint.lR / 2, 0.0), half_right)
@@ -92,10 +92,10 @@ def _between(start: Array, end: Array) -> Frame:
     return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
 
 
-def _left_apex(start: Array, end: Array, from_start: float, from_end: float) -> Array:
-    """Third corner, left of start->end, of the triangle with these two sides (law of cosines)."""
+def _apex(start: Array, end: Array, from_start: float, from_end: float, is_right: bool) -> Array:
+    """Third corner, left or right of start->end, of the triangle with these two sides (law of cosines)."""
     base = end - start
     span = float(np.hypot(*base))
     opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))
-    heading = math.atan2(base[1], base[0]) + opening
+    heading = math.atan2(base[1], base[0]) + (-opening if is_right else opening)
     return start + from_start * np.array([math.cos(heading), math.sin(heading)])

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from ....errors import SolverError
+from ....scene.schema import Cylinder
 from ....types import Array
 from .module import exudyn
+from .oil import oil_stiffness
 from .parameter_changes import ParameterChanges
 from .system import Boom
 
@@ -133,6 +135,7 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     """
     rests = [_rests(boom, i, course) for i in range(len(boom.drives))]
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
+    oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]
     last = [float("nan")] * len(moving)
     spent = [0.0]
 
@@ -144,6 +147,8 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
         if course.load is not None:
             boom.push(course.load[row])
         course.changes.hand_over(row)
+        for drive, stiffness in oils:
+            boom.system.SetObjectParameter(drive, "stiffness", stiffness[row])
 
     def before_step(_: Any, at: float) -> bool:
         begun = time.perf_counter()
@@ -156,6 +161,8 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     for (drive, name), rest in zip(boom.drives, rests, strict=True):
         boom.system.SetObjectParameter(drive, name, rest[0])
     course.changes.hand_over(0)
+    for drive, stiffness in oils:
+        boom.system.SetObjectParameter(drive, "stiffness", stiffness[0])
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
@@ -164,9 +171,18 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
 
 def _rests(boom: Boom, index: int, course: Course) -> list[float]:
     """Lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
-    cylinder = boom.scene.joints[index].cylinder
+    cylinder = _cylinder(boom, index)
     lengths: Array = course.strokes[:, index] + cylinder.closed_length
-    if cylinder.k is not None:
-        stiffness = cylinder.k + course.changes.of(boom.drives[index][0], "stiffness")
-        lengths = lengths + (cylinder.d or 0.0) / stiffness * course.rates[:, index]
+    if cylinder.is_compressible:
+        lengths = lengths + (cylinder.d or 0.0) / _stiffness(boom, index, course) * course.rates[:, index]
     return [float(rest) for rest in lengths]
+
+
+def _stiffness(boom: Boom, index: int, course: Course) -> Array:
+    """Of an oil spring at the start and after every step, N/m: that of its drive's stroke, changed in the same proportion."""
+    stiffness = oil_stiffness(_cylinder(boom, index), course.strokes[:, index])
+    return np.asarray(stiffness + course.changes.of(boom.drives[index][0], "stiffness") * (stiffness / stiffness[0]))
+
+
+def _cylinder(boom: Boom, index: int) -> Cylinder:
+    return boom.scene.joints[index].cylinder

@@ -171,7 +171,7 @@ def one_pin(scene: Scene, index: int) -> Scene:
 
 
 def _hard(joint: Joint) -> Joint:
-    cylinder: Cylinder = joint.cylinder.model_copy(update={"k": None, "d": None})
+    cylinder: Cylinder = joint.cylinder.model_copy(update={"k": None, "oil": None, "d": None})
     return joint.model_copy(update={"cylinder": cylinder})
 
 

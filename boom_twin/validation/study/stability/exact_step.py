@@ -14,6 +14,7 @@ from ....analysis.equilibrium import set_undeformed
 from ....analysis.methods import FAMILIES
 from ....compiler.compile import compile_scene
 from ....compiler.plan import Plan
+from ....kernels.elements.cylinder import compliance_and_lag
 from ....kernels.integrators import prepare
 from ....kernels.tables import OK, Motion, State, Work
 from ....kernels.transfer.forward_kinematics import place
@@ -65,7 +66,7 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> StepRoundo
     scheme = prepare(FAMILIES["generalised-alpha"], rho, step, work.weights)
     motion = Motion(scheme.gain, scheme.rate, work.position.copy(), -scheme.rate * work.position)
     kinematics = Kinematics(plan, state.z.copy())
-    system = _System(plan, kinematics, scheme.gain, scheme.rate)
+    system = _System(plan, kinematics, scheme.gain, scheme.rate, work.position[plan.tables.cylinders.history].copy())
     exact, last = system.solve()
     tip = kinematics.tip
 
@@ -118,7 +119,7 @@ def _increments(
 class _System:
     """The whole system in extended precision, equilibrated and factored in double."""
 
-    def __init__(self, plan: Plan, kinematics: Kinematics, gain: float, rate: float) -> None:
+    def __init__(self, plan: Plan, kinematics: Kinematics, gain: float, rate: float, drives: Array) -> None:
         t, size = plan.tables, len(plan.names)
         self.moved, self.mass = kinematics.moved, (plan.masses * gain).astype(Long)
         self.mass[:size] = 0.0
@@ -132,8 +133,9 @@ class _System:
         for place_, row in rows:
             self.rest[place_] += row
             self.rest[:, place_] += row
-        for c in t.cylinders:
-            self.rest[c.z, c.z] -= Long(c.compliance) / (1 + Long(c.lag) * Long(rate))
+        for c, drive in zip(t.cylinders, drives, strict=True):
+            compliance, lag = compliance_and_lag(c, t.oils, drive)
+            self.rest[c.z, c.z] -= Long(compliance) / (1 + Long(lag) * Long(rate))
         self.load = self.moved.T @ plan.weights.astype(Long)
         double = self.moved.astype(float)
         whole = double.T @ (self.mass.astype(float)[:, None] * double) + self.rest.astype(float)

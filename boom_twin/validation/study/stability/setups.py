@@ -12,6 +12,7 @@ from ....analysis.methods import Drive
 from ....analysis.motions import FULL_STROKE, Motion, ease, ease_integral, motion_of
 from ....scene.edit import scaled
 from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
+from ....scene.oil_spring import middle_stiffness
 from ....scene.schema import Cylinder, CylinderPart, Joint, Scene, Section, Tip
 from ....scene.summary import explain
 from ....types import Array
@@ -24,9 +25,9 @@ def cylinders(scene: Scene, stiffness: float | None) -> Scene:
 
     def changed(cylinder: Cylinder) -> Cylinder:
         if stiffness is None:
-            return cylinder.model_copy(update={"k": None, "d": None})
-        lag = STEEL_LAG if cylinder.k is None else (cylinder.d or 0.0) / cylinder.k
-        return cylinder.model_copy(update={"k": stiffness, "d": lag * stiffness})
+            return cylinder.model_copy(update={"k": None, "oil": None, "d": None})
+        lag = (cylinder.d or 0.0) / middle_stiffness(cylinder) if cylinder.is_compressible else STEEL_LAG
+        return cylinder.model_copy(update={"k": stiffness, "oil": None, "d": lag * stiffness})
 
     return _joints(scene, lambda joint: joint.model_copy(update={"cylinder": changed(joint.cylinder)}))
 

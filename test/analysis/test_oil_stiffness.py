@@ -1,0 +1,146 @@
+"""A cylinder with `oil`: its stiffness is the contract's formula of the drive's stroke, wherever the model uses it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from oracle import booms
+
+from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin.analysis.modal import StrokeNoise, damping_ratio, natural_modes
+from boom_twin.analysis.simulate import simulate
+from boom_twin.calibration.unknowns import unknowns_of, usual_names
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.config.settings import load_settings
+from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.health.inference.fault_catalogue import parameters
+from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.reduction.variants import KINDS, without
+from boom_twin.scene.edit import parameter, parameter_names, with_parameters
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.scene.oil_spring import stiffness
+from boom_twin.types import Stream
+
+OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 8e-4}
+
+
+def formula(oil, max_stroke, stroke):
+    """k (N/m), as the contract writes it."""
+    a_c, a_r = math.pi / 4 * oil["bore"] ** 2, math.pi / 4 * (oil["bore"] ** 2 - oil["rod"] ** 2)
+    v_c, v_r = oil["cap_line"], oil["rod_line"]
+    return oil["bulk_modulus"] * (a_c**2 / (v_c + a_c * stroke) + a_r**2 / (v_r + a_r * (max_stroke - stroke)))
+
+
+def spec_with_oil(which=range(4)):
+    """The default boom, the cylinders `which` with oil, all of another size."""
+    spec = booms.document()
+    for i in which:
+        cylinder = spec["joints"][i]["cylinder"]
+        del cylinder["k"]
+        size = 1.0 - 0.15 * i
+        cylinder["oil"] = OIL | {"bore": OIL["bore"] * size, "rod": OIL["rod"] * size}
+    return spec
+
+
+def with_oil(which=range(4)):
+    return booms.scene_of(spec_with_oil(which))
+
+
+def with_numbers(strokes):
+    """The same boom with the k that its oil has at `strokes`, a number each."""
+    spec = spec_with_oil()
+    for joint, stroke in zip(spec["joints"], strokes, strict=True):
+        cylinder = joint["cylinder"]
+        cylinder["k"] = formula(cylinder.pop("oil"), cylinder["max_stroke"], stroke)
+    return booms.scene_of(spec)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_stiffness_is_that_of_both_columns(share):
+    cylinder = with_oil().joints[0].cylinder
+    stroke = share * cylinder.max_stroke
+    assert stiffness(cylinder, stroke) == pytest.approx(formula(OIL, cylinder.max_stroke, stroke), rel=1e-12)
+
+
+def test_stiffness_of_the_guide():
+    """Bore 100 mm, rod 70 mm, half of 0.64 m, a litre on each side: 36.9 kN/mm."""
+    cylinder = with_oil().joints[0].cylinder.model_copy(update={"max_stroke": 0.64})
+    oil = cylinder.oil.model_copy(update={"rod_line": 1e-3})
+    assert stiffness(cylinder.model_copy(update={"oil": oil}), 0.32) == pytest.approx(36.9e6, rel=2e-3)
+
+
+def test_no_oil_in_a_line_is_incompressible_at_its_end_only():
+    cylinder = with_oil().joints[0].cylinder
+    cylinder = cylinder.model_copy(update={"oil": cylinder.oil.model_copy(update={"cap_line": 0.0})})
+    assert stiffness(cylinder, 0.0) == math.inf and stiffness(cylinder, 0.1) < 1e9
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch", "high", "low"])
+def test_rest_frequencies_and_damping_are_those_of_the_number(posture):
+    scene = with_oil()
+    numbers = with_numbers(strokes_of_posture(scene, posture))
+    found, expected = (statics(one, posture=posture) for one in (scene, numbers))
+    assert found.tip == pytest.approx(expected.tip, abs=1e-10)
+    assert found.cylinder_forces == pytest.approx(expected.cylinder_forces, rel=1e-8)
+    assert found.frequencies == pytest.approx(expected.frequencies, rel=1e-8)
+    strokes = strokes_of_posture(scene, posture)
+    booms_ = [rest_at(one, strokes, joint_angles_of_strokes(one, strokes)) for one in (scene, numbers)]
+    damping = [[damping_ratio(boom[0], mode) for mode in natural_modes(*boom, 4)] for boom in booms_]
+    assert damping[0] == pytest.approx(damping[1], rel=1e-6)
+
+
+def test_a_held_boom_swings_as_with_the_number_and_a_moved_one_does_not():
+    """The stiffness follows the stroke of the drive: alike to a small test move, apart after 0.3 m."""
+    scene = with_oil()
+    first = strokes_of_posture(scene, "arch")
+    numbers, times = with_numbers(first), np.linspace(0.0, 1.0, 101)
+    shape = np.clip(times / 0.8, 0.0, 1.0)[:, None] ** 3 * np.array([1.0, 0.0, 0.0, 0.0])
+    still, moved = (first + travel * shape for travel in (1e-6, -0.3))
+    tips = [[simulate(one, times, strokes, dt=2e-3).tip[:, :2] for one in (scene, numbers)] for strokes in (still, moved)]
+    apart = [np.linalg.norm(one - other, axis=1).max() for one, other in tips]
+    assert apart[0] < 1e-6 and apart[1] > 1e-3
+
+
+def test_the_estimate_follows_the_stroke():
+    """Compliance in the filter of deviations: half the stroke before any sample, then that of the posture."""
+    scene = with_oil()
+    strokes = strokes_of_posture(scene, "high")
+    plan, angles = compile_scene(scene), joint_angles_of_strokes(scene, strokes)
+    modes = DeviationModes(scene, plan, load_settings(), (None,) * 4)
+    modes.refresh(strokes, angles, StrokeNoise(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)), np.zeros(0), ()))
+    expected = [formula(j["cylinder"]["oil"], j["cylinder"]["max_stroke"], s)
+                for j, s in zip(spec_with_oil()["joints"], strokes, strict=True)]  # fmt: skip
+    assert 1.0 / modes.filter.softness == pytest.approx(expected, rel=1e-12)
+
+
+def test_signatures_of_health_are_those_of_the_number():
+    scene = with_oil()
+    strokes = strokes_of_posture(scene, "arch")
+    tables = []
+    for one in (scene, with_numbers(strokes)):
+        known = parameters(one)
+        found = Signatures(one, known, (None,) * 4).at(strokes)
+        columns = [k for k, each in enumerate(known) if each.kind == "softer"]
+        assert found is not None and [known[k].cause for k in columns][:4] == [f"cylinder_{i}.k" for i in range(1, 5)]
+        tables.append(found.channels[:, columns])
+    assert tables[0] == pytest.approx(tables[1], rel=1e-5, abs=1e-9)
+
+
+def test_a_parameter_k_is_the_bulk_modulus():
+    scene = with_oil([1])
+    assert "cylinder_2.k" in parameter_names(scene) and "cylinder_2.k" in usual_names(scene, [Stream.ANGLES])
+    now = parameter(scene, "cylinder_2.k")
+    assert unknowns_of(scene, ["cylinder_2.k"])[0].present == now
+    soft = with_parameters(scene, {"cylinder_2.k": 0.8 * now})
+    old, new = scene.joints[1].cylinder, soft.joints[1].cylinder
+    assert new.k is None and new.oil.bulk_modulus == pytest.approx(0.8 * old.oil.bulk_modulus, rel=1e-12)
+    for stroke in (0.0, 0.1, 0.4):
+        assert stiffness(new, stroke) == pytest.approx(0.8 * stiffness(old, stroke), rel=1e-12)
+
+
+def test_left_out_it_is_incompressible():
+    kind = next(kind for kind in KINDS if kind.name == "cylinder compliance")
+    cylinder = without(with_oil([1]), kind, [1]).of(with_oil([1])).joints[1].cylinder
+    assert (cylinder.k, cylinder.oil, cylinder.d) == (None, None, None)
