@@ -46,7 +46,9 @@ from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
 from ..types import NANO, Array
 
 MODES = 6  # at most
-LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
+LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
+SLOW = 0.5
+BIAS_OFF, BIAS_DRIFT = 0.03, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
 SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
@@ -59,7 +61,7 @@ INEXACT = 0.05  # share of the deviation that modes and static corrections may b
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
 
-LOAD, ERROR, SHARES = 0, 2, 4
+LOAD, LOAD_CHANGE, ERROR, BIAS, SHARES = 0, 2, 4, 6, 8
 """First places in the state: the load's x and y, e's x and y, the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
 
 WIDTH = 22
@@ -160,12 +162,12 @@ def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
     gravity : ndarray, shape (2,)
         m/s^2.
     """
+    h = (stamp - f.status[STAMP]) * NANO
+    f.status[STAMP], f.now[STEP] = stamp, h
     follow_posture(f, live)
     follow_prediction(f, results, estimates, moments, gravity)
     if f.status[STARTED] == 0:
         start_state(f)
-    h = (stamp - f.status[STAMP]) * NANO
-    f.status[STAMP], f.now[STEP] = stamp, h
     if f.status[FED] == 0 or h <= 0.0:
         return
     steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
@@ -195,7 +197,9 @@ def start_state(f):
             f.p[k, b] = 0.0
     for b in range(2):
         add_unknown(f, b, f.loads[USUAL_LOAD])
+        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.loads[USUAL_LOAD]) ** 2
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
+        f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
     for i in range(n):
         if f.softness[i] > 0.0:
             add_unknown(f, 2 + i, SCENE_ERROR)
@@ -251,17 +255,18 @@ def follow_posture(f, live):
 def follow_prediction(f, results, estimates, moments, gravity):
     """How load and shares drive the modes at the predicted forces and moments."""
     n = f.softness.shape[0]
+    kept = math.exp(-min(max(f.now[STEP], 0.0) / SLOW, 50.0)) if f.status[STARTED] else 0.0
     for i in range(n):
-        f.drawn[i] = results.cylinder_forces[i] * f.softness[i]
+        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * results.cylinder_forces[i] * f.softness[i]
         f.variances[i] = estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
         c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
         for i in range(n):
-            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], 0.0
+            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], kept * c[2 + n + i]
         for k in range(moments.shape[0]):
-            c[2 + n + f.sections[k]] += f.bending[j, k] * moments[k]
+            c[2 + n + f.sections[k]] += (1.0 - kept) * f.bending[j, k] * moments[k]
     f.now[ANGLE] = results.tip[0, 2]
     f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
 
@@ -332,19 +337,39 @@ def step_state(f, h):
         p[at + 1, at + 1] += share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
     step_inputs(f, 0.5 * h, size)
     kept = math.exp(-h / JERK_TIME)
-    fade(f, ERROR, kept, f.pushes[0], size)
-    fade(f, ERROR + 1, kept, f.pushes[1], size)
+    for b in range(2):
+        fade(f, ERROR + b, kept, f.pushes[b], size)
+        f.p[BIAS + b, BIAS + b] += BIAS_DRIFT * BIAS_DRIFT * h
 
 
 @inner
 def step_inputs(f, h, size):
     """Load and shares h (s) later."""
-    kept, level2 = math.exp(-h / LOAD_TIME), f.level[0] * f.level[0]
-    fade(f, LOAD, kept, level2, size)
-    fade(f, LOAD + 1, kept, level2, size)
+    step_load(f, LOAD, h, size)
+    step_load(f, LOAD + 1, h, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
             f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+
+
+@inner
+def step_load(f, place, h, size):
+    """A component of the load and its rate h (s) later: exact."""
+    change = place + LOAD_CHANGE - LOAD
+    x, p, e, level2 = f.x, f.p, math.exp(-LOAD_RATE * h), f.level[0] * f.level[0]
+    a11, a12, a21, a22 = e * (1.0 + LOAD_RATE * h), e * h, -e * LOAD_RATE * LOAD_RATE * h, e * (1.0 - LOAD_RATE * h)
+    x[place], x[change] = a11 * x[place] + a12 * x[change], a21 * x[place] + a22 * x[change]
+    for k in range(size):
+        u, v = p[place, k], p[change, k]
+        p[place, k], p[change, k] = a11 * u + a12 * v, a21 * u + a22 * v
+    for k in range(size):
+        u, v = p[k, place], p[k, change]
+        p[k, place], p[k, change] = a11 * u + a12 * v, a21 * u + a22 * v
+    rate2 = LOAD_RATE * LOAD_RATE * level2
+    p[place, place] += level2 - a11 * a11 * level2 - a12 * a12 * rate2
+    p[place, change] -= a11 * a21 * level2 + a12 * a22 * rate2
+    p[change, place] -= a11 * a21 * level2 + a12 * a22 * rate2
+    p[change, change] += rate2 - a21 * a21 * level2 - a22 * a22 * rate2
 
 
 @inner
@@ -480,9 +505,11 @@ def take_imu(f, residuals, first, stamp):
     c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
     if usable(f, first, residuals[0]):
         read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
+        f.row[BIAS] = 1.0
         correct(f, first, residuals[0], f.noise[first], age)
     if usable(f, first + 1, residuals[1]):
         read_acceleration(f, -s, c, 0.0, -c * f.now[FELT_X] - s * f.now[FELT_Y], f.row)
+        f.row[BIAS + 1] = 1.0
         correct(f, first + 1, residuals[1], f.noise[first + 1], age)
 
 
