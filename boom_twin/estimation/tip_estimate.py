@@ -5,14 +5,17 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
 
     q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j = Phi_j^T f + sum_i N_ij (F_i / k_i) a_i + sum_s B_js b_s + w_j
 
-- f (2), N: force at the tip that the model does not know, a Gauss-Markov process of correlation time `LOAD_TIME`; Phi_j is the
-  mode's motion of the tip, 1/sqrt(kg). Its level follows the sensors: while successive innovations of the angles are alike,
-  the filter is too slow and the level rises, while they alternate it is too quick and it falls (Mehra 1970). A pump's pulses
-  need no periodic part of their own: the process is as wide as they are.
+- f (2), N: force at the tip that the model does not know, a Gauss-Markov process of second order, twice damped at `LOAD_RATE`,
+  so that its rate is a state too: what shakes a boom has no corners, and a process of first order states twice the error of
+  the acceleration that there is. Phi_j is the mode's motion of the tip, 1/sqrt(kg). Its level follows the sensors: while
+  successive innovations of the angles are alike, the filter is too slow and the level rises, while they alternate it is too
+  quick and it falls (Mehra 1970). A pump's pulses need no periodic part of their own: the process is as wide as they are.
 - a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
-  F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it.
+  F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it. F_i is
+  its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i
+  would be drawn to what explains noise by noise.
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
-  moment, M_j the mode's, w Simpson's weights.
+  moment, slow likewise, M_j the mode's, w Simpson's weights.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
 - e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
   Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke.
@@ -21,7 +24,7 @@ Measured less predicted:
 
     angle_i   Theta_i q + what is quasi-static in a and b and in no mode
     force_i   N_i q, likewise
-    IMU       Phi q'' + e, turned into the tip's axes, and the specific force turned by the tip's own turn
+    IMU       Phi q'' + e, turned into the tip's axes, the specific force turned by the tip's own turn, and a bias of each axis
 
 What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
 cylinder's force. The part of that which the few modes lack is added (static correction).
@@ -46,12 +49,14 @@ from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
 from ..types import NANO, Array
 
 MODES = 6  # at most
-LOAD_TIME, JERK_TIME = 1.0, 0.02  # s
+LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
+SLOW = 0.5  # s, over which the forces are taken that a and b are learnt from
+BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
 SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
-SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
-AGILITY = 1.0  # 1/s, by which the load's level follows the innovations
+SOFT, SOFTENING = 0.5, 0.01  # standard deviation of a once anything is measured, and what is added to it in a second
+AGILITY, RETREAT = 2.0, 0.02  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
@@ -59,8 +64,9 @@ INEXACT = 0.05  # share of the deviation that modes and static corrections may b
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
 
-LOAD, ERROR, SHARES = 0, 2, 4
-"""First places in the state: the load's x and y, e's x and y, the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
+LOAD, LOAD_CHANGE, ERROR, BIAS, SHARES = 0, 2, 4, 6, 8
+"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the shares a (n,) and
+b (n,); then q_j and q_j' of every mode."""
 
 WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
@@ -88,7 +94,7 @@ class DeviationFilter(NamedTuple):
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
-    coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m. variances : (n,) of the strokes' estimates, m^2.
+    coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m, slow. variances : (n,) of the strokes' estimates, m^2.
     pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. last : (c,) innovations. level : (1,) N.
     loads : (3,) least and largest level, and the usual one that it begins with, N.
@@ -160,12 +166,12 @@ def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
     gravity : ndarray, shape (2,)
         m/s^2.
     """
+    h = (stamp - f.status[STAMP]) * NANO
+    f.status[STAMP], f.now[STEP] = stamp, h
     follow_posture(f, live)
     follow_prediction(f, results, estimates, moments, gravity)
     if f.status[STARTED] == 0:
         start_state(f)
-    h = (stamp - f.status[STAMP]) * NANO
-    f.status[STAMP], f.now[STEP] = stamp, h
     if f.status[FED] == 0 or h <= 0.0:
         return
     steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
@@ -195,7 +201,9 @@ def start_state(f):
             f.p[k, b] = 0.0
     for b in range(2):
         add_unknown(f, b, f.loads[USUAL_LOAD])
+        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.loads[USUAL_LOAD]) ** 2
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
+        f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
     for i in range(n):
         if f.softness[i] > 0.0:
             add_unknown(f, 2 + i, SCENE_ERROR)
@@ -251,17 +259,18 @@ def follow_posture(f, live):
 def follow_prediction(f, results, estimates, moments, gravity):
     """How load and shares drive the modes at the predicted forces and moments."""
     n = f.softness.shape[0]
+    kept = math.exp(-min(max(f.now[STEP], 0.0) / SLOW, 50.0)) if f.status[STARTED] else 0.0
     for i in range(n):
-        f.drawn[i] = results.cylinder_forces[i] * f.softness[i]
+        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * results.cylinder_forces[i] * f.softness[i]
         f.variances[i] = estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
         c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
         for i in range(n):
-            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], 0.0
+            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], kept * c[2 + n + i]
         for k in range(moments.shape[0]):
-            c[2 + n + f.sections[k]] += f.bending[j, k] * moments[k]
+            c[2 + n + f.sections[k]] += (1.0 - kept) * f.bending[j, k] * moments[k]
     f.now[ANGLE] = results.tip[0, 2]
     f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
 
@@ -332,19 +341,38 @@ def step_state(f, h):
         p[at + 1, at + 1] += share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
     step_inputs(f, 0.5 * h, size)
     kept = math.exp(-h / JERK_TIME)
-    fade(f, ERROR, kept, f.pushes[0], size)
-    fade(f, ERROR + 1, kept, f.pushes[1], size)
+    for b in range(2):
+        fade(f, ERROR + b, kept, f.pushes[b], size)
+        f.p[BIAS + b, BIAS + b] += BIAS_DRIFT * BIAS_DRIFT * h
 
 
 @inner
 def step_inputs(f, h, size):
     """Load and shares h (s) later."""
-    kept, level2 = math.exp(-h / LOAD_TIME), f.level[0] * f.level[0]
-    fade(f, LOAD, kept, level2, size)
-    fade(f, LOAD + 1, kept, level2, size)
+    for b in range(2):
+        step_load(f, LOAD + b, LOAD_CHANGE + b, h, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
             f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+
+
+@inner
+def step_load(f, place, change, h, size):
+    """A component of the load and its rate h (s) later, at these places: exact."""
+    x, p, e, level2 = f.x, f.p, math.exp(-LOAD_RATE * h), f.level[0] * f.level[0]
+    a11, a12, a21, a22 = e * (1.0 + LOAD_RATE * h), e * h, -e * LOAD_RATE * LOAD_RATE * h, e * (1.0 - LOAD_RATE * h)
+    x[place], x[change] = a11 * x[place] + a12 * x[change], a21 * x[place] + a22 * x[change]
+    for k in range(size):
+        u, v = p[place, k], p[change, k]
+        p[place, k], p[change, k] = a11 * u + a12 * v, a21 * u + a22 * v
+    for k in range(size):
+        u, v = p[k, place], p[k, change]
+        p[k, place], p[k, change] = a11 * u + a12 * v, a21 * u + a22 * v
+    rate2 = LOAD_RATE * LOAD_RATE * level2  # at rest in itself, load and rate have these variances and no covariance
+    p[place, place] += level2 - a11 * a11 * level2 - a12 * a12 * rate2
+    p[place, change] -= a11 * a21 * level2 + a12 * a22 * rate2
+    p[change, place] -= a11 * a21 * level2 + a12 * a22 * rate2
+    p[change, change] += rate2 - a21 * a21 * level2 - a22 * a22 * rate2
 
 
 @inner
@@ -466,7 +494,7 @@ def take_angles(f, residuals, first, stamp):
             count += 1
     if count > 0 and stamp > f.status[ANGLES_STAMP]:
         h = min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP)
-        level = f.level[0] * math.exp(AGILITY * h * alike / math.sqrt(count))
+        level = f.level[0] * math.exp(AGILITY * h * (alike / math.sqrt(count) - RETREAT))
         f.level[0] = min(max(level, f.loads[LEAST_LOAD]), f.loads[MOST_LOAD])
         f.status[ANGLES_STAMP] = stamp
 
@@ -480,9 +508,11 @@ def take_imu(f, residuals, first, stamp):
     c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
     if usable(f, first, residuals[0]):
         read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
+        f.row[BIAS] = 1.0
         correct(f, first, residuals[0], f.noise[first], age)
     if usable(f, first + 1, residuals[1]):
         read_acceleration(f, -s, c, 0.0, -c * f.now[FELT_X] - s * f.now[FELT_Y], f.row)
+        f.row[BIAS + 1] = 1.0
         correct(f, first + 1, residuals[1], f.noise[first + 1], age)
 
 
