@@ -9,32 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
 
 from ..errors import Fault, SceneError, SceneWarning
+from .block_reader import validated
 from .checks import clearance, geometry, values
-from .checks.findings import Draft, Finding, unknown_key, value_fault
+from .checks.findings import Draft, Finding
+from .format import SCENE
 from .glossary import BLOCKS
 from .schema import Scene
 from .yaml_reader import Document, Place, missing_end_mark, parse, read_text
 
-EMPTY: tuple[Any, ...] = (None, {}, ())
-LISTS = ("sections", "joints", "pins")
-
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
     """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
-    known, faults = _known(document, document.values, Scene, ())
-    broken: set[Place] = set()
-    scene: Scene | None = None
-    try:
-        scene = Scene.model_validate(known, strict=True)
-    except ValidationError as error:
-        for detail in error.errors(include_url=False):
-            place: Place = detail["loc"]
-            faults.append(value_fault(document, detail, place))
-            broken.add(place[:2] if place[:1] in (("sections",), ("joints",), ("postures",)) else place[:1])
-    return scene, _draft(document, known, broken), faults
+    read = validated(document, SCENE)
+    deep = (("sections",), ("joints",), ("postures",))
+    broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
+    return read.block, _draft(document, read.known, broken), list(read.faults)
 
 
 def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
@@ -53,34 +44,6 @@ def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
         elif key != "description":
             blocks[key] = value if model is None else model.model_validate(value, strict=True)
     return Draft(document, **blocks)
-
-
-def _known(document: Document, block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
-    """A block without unknown keys and without empty ones, and a fault for every unknown key."""
-    if not isinstance(block, dict):
-        return block, []
-    known: dict[str, Any] = {}
-    faults: list[Fault] = []
-    for key, value in block.items():
-        here = (*place, key)
-        inner = BLOCKS.get(model, {}).get(key)
-        if key not in model.model_fields:
-            faults.append(unknown_key(document, here, value, model))
-        elif value in EMPTY:
-            continue
-        elif key in LISTS and inner is not None:
-            if not isinstance(value, tuple):
-                known[key] = value
-                continue
-            pairs = [_known(document, item, inner, (*here, i)) for i, item in enumerate(value)]
-            known[key] = tuple(item for item, _ in pairs)
-            faults += [fault for _, found in pairs for fault in found]
-        elif inner is not None:
-            known[key], found = _known(document, value, inner, here)
-            faults += found
-        else:
-            known[key] = value
-    return known, faults
 
 
 CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
