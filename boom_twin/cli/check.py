@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..config.settings import load_settings
-from ..errors import Fault
+from ..errors import Fault, SceneError
 from ..estimation.stroke_filter import filter_band
 from ..scene import Scene
 from ..scene.load import DEFAULT_NAME, examine
@@ -29,6 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Scene, ``--json``, what a search for the leanest model takes."""
     add_scene(parser)
     add_json(parser)
+    parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
     need.add_arguments(parser)
     accuracy.add_arguments(parser)
 
@@ -38,8 +39,10 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
-    account = explain(scene)
     name = args.scene or DEFAULT_NAME
+    if args.strict and oddities:
+        raise SceneError(name, tuple(oddities))
+    account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
         found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))

@@ -51,7 +51,7 @@ def validated(document: Document, form: Format[Root]) -> Validated[Root]:
     return Validated(None, known, frozenset(detail["loc"] for detail in details), tuple(faults))
 
 
-def _known(document: Document, form: Format, block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
+def _known(document: Document, form: Format[Any], block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
     """A block without unknown keys and without empty ones, quantities in their keys' units; a fault for every unknown key."""
     if not isinstance(block, dict):
         return block, []

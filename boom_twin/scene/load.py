@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import Fault, SceneError, SceneWarning
 from .block_reader import validated
-from .checks import clearance, geometry, values
+from .checks import clearance, cross_sections, geometry, rigid_bodies, stretched_boom, values
 from .checks.findings import Draft, Finding
 from .format import SCENE
 from .glossary import BLOCKS
@@ -58,6 +58,15 @@ CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     geometry.joints,
     values.suspects,
 )
+
+
+PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
+    cross_sections.material,
+    cross_sections.beams,
+    rigid_bodies.rigid_parts,
+    rigid_bodies.moving_parts,
+)
+"""Of a scene without faults: parts against each other."""
 
 
 DEFAULT_NAME = "default scene"
@@ -122,12 +131,30 @@ def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list
     scene, draft, faults = structure(document)
     with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
         findings = [finding for check in CHECKS for finding in check(draft)]
+        if scene is not None and not faults and all(finding.odd for finding in findings):
+            findings += _implausible(draft, scene, findings)
     faults += document.faults + [finding.fault for finding in findings if not finding.odd]
     odd = [finding.fault for finding in findings if finding.odd]
     oddities = _in_order(odd if unmarked is None else [*odd, unmarked])
     if faults or scene is None:
         raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
     return scene, oddities
+
+
+def _implausible(draft: Draft, scene: Scene, findings: list[Finding]) -> list[Finding]:
+    """What does not fit together; one cause one warning, so nothing of a block of which something else is told already."""
+    more: list[Finding] = []
+    told = {_block(finding) for finding in findings}
+    for check in PLAUSIBILITY:
+        new = [finding for finding in check(draft, scene) if _block(finding) not in told]
+        told |= {_block(finding) for finding in new}
+        more += new
+    return more + stretched_boom.stretched_boom(draft, scene, [finding.fault.path for finding in (*findings, *more)])
+
+
+def _block(finding: Finding) -> str:
+    """``sections[1]`` of ``sections[1].root.mass``."""
+    return finding.fault.path.partition(".")[0]
 
 
 def _in_order(faults: Iterable[Fault]) -> list[Fault]:

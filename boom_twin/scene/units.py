@@ -16,9 +16,7 @@ from .yaml_reader import NUMBER
 if TYPE_CHECKING:
     from pint import Unit, UnitRegistry
 
-_STATED = re.compile(
-    r"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|N s/m|N/m|Pa|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])"
-)
+_STATED = re.compile(r"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|N s/m|N/m|Pa|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])")
 _TERM = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)?-?[1-9]|[²³⁴])?"
 _QUANTITY = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>{_TERM}(?:(?:\s*[*/·]\s*|\s+){_TERM})*)")
 _LONGEST = 60  # characters

@@ -16,7 +16,8 @@ from boom_twin.scene.schema import Material, Scene
 from boom_twin.scene.units import converted, unit_of
 
 OTHER = {
-    "m": (1000, "mm"), "m^2": (1e4, "cm^2"), "m^4": (1e8, "cm4"), "kg": (1e-3, "t"), "kg/m": (1e-3, "kg/mm"), "Pa": (1e-9, "GPa"),
+    "m": (1000, "mm"), "m^2": (1e4, "cm^2"), "m^4": (1e8, "cm4"), "kg": (1e-3, "t"), "kg/m": (1e-3, "kg/mm"),
+    "Pa": (1e-9, "GPa"),
     "N/m": (1e-6, "kN/mm"), "N s/m": (1e-3, "kN*s/m"), "s": (1e3, "ms"), "kg/m^3": (1e-3, "g/cm³"), "m/s^2": (1e2, "cm/s^2"),
     "kg m^2": (1e4, "kg cm²"), "kg m": (1e2, "kg·cm"), "degrees": (1, "deg"),
 }  # fmt: skip

@@ -160,8 +160,8 @@ SUSPECTS: dict[str, tuple[float, str, str]] = {
     "A": (1.0, "more than 1 m^2: cm^2 or mm^2?", "Give the area in m^2: 49 cm^2 is 4.9e-3."),
     "I": (0.1, "more than 0.1 m^4: cm^4 or mm^4?", "Give the second moment in m^4: 3600 cm^4 is 3.6e-5."),
     "rho_A": (5000.0, "more than 5000 kg/m: a density in kg/m^3?", "Give the mass of one metre of the section."),
-    "line_fill": (500.0, "more than 500 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
-    "inclination": (1.0, "more than 1 rad: degrees?", "Give radians: 5 degrees are 0.0873."),
+    "line_fill": (100.0, "more than 100 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
+    "inclination": (0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?", "Give radians: 5 degrees are 0.0873."),
     "closed_length": (50.0, "more than 50 m: mm?", "Give lengths in m."),
     "max_stroke": (50.0, "more than 50 m: mm?", "Give lengths in m."),
 }
@@ -201,6 +201,10 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
     elif key == "k" and value < 1e4:
         yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
+    elif key == "k" and not 1e6 <= value <= 1e9:
+        unit, newtons = ("kN/m", 1e3) if value < 1e6 else ("mN/m", 1e-3)
+        bound = f"expected from 1e6 to 1e9 N/m: {unit}?"
+        yield warning(draft, place, value, bound, f"Give N/m: {value:g} {unit} are {value * newtons:g}.")
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
@@ -218,6 +222,9 @@ def _upper(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, looks, remedy)
 
 
+TILT = 1e-3  # of gravity against -y, rad
+
+
 def _gravity(draft: Draft) -> Iterator[Finding]:
     if draft.gravity is not None:
         if not 9.7 < math.hypot(*draft.gravity) < 9.9:
@@ -225,6 +232,9 @@ def _gravity(draft: Draft) -> Iterator[Finding]:
             yield warning(draft, ("gravity",), draft.gravity, bound, "Usual is [0.0, -9.81].")
         elif draft.gravity[1] > 0:
             yield warning(draft, ("gravity",), draft.gravity, "it points upwards", "Usual is [0.0, -9.81].")
+        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
+            bound = "it does not point along -y, which is down"
+            yield warning(draft, ("gravity",), draft.gravity, bound, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
 
 
 def _postures(draft: Draft) -> Iterator[Finding]:
