@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and tell what its model consists of",
+    "init": "write a first scene from the dimensions of a drawing",
     "info": "what a recorded session holds and what it lacks",
     "monitor": "the live page, of the topics or of a recorded session",
     "play": "publish a recorded session over ROS 2",
