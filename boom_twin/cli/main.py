@@ -39,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "scene": "print the default scene file",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
+    "envelope": "deflection, forces, frequencies and stresses over the working range",
     "simulate": "the boom's answer to a stroke history",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",
@@ -192,7 +193,12 @@ def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str])
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print one flat JSON object; a number that is not finite becomes null."""
-    print(json.dumps({key: _plain(value) for key, value in values.items()}, allow_nan=False))
+    print(json.dumps(plain_values(values), allow_nan=False))
+
+
+def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values as JSON has them; a number that is not finite becomes None."""
+    return {key: _plain(value) for key, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
