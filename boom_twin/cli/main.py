@@ -39,7 +39,7 @@ COMMANDS: dict[str, str] = {
     "scene": "print the default scene file",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
-    "envelope": "deflection, forces, frequencies and stresses over the working range",
+    "envelope": "sag, forces, frequencies, stresses over the whole range",
     "simulate": "the boom's answer to a stroke history",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",

@@ -27,7 +27,7 @@ SLIPS: dict[str, tuple[Place, Any, str, tuple[str, ...]]] = {
     "k in kN/m": (j(0, "cylinder", "k"), 40e3, "joints[0].cylinder.k", ("kN/m?", "4e+07")),
     "k of the last cylinder in kN/m": (j(3, "cylinder", "k"), 6e3, "joints[3].cylinder.k", ("kN/mm?",)),
     "k ten times too small": (j(1, "cylinder", "k"), 3.0e6, "joints[1].cylinder.k", ("gives way by", "2 % of its stroke")),
-    "k in mN/m": (j(2, "cylinder", "k"), 2e10, "joints[2].cylinder.k", ("expected from 1e6 to 1e9",)),
+    "k in N/m times a thousand": (j(2, "cylinder", "k"), 2e10, "joints[2].cylinder.k", ("expected from 1e6 to 1e9",)),
     "d in kN s/m": (j(0, "cylinder", "d"), 120.0, "joints[0].cylinder.d", ("would damp a mode of",)),
     "d 100 times too large": (j(1, "cylinder", "d"), 9e6, "joints[1].cylinder.d", ("would damp a mode of",)),
     "beta in ms": (s(0, "beta"), 1.0, "sections[0].beta", ("would damp a mode of",)),

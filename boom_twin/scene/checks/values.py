@@ -201,10 +201,12 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
     elif key == "k" and value < 1e4:
         yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
-    elif key == "k" and not 1e6 <= value <= 1e9:
-        unit, newtons = ("kN/m", 1e3) if value < 1e6 else ("mN/m", 1e-3)
-        bound = f"expected from 1e6 to 1e9 N/m: {unit}?"
-        yield warning(draft, place, value, bound, f"Give N/m: {value:g} {unit} are {value * newtons:g}.")
+    elif key == "k" and value < 1e6:
+        bound = "expected from 1e6 to 1e9 N/m: kN/m?"
+        yield warning(draft, place, value, bound, f"Give N/m: {value:g} kN/m are {value * 1e3:g}.")
+    elif key == "k" and value > 1e9:
+        remedy = "Check its unit, N/m, or the bore and the oil that it comes from."
+        yield warning(draft, place, value, "expected from 1e6 to 1e9 N/m", remedy)
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
