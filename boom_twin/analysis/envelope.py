@@ -89,22 +89,23 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
     plan = compile_scene(scene)
     bending, owners = moments_by_unknowns(plan), np.array([station.section for station in stations(scene)], dtype=int)
     rows, names, skipped = [], [], dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
-    for number, (name, angles) in enumerate(postures, 1):
-        strokes = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(plan.joints)])
+    for number, (name, relative) in enumerate(postures, 1):
+        strokes = np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(plan.joints)])
         if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
             skipped["out of a cylinder's travel"] += 1
         else:
             try:
-                rows.append(_at_rest(scene, plan, strokes, angles, bending, owners))
+                rows.append(_at_rest(scene, plan, strokes, relative, bending, owners))
                 names.append(name)
             except SolverError:
                 skipped["no equilibrium"] += 1
         progress(number, len(postures))
     if not rows:
         raise SolverError(f"none of {len(postures)} postures has an equilibrium. Check masses, stiffnesses and range_deg.")
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    angles, tips, deflections, forces, frequencies, moments = (np.array(column) for column in zip(*rows, strict=True))
     moduli = np.array([section.section_modulus or np.nan for section in scene.sections])
-    return Envelope(tuple(names), *columns, stresses=np.abs(columns[-1]) / moduli, skipped=skipped)
+    stresses = np.abs(moments) / moduli
+    return Envelope(tuple(names), angles, tips, deflections, forces, frequencies, moments, stresses, skipped)
 
 
 def _grid(scene: Scene) -> list[Array]:

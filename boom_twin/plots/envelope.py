@@ -46,7 +46,9 @@ def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tup
 
 def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
     axes.set_aspect("equal", adjustable="datalim")
-    shown = axes.scatter(*found.tips.T, c=1e3 * found.deflections, s=26, cmap="viridis_r", zorder=3, label="tips")
+    shown = axes.scatter(
+        found.tips[:, 0], found.tips[:, 1], c=1e3 * found.deflections, s=26, cmap="viridis_r", zorder=3, label="tips"
+    )
     axes.figure.colorbar(shown, ax=axes, label="tip deflection, mm", shrink=0.6, location="bottom", pad=0.02)
     worst = {"largest deflection": found.deflections.argmax()}
     if found.frequencies.shape[1]:

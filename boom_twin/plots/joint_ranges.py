@@ -54,7 +54,7 @@ def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
 
 def _straight(scene: Scene) -> Array:
     """Joint angles (rad) of the boom as straight as its ranges allow."""
-    return np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints])))
+    return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
 
 
 def _boom(axes: Axes, scene: Scene) -> None:
@@ -72,7 +72,7 @@ def _boom(axes: Axes, scene: Scene) -> None:
     for i in range(len(scene.sections)):
         draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
         middle = bones.point(i, 0.5 * scene.sections[i].length)
-        axes.annotate(str(i + 1), middle, ha="center", va="center", fontsize=12, zorder=9)
+        axes.annotate(str(i + 1), (middle[0], middle[1]), ha="center", va="center", fontsize=12, zorder=9)
     for pivot in bones.pivots:
         draw_pin(axes, pivot, 4.0)
     axes.set_title("each section alone at the ends of its joint's range")
@@ -118,7 +118,9 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
     draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, SLENDER * length)
     for name, pin in _named(joint).items():
         draw_pin(axes, pin, 5.0, colour)
-        axes.annotate(name, pin, (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12)
+        axes.annotate(
+            name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12
+        )
 
 
 def _named(joint: JointPins) -> dict[str, Array]:

@@ -7,7 +7,7 @@ frequency, which `boom_twin.scene.straight_boom` estimates.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -105,7 +105,11 @@ def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[st
     """A rigid end, and its formula."""
     length = stop - start
     mass = ENDS * per_metre * length
-    values = {"mass": mass, "com": [0.5 * (start + stop), 0.0], "inertia": mass * (length**2 + height**2) / 12}
+    values: dict[str, float | list[float]] = {
+        "mass": mass,
+        "com": [0.5 * (start + stop), 0.0],
+        "inertia": mass * (length**2 + height**2) / 12,
+    }
     return _block(values), f"[estimate] m = {ENDS:g} rho_A a, a = {length:.3g}; m (a^2 + h^2) / 12"
 
 
@@ -191,7 +195,7 @@ def _item(rows: list[Row]) -> list[str]:
     return lines
 
 
-def _block(values: dict[str, float | list[float]]) -> str:
+def _block(values: Mapping[str, float | list[float]]) -> str:
     shown = (f"{key}: {_list(value) if isinstance(value, list) else _number(value)}" for key, value in values.items())
     return "{" + ", ".join(shown) + "}"
 
