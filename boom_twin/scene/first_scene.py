@@ -40,7 +40,7 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
     try:
         scene, _ = examine_text(_text(table, source, None), source)
         found = straight_boom(scene, np.array([joint.cylinder.k for joint in scene.joints], float))
-        text = _text(table, source, float(found.frequencies[0]))
+        text = _text(table, source, float(found.frequencies[0]) if len(found.frequencies) else None)
         return text, *examine_text(text, source)
     except SceneError as error:
         lines = {words(place): line for place, line in document.lines.items()}

@@ -54,13 +54,21 @@ class StraightBoom:
 
 def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
     """Estimate of the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
+    with np.errstate(all="ignore"):  # of absurd values
+        return _estimate(scene, stiffnesses)
+
+
+def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     n = len(scene.sections)
     starts = np.concatenate([[0.0], np.cumsum([section.length for section in scene.sections])])
     levers = np.array([_lever(scene, i) for i in range(n)])
     places, masses = _masses(scene, starts)
     at, owner, compliance = _springs(scene, starts, levers, stiffnesses)
     arms = np.maximum(places[None, :] - at[:, None], 0.0)
-    left, sizes, _ = np.linalg.svd(np.sqrt(compliance)[:, None] * arms * np.sqrt(masses)[None, :], full_matrices=False)
+    response = np.sqrt(compliance)[:, None] * arms * np.sqrt(masses)[None, :]
+    if not np.isfinite(response).all():  # absurd values: no mode can be told
+        response[:] = 0.0
+    left, sizes, _ = np.linalg.svd(response, full_matrices=False)
     kept = np.flatnonzero(sizes > 1e-9 * sizes.max(initial=0.0))[: n + 2]
     shares = np.zeros((2 * n, len(kept)))
     np.add.at(shares, owner, left[:, kept] ** 2)
@@ -70,8 +78,7 @@ def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
 
 def _lever(scene: Scene, i: int) -> float:
     low, high = np.radians(scene.joints[i].range_deg)
-    with np.errstate(invalid="ignore"):
-        return float(np.nan_to_num(cylinder_length(linkage(scene, i), min(max(0.0, low), high))[1]))
+    return float(np.nan_to_num(cylinder_length(linkage(scene, i), min(max(0.0, low), high))[1]))
 
 
 def _masses(scene: Scene, starts: Array) -> tuple[Array, Array]:
@@ -103,7 +110,7 @@ def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> 
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.I is not None and scene.is_flexible(i):
             cell = (section.beam[1] - section.beam[0]) / CELLS
-            found += [(starts[i] + place, i, cell / (scene.material.E * section.I)) for place in _cells(section.beam)]
+            found += [(starts[i] + place, i, cell / np.float64(scene.material.E * section.I)) for place in _cells(section.beam)]
         if np.isfinite(stiffnesses[i]) and abs(levers[i]) > 0.0:
             found.append((starts[i], n + i, 1.0 / (stiffnesses[i] * levers[i] ** 2)))
     places, owners, compliances = np.array(found or np.zeros((0, 3))).reshape(-1, 3).T

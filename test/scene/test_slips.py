@@ -96,3 +96,15 @@ def test_strict_makes_warnings_errors(bench: Any, capsys: pytest.CaptureFixture[
     assert out == "" and "1 fault" in err and "joints[0].cylinder.k = 40000.0" in err
     assert main(["check", "--strict"]) == 0
     assert examine(path)[1]
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-30, 1e30])
+def test_absurd_values_are_told_of_without_an_accident(bench: Any, size: float) -> None:
+    def edit(values: Any) -> None:
+        values["material"].update(E=size, rho=size)
+        for section in values["sections"]:
+            section.update(A=size, I=size, rho_A=size, rho_I=size, beta=size, height=size)
+        for joint in values["joints"]:
+            joint["cylinder"].update(k=size, d=size)
+
+    assert bench.oddities(edit)

@@ -12,7 +12,7 @@ from .findings import Draft, Finding, warning
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
 GYRATION_BY_LENGTH = (0.004, 0.05)
 COMPACTNESS = (0.12, 5.0)  # A^2 / I: a box with walls of about 1/170 and of a quarter of its height
-MASS_BY_STEEL = (1.0, 4.0)
+MASS_BY_STEEL, SLACK = (1.0, 4.0), 1e-3  # of a value that was rounded
 ROTARY_BY_STEEL = (0.3, 30.0)
 TAPER = (1 / 40, 1.5)  # of EI against the section before
 LEAST_BEAM = 0.6  # of the length
@@ -36,7 +36,7 @@ def gyration(section: Section) -> float | None:
 def material(draft: Draft, scene: Scene) -> Iterator[Finding]:
     """Young's modulus against the density."""
     rho = scene.material.rho
-    if rho is not None and not SPECIFIC_STIFFNESS[0] <= scene.material.E / rho <= SPECIFIC_STIFFNESS[1]:
+    if rho is not None and not _between(scene.material.E, SPECIFIC_STIFFNESS, rho):
         low, high = (limit * rho for limit in SPECIFIC_STIFFNESS)
         bound = f"expected from {low:.2g} to {high:.2g} Pa with a density of {rho:g} kg/m^3"
         yield warning(draft, ("material", "E"), scene.material.E, bound, "Steel has 2.06e11 Pa and 7850 kg/m^3.")
@@ -55,13 +55,13 @@ def beams(draft: Draft, scene: Scene) -> Iterator[Finding]:
 def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) -> Iterator[Finding]:
     place, radius = ("sections", i), math.sqrt(inertia / area)
     says = f"its radius of gyration, sqrt(I/A), is {radius:.3g} m"
-    if section.height is not None and not _between(radius / section.height, GYRATION_BY_HEIGHT):
+    if section.height is not None and not _between(radius, GYRATION_BY_HEIGHT, section.height):
         bound = f"{says}; expected {_range(GYRATION_BY_HEIGHT, section.height)} for a box {section.height:g} m high"
         yield warning(draft, (*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and height (m).")
-    elif not _between(radius / section.length, GYRATION_BY_LENGTH):
+    elif not _between(radius, GYRATION_BY_LENGTH, section.length):
         bound = f"{says}; expected {_range(GYRATION_BY_LENGTH, section.length)} for a section of {section.length:g} m"
         yield warning(draft, (*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and length (m), decimals and units.")
-    elif not _between(area**2 / inertia, COMPACTNESS):
+    elif not _between(area**2, COMPACTNESS, inertia):
         depth = DEEP * radius
         walls = [f"{1e3 * depth * share / WALL:.2g}" for share in (area**2 / inertia, *COMPACTNESS)]
         bound = (
@@ -76,12 +76,12 @@ def _per_metre(draft: Draft, i: int, section: Section, rho: float | None) -> Ite
     if rho is None:
         return
     place, steel = ("sections", i), rho * section.A
-    if not _between(section.rho_A / steel, MASS_BY_STEEL, 1e-3):
+    if not _between(section.rho_A * (1.0 + SLACK), MASS_BY_STEEL, steel):
         bound = f"expected {_range(MASS_BY_STEEL, steel)} kg/m: the box alone, rho A, has {steel:.3g}"
         remedy = "Give the mass of one metre of beam: box, pipe line, hoses, without concrete (line_fill)."
         yield warning(draft, (*place, "rho_A"), section.rho_A, bound, remedy)
     rotary = rho * section.I
-    if section.rho_I and not _between(section.rho_I / rotary, ROTARY_BY_STEEL):
+    if section.rho_I and not _between(section.rho_I, ROTARY_BY_STEEL, rotary):
         bound = f"expected {_range(ROTARY_BY_STEEL, rotary)} kg m: the box alone, rho I, has {rotary:.3g}"
         yield warning(draft, (*place, "rho_I"), section.rho_I, bound, "Give rho I, or leave it out.")
 
@@ -101,13 +101,13 @@ def _ends(draft: Draft, i: int, section: Section, beam: Point) -> Iterator[Findi
 
 def _taper(draft: Draft, scene: Scene, i: int, inertia: float) -> Iterator[Finding]:
     before = scene.sections[i - 1].I if i > 0 else None
-    if before is not None and not _between(inertia / before, TAPER):
+    if before is not None and not _between(inertia, TAPER, before):
         bound = f"expected {_range(TAPER, before)} m^4 after sections[{i - 1}] with I = {before:g}"
         yield warning(draft, ("sections", i, "I"), inertia, bound, "Booms taper outwards: check the decimals of both.")
 
 
-def _between(value: float, limits: tuple[float, float], slack: float = 0.0) -> bool:
-    return limits[0] * (1.0 - slack) <= value <= limits[1] * (1.0 + slack)
+def _between(value: float, limits: tuple[float, float], unit: float) -> bool:
+    return limits[0] * unit <= value <= limits[1] * unit
 
 
 def _range(limits: tuple[float, float], unit: float) -> str:

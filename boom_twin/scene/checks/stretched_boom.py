@@ -17,6 +17,7 @@ DAMPING = (1e-3, 0.2)  # ratio of the first mode
 PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
 QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
 GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
+TINY = 1e-300
 MOST_PAYLOAD = 0.5  # of the boom's mass
 
 
@@ -61,10 +62,10 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Findin
             parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, joint.cylinder.d / joint.cylinder.k))
     slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
     first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
-    odd = [part for part in parts if not PART_DAMPING[0] / first <= part[2] <= PART_DAMPING[1] / second]
+    odd = [part for part in parts if first * part[2] < PART_DAMPING[0] or second * part[2] > PART_DAMPING[1]]
     for place, value, delay in odd:
         pace = second if delay * second > PART_DAMPING[1] else first
-        low, high = (PART_DAMPING[0] / first * value / delay, PART_DAMPING[1] / second * value / delay)
+        low, high = (limit * value / (each * delay or TINY) for limit, each in zip(PART_DAMPING, (first, second), strict=True))
         damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
         bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
         remedy = "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
