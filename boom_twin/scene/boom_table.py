@@ -164,7 +164,10 @@ def csv_document(text: str, source: str) -> Document:
     name a unit: ``length [mm]``. Columns of the base and of the whole boom count in the first row.
     """
     document = Document({"sections": [], "joints": [], "base": {}})
-    rows = list(csv.reader(text.splitlines(), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+    try:
+        rows = list(csv.reader(text.splitlines(), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+    except csv.Error as error:
+        raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
     columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
@@ -214,8 +217,9 @@ def _put(document: Document, place: Place, value: Any, line: int) -> None:
     for step in keys:
         block = block[step]
     if isinstance(place[-1], int):
-        pair = block.setdefault(place[-2], [None, None])
-        pair[place[-1]] = value
+        if not isinstance(block.get(place[-2]), list):
+            block[place[-2]] = [None, None]
+        block[place[-2]][place[-1]] = value
     else:
         block[place[-1]] = value
     for depth in range(1, len(place) + 1):
