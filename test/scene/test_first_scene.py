@@ -103,7 +103,9 @@ def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str,
     assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
 
 
-@pytest.mark.parametrize(("header", "row"), [("lenght,kind", "3,A"), ("length", ""), ("C,C_x,length_x", "1,2,3"), ("length", "1" * 200_000)])
+@pytest.mark.parametrize(
+    ("header", "row"), [("lenght,kind", "3,A"), ("length", ""), ("C,C_x,length_x", "1,2,3"), ("length", "1" * 200_000)]
+)
 def test_a_csv_table_that_is_none_is_refused(tmp_path: Path, header: str, row: str) -> None:
     with pytest.raises(SceneError, match=r"no such column|it is needed|no row under|not a readable CSV"):
         scene_of(tmp_path, f"{header}\n{row}\n", "table.csv")
