@@ -41,6 +41,7 @@ setup(
         "lz4>=4.3.3,<5",
         "matplotlib>=3.9.1,<4",
         "tqdm>=4.66.3,<5",
+        "pint>=0.24,<1",
     ],
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<8", "ros-jazzy-common-interfaces>=5.3,<6"],

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from ..config.settings import load_settings
-from ..errors import Fault
+from ..errors import Fault, SceneError
 from ..estimation.stroke_filter import filter_band
 from ..scene import Scene
 from ..scene.load import DEFAULT_NAME, examine
@@ -15,6 +16,7 @@ from ..scene.oil_spring import STATIONS
 from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
+from ..system.atomic_files import check_target
 from ..types import Array
 from . import accuracy
 from . import reduce as need
@@ -22,6 +24,8 @@ from .main import add_json, add_scene, open_scene, print_result
 
 RATES = (50.0, 100.0, 200.0, 1000.0)
 """Sample rates (Hz) of strokes."""
+PNG = b"\x89PNG"
+"""How a picture begins; one that is there is replaced."""
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
@@ -30,6 +34,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Scene, ``--json``, what a search for the leanest model takes."""
     add_scene(parser)
     add_json(parser)
+    parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
+    told = "PNG file to draw: all pins, links and cylinders over the range of each joint"
+    parser.add_argument("--picture", metavar="FILE", type=Path, help=told)
     need.add_arguments(parser)
     accuracy.add_arguments(parser)
 
@@ -37,10 +44,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
     need.refuse_misuse(args)
+    if args.picture is not None:
+        check_target(args.picture, [Path(args.scene)] if args.scene else [], PNG)
     sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
-    account = explain(scene)
     name = args.scene or DEFAULT_NAME
+    if args.strict and oddities:
+        raise SceneError(name, tuple(oddities))
+    account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
         found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
@@ -53,6 +64,10 @@ def run(args: Namespace) -> int:
         told, rows = accuracy.table(scene, sensors)
         values |= told
         lines += rows
+    if args.picture is not None:
+        from ..plots.joint_ranges import joint_ranges_picture
+
+        lines.append(f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}")
     print_result(args.json, values, lines)
     return 0
 

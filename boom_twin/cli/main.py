@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and tell what its model consists of",
+    "init": "write a first scene from the dimensions of a drawing",
     "info": "what a recorded session holds and what it lacks",
     "monitor": "the live page, of the topics or of a recorded session",
     "play": "publish a recorded session over ROS 2",
@@ -38,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "scene": "print the default scene file",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
+    "envelope": "sag, forces, frequencies, stresses over the whole range",
     "simulate": "the boom's answer to a stroke history",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",
@@ -191,7 +193,12 @@ def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str])
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print one flat JSON object; a number that is not finite becomes null."""
-    print(json.dumps({key: _plain(value) for key, value in values.items()}, allow_nan=False))
+    print(json.dumps(plain_values(values), allow_nan=False))
+
+
+def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values as JSON has them; a number that is not finite becomes None."""
+    return {key: _plain(value) for key, value in values.items()}
 
 
 def _plain(value: Any) -> Any:

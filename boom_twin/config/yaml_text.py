@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 from typing import Any, cast
 
@@ -175,6 +176,16 @@ def with_value(text: str, place: Place, value: Any) -> str:
         return text[:start] + yaml_text(value) + text[end:]
     colon = text.index(":", int(name.end_mark.index)) + 1  # nothing stands there: its mark lies further on
     return f"{text[:colon]} {yaml_text(value)}{text[colon:]}"
+
+
+def whole_text(values: Any) -> str:
+    """Plain values as a YAML file, keys in their order, innermost blocks in braces."""
+    stream = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.dump(values, stream)
+    return stream.getvalue()
 
 
 def yaml_text(value: Any) -> str:

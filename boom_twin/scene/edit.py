@@ -7,17 +7,15 @@ stroke; to change it changes the bulk modulus, and with that k by the same facto
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
-from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from ..config.yaml_text import with_value, yaml_text
+from ..config.yaml_text import whole_text, with_value, yaml_text
 from ..errors import SceneError, UsageError
 from .load import structure
 from .oil_spring import middle_stiffness
@@ -199,12 +197,7 @@ def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
 
 def anew(scene: Scene) -> str:
     """A scene as a file without comments."""
-    stream = io.StringIO()
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.dump(scene.model_dump(mode="json", exclude_none=True), stream)
-    return with_end_mark(stream.getvalue())
+    return with_end_mark(whole_text(scene.model_dump(mode="json", exclude_none=True)))
 
 
 def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:

@@ -9,32 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
 
 from ..errors import Fault, SceneError, SceneWarning
-from .checks import clearance, geometry, values
-from .checks.findings import Draft, Finding, unknown_key, value_fault
+from .block_reader import validated
+from .checks import clearance, cross_sections, geometry, rigid_bodies, stretched_boom, values
+from .checks.findings import Draft, Finding
+from .format import SCENE
 from .glossary import BLOCKS
 from .schema import Scene
 from .yaml_reader import Document, Place, missing_end_mark, parse, read_text
 
-EMPTY: tuple[Any, ...] = (None, {}, ())
-LISTS = ("sections", "joints", "pins")
-
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
     """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
-    known, faults = _known(document, document.values, Scene, ())
-    broken: set[Place] = set()
-    scene: Scene | None = None
-    try:
-        scene = Scene.model_validate(known, strict=True)
-    except ValidationError as error:
-        for detail in error.errors(include_url=False):
-            place: Place = detail["loc"]
-            faults.append(value_fault(document, detail, place))
-            broken.add(place[:2] if place[:1] in (("sections",), ("joints",), ("postures",)) else place[:1])
-    return scene, _draft(document, known, broken), faults
+    read = validated(document, SCENE)
+    deep = (("sections",), ("joints",), ("postures",))
+    broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
+    return read.block, _draft(document, read.known, broken), list(read.faults)
 
 
 def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
@@ -55,34 +46,6 @@ def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
     return Draft(document, **blocks)
 
 
-def _known(document: Document, block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
-    """A block without unknown keys and without empty ones, and a fault for every unknown key."""
-    if not isinstance(block, dict):
-        return block, []
-    known: dict[str, Any] = {}
-    faults: list[Fault] = []
-    for key, value in block.items():
-        here = (*place, key)
-        inner = BLOCKS.get(model, {}).get(key)
-        if key not in model.model_fields:
-            faults.append(unknown_key(document, here, value, model))
-        elif value in EMPTY:
-            continue
-        elif key in LISTS and inner is not None:
-            if not isinstance(value, tuple):
-                known[key] = value
-                continue
-            pairs = [_known(document, item, inner, (*here, i)) for i, item in enumerate(value)]
-            known[key] = tuple(item for item, _ in pairs)
-            faults += [fault for _, found in pairs for fault in found]
-        elif inner is not None:
-            known[key], found = _known(document, value, inner, here)
-            faults += found
-        else:
-            known[key] = value
-    return known, faults
-
-
 CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     values.counts,
     values.sections,
@@ -95,6 +58,15 @@ CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     geometry.joints,
     values.suspects,
 )
+
+
+PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
+    cross_sections.material,
+    cross_sections.beams,
+    rigid_bodies.rigid_parts,
+    rigid_bodies.moving_parts,
+)
+"""Of a scene without faults: parts against each other."""
 
 
 DEFAULT_NAME = "default scene"
@@ -169,12 +141,30 @@ def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list
     scene, draft, faults = structure(document)
     with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
         findings = [finding for check in CHECKS for finding in check(draft)]
+        if scene is not None and not faults and all(finding.odd for finding in findings):
+            findings += _implausible(draft, scene, findings)
     faults += document.faults + [finding.fault for finding in findings if not finding.odd]
     odd = [finding.fault for finding in findings if finding.odd]
     oddities = _in_order(odd if unmarked is None else [*odd, unmarked])
     if faults or scene is None:
         raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
     return scene, oddities
+
+
+def _implausible(draft: Draft, scene: Scene, findings: list[Finding]) -> list[Finding]:
+    """What does not fit together; one cause one warning, so nothing of a block of which something else is told already."""
+    more: list[Finding] = []
+    told = {_block(finding) for finding in findings}
+    for check in PLAUSIBILITY:
+        new = [finding for finding in check(draft, scene) if _block(finding) not in told]
+        told |= {_block(finding) for finding in new}
+        more += new
+    return more + stretched_boom.stretched_boom(draft, scene, [finding.fault.path for finding in (*findings, *more)])
+
+
+def _block(finding: Finding) -> str:
+    """``sections[1]`` of ``sections[1].root.mass``."""
+    return finding.fault.path.partition(".")[0]
 
 
 def _in_order(faults: Iterable[Fault]) -> list[Fault]:

@@ -70,6 +70,7 @@ _FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.
 REPLAY = ResultKind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
 RIG = ResultKind("rig", _SESSION, is_replaced=False)
 RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
+ENVELOPE = ResultKind("envelope", ("envelope.csv", "envelope.json", "envelope.png"), is_replaced=True)
 COMPARE = ResultKind(
     "compare", ("compare.png", *(f"{side}/{name}" for side in "AB" for name in REPLAY.files)), is_replaced=True
 )

@@ -31,7 +31,7 @@ FAULTS = [
     ({"pins": [PIN, PIN]}, "pins[1].at", ("clearance.pins[0] is this pin already", "once")),
     (pin(radial_clearance=0.03), "pins[0].radial_clearance", ("0.03", "less than pin_radius = 0.03 m", "metres")),
     (pin(radial_clearance=-1e-4), "pins[0].radial_clearance", ("-0.0001", "not be less than 0", "m.")),
-    (pin(radial_clearance="0.1 mm"), "pins[0].radial_clearance", ("not text", "number alone, 0.1")),
+    (pin(radial_clearance="0.1 mn"), "pins[0].radial_clearance", ("`mn` is no unit that is known", "less that of the pin, m")),
     (pin(pin_radius=0), "pins[0].pin_radius", ("greater than 0", "radius of the pin, m")),
     (pin(clearance=1e-4), "pins[0].clearance", ("unknown key", "`radial_clearance`")),
     ({"pins": [{"at": "cylinder_1.rod", "pin_radius": 0.03}]}, "pins[0].radial_clearance", ("is absent", "m.")),

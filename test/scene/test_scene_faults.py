@@ -41,7 +41,7 @@ SINGLE_VALUES: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (s(1, "A"), math.inf, "sections[1].A", ("inf", "finite")),
     (s(1, "A"), "3.9e-3", "sections[1].A", ("not text", "without quotes: 3.9e-3")),
     (s(1, "A"), "0,0039", "sections[1].A", ("not text", "decimal point: 0.0039")),
-    (s(1, "A"), "39 cm2", "sections[1].A", ("not text", "number alone, 39", "m^2")),
+    (s(1, "A"), "39 cm", "sections[1].A", ("`cm` is no unit of this key, which is in m^2", "Give the area")),
     (s(1, "A"), "big", "sections[1].A", ("not text", "Give the area of the cross-section, m^2")),
     (s(1, "A"), True, "sections[1].A", ("true", "a number is needed, not true or false")),
     (s(1, "A"), [1], "sections[1].A", ("not a list",)),

@@ -10,8 +10,9 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from ...errors import ABSENT, Fault
-from ..glossary import BLOCKS, HOME, MEANING
-from ..schema import Base, Clearance, Joint, Material, Modes, Point, Scene, Section, Tip
+from ..format import Format
+from ..schema import Base, Clearance, Joint, Material, Modes, Point, Section, Tip
+from ..units import misfit, unit_of
 from ..yaml_reader import NUMBER, Document, Place, words
 
 
@@ -77,10 +78,9 @@ BOUNDS = {
 }
 
 LONGEST = 40  # characters of a text that is taken for a number
-ITEMS = {MEANING[Scene][key]: "a block of keys, as in the default scene" for key in ("sections", "joints")}
 
 
-def unknown_key(document: Document, place: Place, value: Any, model: type[BaseModel]) -> Fault:
+def unknown_key(document: Document, form: Format[Any], place: Place, value: Any, model: type[BaseModel]) -> Fault:
     """A key that `model` does not have: the nearest one, and where the key belongs if it is known elsewhere."""
     key = str(place[-1])
     if key.isdigit() and value is None:
@@ -89,7 +89,7 @@ def unknown_key(document: Document, place: Place, value: Any, model: type[BaseMo
     here = {name.lower(): name for name in reversed(model.model_fields)}
     near = difflib.get_close_matches(key.lower(), here, n=1, cutoff=0.0)
     remedy = f"The nearest known key here is `{here[near[0]]}`."
-    homes = [HOME[other] for other in MEANING if other is not model and key in other.model_fields]
+    homes = [form.home[other] for other in form.meaning if other is not model and key in other.model_fields]
     if homes:
         remedy = f"`{key}` is a key of {' or '.join(homes)}. " + remedy
     elif not difflib.get_close_matches(key.lower(), here, n=1):
@@ -98,10 +98,10 @@ def unknown_key(document: Document, place: Place, value: Any, model: type[BaseMo
     return document.fault(place, value, f"unknown key {where}", remedy)
 
 
-def value_fault(document: Document, detail: ErrorDetails, place: Place) -> Fault:
+def value_fault(document: Document, form: Format[Any], detail: ErrorDetails, place: Place) -> Fault:
     """A pydantic error in the words of the file."""
     kind, value, limits = detail["type"], detail["input"], detail.get("ctx", {})
-    meaning = _meaning(place)
+    meaning = form.meaning_at(place)
     give = f"Give {meaning}." if meaning else "Give such a value."
     if kind == "missing" and not isinstance(place[-1], int):
         return document.fault(place, ABSENT, "it is needed", give)
@@ -109,6 +109,9 @@ def value_fault(document: Document, detail: ErrorDetails, place: Place) -> Fault
         return _length_fault(document, detail, place, give)
     if kind in ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing"):
         whole = "a whole number" if kind.startswith("int") else "a number"
+        unfit = misfit(value, unit_of(meaning)) if isinstance(value, str) else None
+        if unfit is not None:
+            return document.fault(place, value, unfit, give)
         bound = f"{whole} is needed, not {_what(value)}"
         return document.fault(place, value, bound, _number_remedy(value, give))
     if kind == "string_type":
@@ -129,19 +132,6 @@ def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: 
     if found > 2:
         give += " Decimals take a point, not a comma."
     return document.fault(place, value, bound, give)
-
-
-def _meaning(place: Place) -> str:
-    """Words and unit of the key at or around a place, empty if there are none."""
-    model: type[BaseModel] = Scene
-    meaning = ""
-    for step in place:
-        if isinstance(step, int):
-            meaning = ITEMS.get(meaning, meaning)
-        else:
-            meaning = MEANING[model].get(step, meaning)
-            model = BLOCKS.get(model, {}).get(step, model)
-    return "section angles to the horizontal, degrees" if place[:1] == ("postures",) and len(place) > 1 else meaning
 
 
 def _what(value: Any) -> str:
@@ -169,6 +159,4 @@ def _number_remedy(value: Any, give: str) -> str:
         return f"Write it without quotes: {text}."
     if NUMBER.fullmatch(pointed):
         return f"Write a decimal point: {pointed}."
-    if (start := NUMBER.match(text)) and text[start.end() :].strip().isalnum():
-        return f"Write the number alone, {start[0]}, if that is {give.removeprefix('Give ')}"
     return give

@@ -15,7 +15,7 @@ from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
-BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
+BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "height", "modes", "axial", "geometric", "head")
 LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "side", "R", "mL", "mR")
 NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
@@ -168,7 +168,7 @@ def _several(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-LENGTHS = ("length", "beam", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
+LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
            "closed_length", "max_stroke")  # fmt: skip
 MASSES = ("mass", "mL", "mR", "payload")
 
@@ -177,8 +177,8 @@ SUSPECTS: dict[str, tuple[float, str, str]] = {
     "A": (1.0, "more than 1 m^2: cm^2 or mm^2?", "Give the area in m^2: 49 cm^2 is 4.9e-3."),
     "I": (0.1, "more than 0.1 m^4: cm^4 or mm^4?", "Give the second moment in m^4: 3600 cm^4 is 3.6e-5."),
     "rho_A": (5000.0, "more than 5000 kg/m: a density in kg/m^3?", "Give the mass of one metre of the section."),
-    "line_fill": (500.0, "more than 500 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
-    "inclination": (1.0, "more than 1 rad: degrees?", "Give radians: 5 degrees are 0.0873."),
+    "line_fill": (100.0, "more than 100 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
+    "inclination": (0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?", "Give radians: 5 degrees are 0.0873."),
     "closed_length": (50.0, "more than 50 m: mm?", "Give lengths in m."),
     "max_stroke": (50.0, "more than 50 m: mm?", "Give lengths in m."),
     "bore": (1.0, "more than 1 m: mm?", "Give the diameter in m: 100 mm is 0.1."),
@@ -222,6 +222,12 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
     elif key == "k" and value < 1e4:
         yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
+    elif key == "k" and value < 1e6:
+        bound = "expected from 1e6 to 1e9 N/m: kN/m?"
+        yield warning(draft, place, value, bound, f"Give N/m: {value:g} kN/m are {value * 1e3:g}.")
+    elif key == "k" and value > 1e9:
+        remedy = "Check its unit, N/m, or the bore and the oil that it comes from."
+        yield warning(draft, place, value, "expected from 1e6 to 1e9 N/m", remedy)
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
@@ -239,6 +245,9 @@ def _upper(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
         yield warning(draft, place, value, looks, remedy)
 
 
+TILT = 1e-3  # of gravity against -y, rad
+
+
 def _gravity(draft: Draft) -> Iterator[Finding]:
     if draft.gravity is not None:
         if not 9.7 < math.hypot(*draft.gravity) < 9.9:
@@ -246,6 +255,9 @@ def _gravity(draft: Draft) -> Iterator[Finding]:
             yield warning(draft, ("gravity",), draft.gravity, bound, "Usual is [0.0, -9.81].")
         elif draft.gravity[1] > 0:
             yield warning(draft, ("gravity",), draft.gravity, "it points upwards", "Usual is [0.0, -9.81].")
+        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
+            bound = "it does not point along -y, which is down"
+            yield warning(draft, ("gravity",), draft.gravity, bound, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
 
 
 def _postures(draft: Draft) -> Iterator[Finding]:

@@ -1,0 +1,125 @@
+"""`boom_twin envelope`: deflection, forces, frequencies, moments and stresses over the working range, worst postures named."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .main import add_json, add_scene, open_scene, print_result
+
+if TYPE_CHECKING:
+    from ..analysis.envelope import Envelope
+    from ..types import Array
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_scene(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for envelope.csv (a row a posture), .json and .png")
+    add_json(parser)
+
+
+class Quantity(NamedTuple):
+    """A column of the envelope: key of ``--json``, words, values by posture, factor and name of the unit that people read."""
+
+    key: str
+    words: str
+    values: Array
+    factor: float
+    unit: str
+
+
+def run(args: Namespace) -> int:
+    """Compute, print and write."""
+    from tqdm import tqdm
+
+    from ..analysis.envelope import envelope
+
+    scene = open_scene(args.scene)
+    with tqdm(unit=" postures", file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
+
+        def progress(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        found = envelope(scene, progress)
+    quantities = quantities_of(found)
+    values, lines = _summary(found, quantities), _report(found, quantities)
+    if args.out is not None:
+        lines += _write(args, found, quantities, values, scene)
+    print_result(args.json, values, lines)
+    return 0
+
+
+def quantities_of(found: Envelope) -> list[Quantity]:
+    """All columns of numbers, in the order of the table; without stresses of sections that have no height."""
+    columns = [Quantity("deflection_m", "tip deflection", found.deflections, 1e3, "mm")]
+    for key, words, values, factor, unit in (
+        ("cylinder_{}_force_N", "cylinder {} force", found.forces, 1e-3, "kN"),
+        ("frequency_{}_Hz", "frequency {}", found.frequencies, 1.0, "Hz"),
+        ("section_{}_moment_N_m", "section {} bending moment", found.moments, 1e-3, "kN m"),
+        ("section_{}_stress_Pa", "section {} bending stress", found.stresses, 1e-6, "MPa"),
+    ):
+        for i, column in enumerate(values.T, 1):
+            if not (column != column).any():
+                columns.append(Quantity(key.format(i), words.format(i), column, factor, unit))
+    return columns
+
+
+def _summary(found: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
+    values: dict[str, Any] = {"postures": len(found.names)}
+    values |= {f"skipped_{reason.replace(' ', '_')}": count for reason, count in found.skipped.items()}
+    for quantity in quantities:
+        for name, row in (("least", quantity.values.argmin()), ("greatest", quantity.values.argmax())):
+            values[f"{quantity.key}_{name}"] = float(quantity.values[row])
+            values[f"{quantity.key}_{name}_angles_deg"] = found.angles[row]
+    return values
+
+
+def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
+    skipped = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items() if count)
+    lines = [f"{len(found.names)} postures at rest{f'; left out: {skipped}' if skipped else ''}"]
+    lines += ["postures: by name, or section angles to the base in degrees", ""]
+    rows = [["", "least", "in posture", "greatest", "in posture"]]
+    for quantity in quantities:
+        row = [f"{quantity.words}, {quantity.unit}"]
+        for place in (int(quantity.values.argmin()), int(quantity.values.argmax())):
+            row += [f"{quantity.factor * quantity.values[place]:.4g}", found.posture(place)]
+        rows.append(row)
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    for row in rows:
+        cells = [cell.rjust(w) if i in (1, 3) else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    if not any(quantity.unit == "MPa" for quantity in quantities):
+        lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
+    return lines
+
+
+def _write(args: Namespace, found: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Any) -> list[str]:
+    from ..plots.envelope import envelope_picture
+    from ..system.result_folder import ENVELOPE, result_folder
+    from .main import plain_values
+
+    with result_folder(args.out, ENVELOPE, [Path(args.scene)] if args.scene else []) as building:
+        (building.folder / "envelope.csv").write_text(_csv(found, quantities), encoding="utf-8")
+        (building.folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")
+        bars = [(f"{q.words}, {q.unit}", q.factor * q.values) for q in quantities[1:]]
+        envelope_picture(building.folder / "envelope.png", scene, found, bars)
+    return ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
+
+
+def _csv(found: Envelope, quantities: list[Quantity]) -> str:
+    """One row a posture, SI units; angles in degrees."""
+    stream = io.StringIO()
+    table = csv.writer(stream, lineterminator="\n")
+    angles = [f"section_{i + 1}_deg" for i in range(found.angles.shape[1])]
+    table.writerow(["posture", *angles, "tip_x_m", "tip_y_m", *(quantity.key for quantity in quantities)])
+    for row, name in enumerate(found.names):
+        numbers = [*found.angles[row], *found.tips[row], *(quantity.values[row] for quantity in quantities)]
+        table.writerow([name, *(f"{float(number):.9g}" for number in numbers)])
+    return stream.getvalue()

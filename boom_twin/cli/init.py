@@ -1,0 +1,132 @@
+"""`boom_twin init`: a first scene from the drawing's dimensions, out of a table or asked for on the terminal."""
+
+from __future__ import annotations
+
+import re
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from ..config.yaml_text import whole_text
+from ..errors import UsageError
+from ..scene.block_reader import validated
+from ..scene.boom_table import TABLE, checked_table, frozen, read_table
+from ..scene.checks.values import NEEDED
+from ..scene.first_scene import first_scene
+from ..scene.yaml_reader import NUMBER, Document, Place, words
+from ..system.atomic_files import check_new, write_atomic
+from .main import tell
+
+KEPT = ".table.yaml"
+"""How the name of the file ends that keeps the answers, beside the scene."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("--table", metavar="FILE", help="dimensions in YAML or CSV; without it, they are asked for")
+    parser.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")
+    parser.add_argument("--example-table", action="store_true", help="print a table to start from, and do no more")
+
+
+def run(args: Namespace) -> int:
+    """Write the scene."""
+    if args.example_table:
+        sys.stdout.write((files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8"))
+        return 0
+    if args.out is None:
+        raise UsageError("--out is absent: it names the scene to write, for example --out my_boom.yaml.")
+    sources = [Path(args.table)] if args.table else []
+    check_new(args.out, sources)
+    if args.table:
+        table, document = read_table(Path(args.table))
+        source = args.table
+    else:
+        kept = args.out.with_suffix(KEPT)
+        check_new(kept, [args.out])
+        document = Document(frozen(_asked()))
+        write_atomic(kept, whole_text(document.values))
+        print(f"Answers kept: {kept}; mend them there, then `boom_twin init --table {kept} --out {args.out}`")
+        table, source = checked_table(document, str(kept)), str(kept)
+    text, scene, oddities = first_scene(table, document, source)
+    write_atomic(args.out, text)
+    tell(oddities, str(args.out))
+    print(f"Written: {args.out}, {len(scene.sections)} sections, {scene.reach:.2f} m. Next: boom_twin check {args.out}")
+    return 0
+
+
+def _asked() -> dict[str, Any]:
+    """The values of a table, each asked for until it is one."""
+    print("Dimensions as on the drawing: `8500 mm`, `8.5`, two numbers as `1320 mm, -264 mm`. An empty line takes [..].")
+    values: dict[str, Any] = {"base": {}, "sections": [], "joints": []}
+    values["description"] = _line("description [none]: ") or "Boom described by boom_twin init."
+    for place, default in _questions_of_all():
+        _ask(values, place, default)
+    count = 0
+    while not 1 <= count <= 20:
+        answer = _line("number of sections: ")
+        count = int(answer) if answer.isdigit() else 0
+    for i in range(count):
+        values["sections"].append({})
+        values["joints"].append({})
+        for place, default in _questions_of_section(values, i):
+            _ask(values, place, default)
+    return values
+
+
+def _questions_of_all() -> Iterator[tuple[Place, str | None]]:
+    yield ("base", "pivot"), "0, 0"
+    yield ("base", "cylinder_pin"), None
+    yield ("pipe",), "0"
+    yield ("payload",), "0"
+    yield ("bulk_modulus",), "1.4 GPa"
+    yield ("damping_ratio",), "0.01"
+
+
+def _questions_of_section(values: dict[str, Any], i: int) -> Iterator[tuple[Place, str | None]]:
+    """Keys of section and joint `i`, the joint's by its kind, which is asked for first."""
+    section, joint = ("sections", i), ("joints", i)
+    for key in ("length", "beam", "height", "width", "wall", *(["rod_pin"] if i == 0 else [])):
+        yield (*section, key), None
+    yield (*joint, "kind"), "B1" if i else "A"
+    yield (*joint, "range_deg"), None
+    for key in ("bore", "rod", *NEEDED[values["joints"][i]["kind"]]):
+        yield (*joint, key), None
+    for key in ("mL", "mR") if i else ():
+        yield (*joint, key), "0"
+
+
+def _ask(values: dict[str, Any], place: Place, default: str | None) -> None:
+    """Ask for one value until the table takes it."""
+    block: Any = values
+    for step in place[:-1]:
+        block = block[step]
+    meaning = f"{words(place)}, {TABLE.meaning_at(place)}"
+    while True:
+        answer = _line(f"{meaning}{f' [{default}]' if default else ''}: ") or default or ""
+        block[place[-1]] = _value(answer)
+        wrong = [fault for fault in validated(Document(frozen(values)), TABLE).faults if _is_at(fault.path, place)]
+        if answer and not wrong:
+            return
+        print("\n".join(f"  {fault}" for fault in wrong) or "  A value is needed.")
+
+
+def _is_at(path: str, place: Place) -> bool:
+    return path == words(place) or path.startswith(f"{words(place)}[")
+
+
+def _line(prompt: str) -> str:
+    """One line of the answers."""
+    print(prompt, end="", flush=True)
+    line = sys.stdin.readline()
+    if not line:
+        raise UsageError(f"the answers end at `{prompt.strip()}`. Answer on a terminal, or give --table (--example-table).")
+    return line.strip()
+
+
+def _value(answer: str) -> Any:
+    parts = [part.strip() for part in re.split(r"[,;]", answer.strip("[] "))]
+    found = tuple(float(part) if NUMBER.fullmatch(part) else part for part in parts)
+    return found if len(found) > 1 else found[0]

@@ -1,0 +1,83 @@
+"""Picture of a boom's envelope: the tip's places with its deflection there, ranges of all else, worst postures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..analysis.envelope import Envelope
+from ..scene.kinematics import skeleton
+from ..scene.schema import Scene
+from ..types import Array
+from .boom import draw_base
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}
+"""Of bars, by unit."""
+ROOM = 0.6  # for words beside the bars, of what they span
+
+
+def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
+    """Write the picture.
+
+    Parameters
+    ----------
+    path : Path
+    scene : Scene
+    found : Envelope
+        Of that scene.
+    ranges : list of (str, ndarray)
+        Words with unit, as in ``frequency 1, Hz``, and the values (m,) in that unit.
+    """
+    units = list(dict.fromkeys(words.rpartition(", ")[2] for words, _ in ranges))
+    note = f"{len(found.names)} postures at rest"
+    with picture(path, "Envelope over the working range", note, (18.0, 11.0)) as figure:
+        grid = figure.add_gridspec(len(units) or 1, 2, width_ratios=[1.35, 1.0])
+        _tips(figure.add_subplot(grid[:, 0]), scene, found)
+        for row, unit in enumerate(units):
+            own = [(words.rpartition(", ")[0], values) for words, values in ranges if words.rpartition(", ")[2] == unit]
+            _bars(figure.add_subplot(grid[row, 1]), found, own, unit)
+
+
+def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
+    axes.set_aspect("equal", adjustable="datalim")
+    shown = axes.scatter(
+        found.tips[:, 0], found.tips[:, 1], c=1e3 * found.deflections, s=26, cmap="viridis_r", zorder=3, label="tips"
+    )
+    axes.figure.colorbar(shown, ax=axes, label="tip deflection, mm", shrink=0.6, location="bottom", pad=0.02)
+    worst = {"largest deflection": found.deflections.argmax()}
+    if found.frequencies.shape[1]:
+        worst["lowest frequency"] = found.frequencies[:, 0].argmin()
+    if np.isfinite(found.stresses).any():
+        worst["largest stress"] = np.nan_to_num(found.stresses).max(axis=1).argmax()
+    for (name, row), colour in zip(worst.items(), (INK, BLUE, ORANGE), strict=False):
+        bones = skeleton(scene, np.diff(np.radians(found.angles[row]), prepend=0.0))
+        axes.plot(*bones.pivots.T, "o-", color=colour, linewidth=2.2, markersize=5, label=f"{name}: {found.posture(int(row))}")
+    draw_base(axes, np.array(scene.base.pivot), 0.035 * scene.reach)
+    axes.set_xlabel("x forward, m")
+    axes.set_ylabel("y up, m")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize=11)
+
+
+def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> None:
+    """From the least to the greatest value, one bar a quantity, with the posture of each end."""
+    for place, (_, values) in enumerate(own):
+        low, high = int(values.argmin()), int(values.argmax())
+        axes.barh(place, values[high] - values[low], left=values[low], height=0.5, color=COLOURS.get(unit, GREY), alpha=0.8)
+        for row, side in ((low, "right"), (high, "left")):
+            gap = -4 if side == "right" else 4
+            axes.annotate(
+                f"{values[row]:.3g} {found.posture(row)}", (values[row], place), (gap, 0), textcoords="offset points",
+                ha=side, va="center", fontsize=9, color=INK,
+            )  # fmt: skip
+    axes.set_yticks(range(len(own)), [words for words, _ in own])
+    axes.invert_yaxis()
+    low, high = min(values.min() for _, values in own), max(values.max() for _, values in own)
+    axes.set_xlim(low - ROOM * (high - low or 1.0), high + ROOM * (high - low or 1.0))
+    axes.grid(False, axis="y")
+    axes.set_xlabel(unit)

@@ -1,0 +1,148 @@
+"""Picture of every joint over its range: all pins, links and the cylinder from end to end, and the stroke by the angle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
+from ..scene.schema import Scene, section_depth
+from ..types import Array
+from .boom import draw_cylinder, draw_link, draw_pin, draw_section, section_parts
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+POSITIONS = 5  # of a joint, ends of its range included
+CURVE = 361  # angles
+COLUMNS = 3
+SLENDER = 0.07  # width of a drawn barrel over its closed length
+NOTE = "blue: lowest angle, orange: highest; section before along x"
+ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
+
+
+def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
+    """Write one pair of panels a joint, and one of the boom with every joint at the ends of its range.
+
+    Parameters
+    ----------
+    path : Path
+    scene : Scene
+    name : str
+        What the scene is called in the title.
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    count = len(scene.joints)
+    columns = min(COLUMNS, count + 1)
+    rows = -(-(count + 1) // columns)
+    with picture(path, f"{name}: all pins over the range of each joint", NOTE, (18.0, 8.0 * rows)) as figure:
+        grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.0, 1.0] * rows)
+        _boom(figure.add_subplot(grid[0:2, 0]), scene)
+        for i in range(count):
+            row, column = divmod(i + 1, columns)
+            _joint(figure.add_subplot(grid[2 * row, column]), scene, i)
+            _stroke(figure.add_subplot(grid[2 * row + 1, column]), scene, i)
+    return path
+
+
+def _straight(scene: Scene) -> Array:
+    """Joint angles (rad) of the boom as straight as its ranges allow."""
+    return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
+
+
+def _boom(axes: Axes, scene: Scene) -> None:
+    """The straight boom, and where each section gets when only its joint turns."""
+    axes.set_aspect("equal", adjustable="datalim")
+    angles = _straight(scene)
+    for i, joint in enumerate(scene.joints):
+        for degrees, (colour, word) in zip(joint.range_deg, ENDS, strict=True):
+            turned = angles.copy()
+            turned[i] = np.radians(degrees)
+            with np.errstate(invalid="ignore"):
+                line = skeleton(scene, turned).pivots[i : i + 2]
+            axes.plot(*line.T, "-", color=colour, linewidth=1.6, label="" if i else f"{word} angle of its joint")
+    bones = skeleton(scene, angles)
+    for i in range(len(scene.sections)):
+        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
+        middle = bones.point(i, 0.5 * scene.sections[i].length)
+        axes.annotate(str(i + 1), (middle[0], middle[1]), ha="center", va="center", fontsize=12, zorder=9)
+    for pivot in bones.pivots:
+        draw_pin(axes, pivot, 4.0)
+    axes.set_title("each section alone at the ends of its joint's range")
+    axes.set_xlabel("x forward, m")
+    axes.set_ylabel("y up, m")
+    axes.legend(loc="lower left", fontsize=11)
+
+
+def _joint(axes: Axes, scene: Scene, i: int) -> None:
+    """Sections before and after, links and cylinder: the ends of the range in full, what lies between as a shadow."""
+    axes.set_aspect("equal", adjustable="box")
+    straight, pins = _straight(scene), []
+    for place, degrees in enumerate(np.linspace(*scene.joints[i].range_deg, POSITIONS)):
+        angles = straight.copy()
+        angles[: i + 1] = 0.0
+        angles[i] = np.radians(degrees)
+        with np.errstate(invalid="ignore"):
+            bones = skeleton(scene, angles)
+        joint = bones.joints[i]
+        if np.isfinite(joint.rod_pin).all():
+            pins += _pins_of(joint)
+            _mechanism(axes, scene, bones, i, {0: BLUE, POSITIONS - 1: ORANGE}.get(place))
+    low, high = np.min(pins or [np.zeros(2)], axis=0), np.max(pins or [np.ones(2)], axis=0)
+    middle, reach = 0.5 * (low + high), 0.62 * max(*(high - low), 0.05 * scene.reach)
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    joint_range = " to ".join(f"{degrees:g}" for degrees in scene.joints[i].range_deg)
+    axes.set_title(f"joint {i + 1}, kind {scene.joints[i].kind}: {joint_range} deg")
+
+
+def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
+    """One position; names of the pins where it has a colour."""
+    joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
+    draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+    if i > 0:
+        draw_section(axes, section_parts(scene, bones, i - 1), section_depth(scene, i - 1), 0.12)
+    for corners, own in zip(joint.links, (GREEN, PURPLE), strict=False):
+        draw_link(axes, corners, PALE if colour is None else own, 2.0 if colour is None else 3.5)
+    if colour is None:
+        axes.plot(*np.transpose([joint.barrel_pin, joint.rod_pin]), color=PALE, linewidth=3.0, zorder=4)
+        return
+    length = scene.joints[i].cylinder.closed_length
+    draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, SLENDER * length)
+    for name, pin in _named(joint).items():
+        draw_pin(axes, pin, 5.0, colour)
+        axes.annotate(
+            name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12
+        )
+
+
+def _named(joint: JointPins) -> dict[str, Array]:
+    """Pins by the letters of the scene."""
+    six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
+    ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
+    if joint.kind in ("B2", "B3"):
+        ends["R"] = joint.rod_pin
+    return {"pivot": joint.pivot, **ends, **{name: pin for name, pin in six_bar.items() if pin is not None}}
+
+
+def _pins_of(joint: JointPins) -> list[Array]:
+    return list(_named(joint).values())
+
+
+def _stroke(axes: Axes, scene: Scene, i: int) -> None:
+    """Stroke by angle in the band that the cylinder has."""
+    joint = scene.joints[i]
+    degrees = np.linspace(*joint.range_deg, CURVE)
+    axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")
+    axes.plot(degrees, stroke_curve(scene, i, np.radians(degrees)), color=INK)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.set_xlabel(f"joint {i + 1}, deg")
+    axes.set_ylabel("stroke, m")
+    axes.legend(loc="upper center", fontsize=10)

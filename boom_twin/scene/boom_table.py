@@ -1,0 +1,233 @@
+"""The table of a boom's drawing: boxes, bores and rods, pins, kinds of joints; read from YAML or CSV."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from ..errors import ABSENT, Fault, SceneError
+from .block_reader import validated
+from .format import Format
+from .glossary import MEANING
+from .schema import Base, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
+from .yaml_reader import NUMBER, Document, Place, parse, read_text
+
+STEEL = Material(E=2.1e11, rho=7850.0)
+
+
+class BoxSection(Part):
+    """One section whose beam is a box: outer height and width, wall, m; what else its metre weighs, kg/m."""
+
+    length: Positive
+    beam: Point
+    height: Positive
+    width: Positive
+    wall: Positive
+    pipe: NotNegative | None = None
+    rod_pin: Point | None = None
+
+
+class DrawnJoint(Part):
+    """One joint as in a scene, with bore and rod of its cylinder, m, and the oil in its lines, m^3."""
+
+    kind: Literal["A", "B1", "B2", "B3"]
+    range_deg: tuple[Finite, Finite]
+    bore: Positive
+    rod: Positive
+    C: Point | None = None
+    D: Point | None = None
+    E: Point | None = None
+    lL: Positive | None = None
+    lR: Positive | None = None
+    R: Point | None = None
+    mL: NotNegative | None = None
+    mR: NotNegative | None = None
+    closed_length: Positive | None = None
+    max_stroke: Positive | None = None
+    cap_line: NotNegative = 5e-4
+    rod_line: NotNegative = 5e-4
+
+
+class BoomTable(Part):
+    """A boom as its drawing shows it; SI units, angles in degrees."""
+
+    description: str = ""
+    material: Material = STEEL
+    base: Base
+    pipe: NotNegative = 0.0
+    bulk_modulus: Positive = 1.4e9
+    damping_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.01
+    payload: NotNegative | None = None
+    line_fill: NotNegative | None = None
+    sections: Annotated[tuple[BoxSection, ...], Field(min_length=1)]
+    joints: Annotated[tuple[DrawnJoint, ...], Field(min_length=1)]
+    postures: dict[str, tuple[Finite, ...]] = Field(default_factory=dict)
+
+
+_PIPE = "what rides on a metre of the box beside it: pipe line, hoses, clamps, kg/m"
+TABLE = Format(
+    BoomTable,
+    {
+        BoomTable: {
+            "description": "text",
+            "material": "a block with E (Pa) and rho (kg/m^3); steel if it is not there",
+            "base": "a block with pivot and cylinder_pin",
+            "pipe": _PIPE,
+            "bulk_modulus": "the bulk modulus of the oil in Pa, 1.4e9 to 1.7e9; less with air in it",
+            "damping_ratio": "the damping ratio of the first mode, 0.005 to 0.03",
+            "payload": "the point mass at the tip, for example an end hose, kg",
+            "line_fill": "the concrete in the pipe line, kg/m",
+            "sections": "a list with one block per section",
+            "joints": "a list with one block per joint",
+            "postures": "a block of names, each with a list of section angles in degrees",
+        },
+        Material: MEANING[Material],
+        Base: MEANING[Base],
+        BoxSection: {
+            **{key: MEANING[Section][key] for key in ("length", "beam", "height", "rod_pin")},
+            "width": "the outer width of the box, m",
+            "wall": "the thickness of its walls, m",
+            "pipe": _PIPE,
+        },
+        DrawnJoint: {
+            **{key: MEANING[Joint][key] for key in ("kind", "range_deg", "C", "D", "E", "lL", "lR", "R", "mL", "mR")},
+            "bore": "the diameter of the piston, m",
+            "rod": "the diameter of the rod, m",
+            "closed_length": "the length from pin to pin at stroke 0, m; without it, worked out from the pins",
+            "max_stroke": "the largest stroke, m; without it, worked out from the pins",
+            "cap_line": "the oil between piston and valve on the cap side at stroke 0, m^3",
+            "rod_line": "the oil between piston and valve on the rod side at max_stroke, m^3",
+        },
+    },
+    {BoomTable: "the top level", Material: "material", Base: "base", BoxSection: "sections[i]", DrawnJoint: "joints[i]"},
+    {BoomTable: {"material": Material, "base": Base, "sections": BoxSection, "joints": DrawnJoint}},
+)
+"""What a table may hold."""
+
+PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
+"""What a column of one of two numbers ends with, as in C_x, beam_end, range_deg_low."""
+_HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(]\s*(.+?)\s*[\])])?")
+
+
+def read_table(path: Path) -> tuple[BoomTable, Document]:
+    """The table in a file (.csv, else YAML), and the document with the lines of its values.
+
+    Raises
+    ------
+    SceneError
+        With every fault that was found: place, value, bound, remedy.
+    """
+    text = read_text(path)
+    document = csv_document(text, str(path)) if path.suffix.lower() == ".csv" else parse(text, str(path))
+    return checked_table(document, str(path)), document
+
+
+def checked_table(document: Document, source: str) -> BoomTable:
+    """The table that a document holds; SceneError with all its faults."""
+    read = validated(document, TABLE)
+    faults = [*read.faults, *document.faults]
+    if read.block is not None:
+        faults += _faults(document, read.block)
+    if faults or read.block is None:
+        raise SceneError(source, tuple(sorted(faults, key=lambda fault: fault.line or 0)))
+    return read.block
+
+
+def _faults(document: Document, table: BoomTable) -> list[Fault]:
+    """Walls that fill their box, rods as thick as the bore, a material without density, not a joint for every section."""
+    found = []
+    for i, section in enumerate(table.sections):
+        if 2.0 * section.wall >= min(section.height, section.width):
+            bound = f"two walls fill the box of {section.height:g} by {section.width:g} m"
+            found.append(document.fault(("sections", i, "wall"), section.wall, bound, "Give the thickness of one wall."))
+    for i, joint in enumerate(table.joints):
+        if joint.rod >= joint.bore:
+            bound = f"the rod must be thinner than the bore, {joint.bore:g} m"
+            found.append(document.fault(("joints", i, "rod"), joint.rod, bound, "Give both as diameters."))
+    if table.material.rho is None:
+        remedy = f"Give {MEANING[Material]['rho']}."
+        found.append(document.fault(("material", "rho"), ABSENT, "masses are worked out with it", remedy))
+    if len(table.joints) != len(table.sections):
+        bound = f"there are {len(table.sections)} sections, and every section has one joint"
+        found.append(document.fault(("joints",), len(table.joints), bound, "Add or remove joints or sections."))
+    return found
+
+
+def csv_document(text: str, source: str) -> Document:
+    """A CSV text as the values of a table: a header, then a row for every section with its joint.
+
+    A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
+    name a unit: ``length [mm]``. Columns of the base and of the whole boom count in the first row.
+    """
+    document = Document({"sections": [], "joints": [], "base": {}})
+    try:
+        rows = list(csv.reader(text.splitlines(), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+    except csv.Error as error:
+        raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
+    if len(rows) < 2:
+        raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
+    columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
+    for i, row in enumerate(row for row in rows[1:] if any(cell.strip() for cell in row)):
+        document.values["sections"].append({})
+        document.values["joints"].append({})
+        for number, (column, cell) in enumerate(zip(columns, row, strict=False)):
+            if column is None or (place := _place(column, i)) is None:
+                name, known = rows[0][number], ", ".join(_columns())
+                raise SceneError(source, (Fault("header", name, "no such column", f"Known are {known}.", 1),))
+            if cell.strip() and not (place[0] not in ("sections", "joints") and i > 0):
+                _put(document, place, _value(cell.strip(), column[3]), i + 2)
+    document.values = frozen(document.values)
+    return document
+
+
+def _columns() -> list[str]:
+    """Keys that a column may be named after."""
+    return sorted({key for model in (BoxSection, DrawnJoint, Base) for key in model.model_fields} | {*_OF_ALL})
+
+
+_OF_ALL = ("description", "bulk_modulus", "damping_ratio", "payload", "line_fill")
+
+
+def _place(column: re.Match[str], row: int) -> Place | None:
+    key, end = column[1], column[2]
+    homes: list[tuple[type[BaseModel], Place]] = [
+        (BoxSection, ("sections", row)),
+        (DrawnJoint, ("joints", row)),
+        (Base, ("base",)),
+    ]
+    for model, home in homes:
+        if key in model.model_fields:
+            return (*home, key) if end is None else (*home, key, PAIRS[end])
+    return (key,) if key in _OF_ALL else None
+
+
+def _value(cell: str, unit: str | None) -> Any:
+    if unit is not None and NUMBER.fullmatch(cell):
+        return f"{cell} {unit}"
+    return float(cell) if NUMBER.fullmatch(cell) else cell
+
+
+def _put(document: Document, place: Place, value: Any, line: int) -> None:
+    block: Any = document.values
+    keys = place[:-1] if isinstance(place[-1], str) else place[:-2]
+    for step in keys:
+        block = block[step]
+    if isinstance(place[-1], int):
+        if not isinstance(block.get(place[-2]), list):
+            block[place[-2]] = [None, None]
+        block[place[-2]][place[-1]] = value
+    else:
+        block[place[-1]] = value
+    for depth in range(1, len(place) + 1):
+        document.lines.setdefault(place[:depth], line)
+
+
+def frozen(value: Any) -> Any:
+    """Lists as tuples, as the reader of YAML gives them."""
+    if isinstance(value, dict):
+        return {key: frozen(item) for key, item in value.items()}
+    return tuple(map(frozen, value)) if isinstance(value, list) else value

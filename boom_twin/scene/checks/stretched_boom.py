@@ -1,0 +1,105 @@
+"""Plausibility of the whole boom stretched out: its first frequencies, their damping, the give of its oil, its payload."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..schema import Scene
+from ..straight_boom import StraightBoom, straight_boom
+from ..yaml_reader import Place
+from .findings import Draft, Finding, warning
+
+FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
+DAMPING = (1e-3, 0.2)  # ratio of the first mode
+PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
+QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
+GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
+TINY = 1e-300
+MOST_PAYLOAD = 0.5  # of the boom's mass
+
+
+TAKES = frozenset({"E", "A", "I", "k", "rho_A", "mass", "mL", "mR", "payload", "line_fill", "beam", "gravity"})
+"""Keys on which all of it depends: where one of these is odd, it would be told again."""
+
+
+def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Finding]:
+    """What only all parts together tell, estimated by `boom_twin.scene.straight_boom`; `odd` are paths that are told already.
+
+    The first of payload, oil, frequency and damping that is odd is told: it is the cause of what follows.
+    """
+    if any(path.rpartition(".")[2] in TAKES for path in odd):
+        return []
+    stiffnesses = np.array([math.inf if joint.cylinder.k is None else joint.cylinder.k for joint in scene.joints])
+    found = straight_boom(scene, stiffnesses)
+    checks = (_payload, _give, _frequency, _damping)
+    return next((told for check in checks if (told := list(check(draft, scene, found)))), [])
+
+
+def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+    low, high = (limit / scene.reach for limit in FREQUENCY)
+    first = float(found.frequencies[0]) if len(found.frequencies) else low
+    if not low <= first <= high:
+        bound = (
+            f"stretched out, this boom of {scene.reach:.3g} m has its first natural frequency at about {first:.2g} Hz; "
+            f"expected {low:.2g} to {high:.2g} Hz"
+        )
+        remedy = "Check E, I and k for what is too soft or too stiff, masses for what is too heavy or too light."
+        yield warning(draft, ("sections",), len(scene.sections), bound, remedy)
+
+
+def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+    """Of every part by itself, then of all together; nothing where no damping is named at all."""
+    if not len(found.frequencies):
+        return
+    parts: list[tuple[Place, float, float]] = []
+    for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
+        if section.beta:
+            parts.append((("sections", i, "beta"), section.beta, section.beta))
+        if joint.cylinder.d and joint.cylinder.k:
+            parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, joint.cylinder.d / joint.cylinder.k))
+    slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
+    first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
+    odd = [part for part in parts if first * part[2] < PART_DAMPING[0] or second * part[2] > PART_DAMPING[1]]
+    for place, value, delay in odd:
+        pace = second if delay * second > PART_DAMPING[1] else first
+        low, high = (limit * value / (each * delay or TINY) for limit, each in zip(PART_DAMPING, (first, second), strict=True))
+        damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
+        bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
+        remedy = "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
+        yield warning(draft, place, value, bound, remedy)
+    if parts and not odd:
+        yield from _damping_of_all(draft, scene, found, parts[0])
+
+
+def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Iterator[Finding]:
+    betas = np.array([section.beta or 0.0 for section in scene.sections])
+    delays = np.array([(joint.cylinder.d or 0.0) / (joint.cylinder.k or math.inf) for joint in scene.joints])
+    ratio = float(found.damping_ratios(betas, delays)[0])
+    if not DAMPING[0] <= ratio <= DAMPING[1]:
+        low, high = (100.0 * limit for limit in DAMPING)
+        bound = f"all damping together gives the first mode a ratio of {100 * ratio:.2g} %; expected {low:g} to {high:g} %"
+        yield warning(draft, part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
+
+
+def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+    for i, joint in enumerate(scene.joints):
+        k, lever = joint.cylinder.k, abs(float(found.levers[i]))
+        if k is not None and lever > 0.0:
+            force, most = float(found.moments[i]) / lever, GIVE * joint.cylinder.max_stroke
+            if force > k * most:
+                bound = (
+                    f"stretched out, the boom loads the cylinder with about {force / 1e3:.3g} kN, and its oil gives way by "
+                    f"{1e3 * force / k:.3g} mm; expected at most {1e3 * most:.3g} mm, 2 % of its stroke"
+                )
+                yield warning(draft, ("joints", i, "cylinder", "k"), k, bound, "Check k (N/m), and the masses.")
+
+
+def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+    payload = 0.0 if scene.tip is None else scene.tip.payload or 0.0
+    boom = found.mass - payload
+    if payload > MOST_PAYLOAD * boom > 0.0:
+        bound = f"expected at most {MOST_PAYLOAD * boom:.3g} kg, half of what the boom weighs"
+        yield warning(draft, ("tip", "payload"), payload, bound, "Give kg; concrete in the pipe line is line_fill.")

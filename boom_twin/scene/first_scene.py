@@ -1,0 +1,209 @@
+"""A first scene from a table of the drawing: every value that is worked out stands with its formula beside it.
+
+What no drawing tells (rigid ends, barrels, rods, damping) is estimated and marked so. The damping needs the first natural
+frequency, which `boom_twin.scene.straight_boom` estimates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..config.yaml_text import yaml_text
+from ..errors import Fault, SceneError
+from ..kernels.elements.linkage import cylinder_length
+from .boom_table import BoomTable, BoxSection, DrawnJoint
+from .kinematics import linkage_of
+from .load import examine_text
+from .schema import Cylinder, Joint, Scene, Section
+from .straight_boom import straight_boom
+from .yaml_reader import Document, with_end_mark, words
+
+ENDS = 1.2  # mass per metre of a rigid end against the beam's
+TUBE = 0.12  # wall of a barrel over its bore
+SPARE = 0.02  # of the travel, at each end of the stroke
+GRID = 721  # angles of a joint's range
+WIDTH = 46  # where comments begin
+
+
+def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str, Scene, list[Fault]]:
+    """Text of the scene, the scene, and what `boom_twin.scene.load.examine` warns of.
+
+    Raises
+    ------
+    SceneError
+        The boom of the table cannot be: pins that do not meet, postures out of reach.
+    """
+    try:
+        scene, _ = examine_text(_text(table, source, None), source)
+        found = straight_boom(scene, np.array([joint.cylinder.k for joint in scene.joints], float))
+        text = _text(table, source, float(found.frequencies[0]) if len(found.frequencies) else None)
+        return text, *examine_text(text, source)
+    except SceneError as error:
+        lines = {words(place): line for place, line in document.lines.items()}
+        faults, odd = (
+            [replace(each, line=lines.get(each.path, lines.get(each.path.rpartition(".")[0]))) for each in told]
+            for told in (error.faults, error.oddities)
+        )
+        raise SceneError(source, tuple(faults), tuple(odd)) from None
+
+
+def _text(table: BoomTable, source: str, first: float | None) -> str:
+    """The scene; without damping where the `first` natural frequency (Hz) is not known yet."""
+    lines = [f"# Worked out by `boom_twin init` from {source}. SI units: m, kg, s, N, Pa; range_deg and postures in degrees."]
+    lines += ["# [estimate]: a guess where the drawing tells nothing. Weigh, measure or test, and write what you find."]
+    lines += [f"description: {yaml_text(table.description)}"] if table.description else []
+    material = {key: value for key, value in table.material.model_dump().items() if value is not None}
+    lines += ["gravity: [0.0, -9.81]", f"material: {yaml_text(material)}", "", "base:"]
+    lines += [f"  pivot: {_list(table.base.pivot)}", f"  cylinder_pin: {_list(table.base.cylinder_pin)}"]
+    lines += [f"  inclination: {_number(table.base.inclination)}"] if table.base.inclination else []
+    lines += ["", "sections:"]
+    for number, section in enumerate(table.sections, 1):
+        lines += [f"  # section {number}: a box {section.height:g} x {section.width:g} m, walls {section.wall:g} m"]
+        lines += _item(_section(table, section, first))
+    lines += ["", "joints:"]
+    for i, joint in enumerate(table.joints):
+        lines += [f"  # joint {i + 1}: bore {joint.bore:g} m, rod {joint.rod:g} m", *_item(_joint(table, i, joint, first))]
+    lines += ["", f"tip: {{payload: {_number(table.payload)}}}"] if table.payload else []
+    lines += [f"line_fill: {_number(table.line_fill)}"] if table.line_fill else []
+    return with_end_mark("\n".join([*lines, "", *_postures(table)]))
+
+
+Row = tuple[str, str, str]
+"""Key, value, comment."""
+
+
+def _section(table: BoomTable, section: BoxSection, first: float | None) -> list[Row]:
+    h, b, t, rho = section.height, section.width, section.wall, table.material.rho or 0.0
+    area = h * b - (h - 2 * t) * (b - 2 * t)
+    inertia = (b * h**3 - (b - 2 * t) * (h - 2 * t) ** 3) / 12
+    pipe = table.pipe if section.pipe is None else section.pipe
+    per_metre = rho * area + pipe
+    rows = [
+        ("length", _number(section.length), "pivot to pivot"),
+        ("beam", _list(section.beam), "the box that bends, from the inboard pivot"),
+        ("height", _number(h), "outer height h; section modulus 2 I / h"),
+        ("A", _number(area), f"h b - (h - 2 t)(b - 2 t), b = {b:g}, t = {t:g}"),
+        ("I", _number(inertia), "[b h^3 - (b - 2 t)(h - 2 t)^3] / 12"),
+        ("rho_A", _number(per_metre), f"rho A + pipe = {rho:g} A + {pipe:g}"),
+        ("rho_I", _number(rho * inertia), "rho I"),
+    ]
+    if first is not None:
+        formula = f"[estimate] 2 zeta / omega, zeta = {table.damping_ratio:g}, omega = 2 pi {first:.3g} Hz"
+        rows.append(("beta", _number(_delay(table, first)), formula))
+    x0, x1 = section.beam
+    for key, start, stop in (("root", 0.0, x0), ("head", x1, section.length)):
+        if stop - start > 1e-6 * section.length:
+            rows.append((key, *_end(per_metre, start, stop, h)))
+    return rows + ([("rod_pin", _list(section.rod_pin), "")] if section.rod_pin is not None else [])
+
+
+def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[str, str]:
+    """A rigid end, and its formula."""
+    length = stop - start
+    mass = ENDS * per_metre * length
+    values: dict[str, float | list[float]] = {
+        "mass": mass,
+        "com": [0.5 * (start + stop), 0.0],
+        "inertia": mass * (length**2 + height**2) / 12,
+    }
+    return _block(values), f"[estimate] m = {ENDS:g} rho_A a, a = {length:.3g}; m (a^2 + h^2) / 12"
+
+
+def _joint(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
+    shared = joint.model_dump(include={"C", "D", "E", "lL", "lR", "R", "mL", "mR"}, exclude_none=True)
+    rows = [("kind", joint.kind, ""), ("range_deg", _list(joint.range_deg), "lowest and highest joint angle, degrees")]
+    rows += [(key, _list(value) if isinstance(value, tuple) else _number(value), "") for key, value in shared.items()]
+    rows.append(("cylinder", "", ""))
+    return rows + [(f"  {key}", value, told) for key, value, told in _cylinder(table, i, joint, first)]
+
+
+def _cylinder(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
+    closed, stroke, told = _stroke(table, i, joint)
+    rho, middle = table.material.rho or 0.0, 0.5 * stroke
+    cap, ring = math.pi / 4 * joint.bore**2, math.pi / 4 * (joint.bore**2 - joint.rod**2)
+    columns = (cap**2 / (joint.cap_line + cap * middle), ring**2 / (joint.rod_line + ring * (stroke - middle)))
+    k = table.bulk_modulus * sum(columns)
+    formula = f"B [Ac^2/(Vc + Ac s) + Ar^2/(Vr + Ar (max_stroke - s))] at s = {middle:.3g}, B = {table.bulk_modulus:.3g}"
+    areas = f"Ac = pi bore^2/4 = {cap:.3g}, Ar = pi (bore^2 - rod^2)/4 = {ring:.3g}"
+    areas += f", Vc = {joint.cap_line:g}, Vr = {joint.rod_line:g}"
+    rows = [("k", _number(k), formula), ("", "", areas)]
+    if first is not None:
+        rows.append(("d", _number(k * _delay(table, first)), "[estimate] 2 zeta k / omega, as beta"))
+    rows += [("closed_length", _number(closed), told), ("max_stroke", _number(stroke), told)]
+    barrel = rho * math.pi * joint.bore**2 * TUBE * (1 + TUBE) * closed
+    rod = rho * math.pi / 4 * joint.rod**2 * closed
+    rows.append(("barrel", _rod(barrel, closed), f"[estimate] a tube of closed_length, wall {TUBE:g} bore"))
+    rows.append(("rod", _rod(rod, closed), "[estimate] a round bar of closed_length; m L^2 / 12"))
+    return rows
+
+
+def _stroke(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float, str]:
+    """Closed length, stroke (m), and where they come from."""
+    if joint.closed_length is not None and joint.max_stroke is not None:
+        return joint.closed_length, joint.max_stroke, "from the table"
+    least, most = _lengths(table, i, joint)
+    spare = SPARE * (most - least)
+    closed = joint.closed_length or math.floor(1e3 * (least - spare)) / 1e3
+    stroke = joint.max_stroke or math.ceil(1e3 * (most + spare - closed)) / 1e3
+    return closed, stroke, f"over range_deg the pins are {least:.4g} to {most:.4g} m apart; {100 * SPARE:g} % to spare"
+
+
+def _lengths(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float]:
+    """Least and greatest distance (m) of the pins over the range; 1 and 2 where they are not complete or do not meet at all."""
+    shared = joint.model_dump(include={"kind", "range_deg", "C", "D", "E", "lL", "lR", "R"})
+    drawn = Joint(**shared, cylinder=Cylinder(closed_length=1.0, max_stroke=1.0))
+    first = Section(length=table.sections[0].length, rod_pin=table.sections[0].rod_pin)
+    try:
+        row = linkage_of(drawn, table.base, first)
+    except TypeError:  # a pin is not given: the checks of the scene name it
+        return 1.0, 2.0
+    with np.errstate(invalid="ignore"):
+        lengths = cylinder_length(row, np.radians(np.linspace(*joint.range_deg, GRID)))[0]
+    lengths = lengths[np.isfinite(lengths)]
+    return (float(lengths.min()), float(lengths.max())) if lengths.size else (1.0, 2.0)
+
+
+def _rod(mass: float, length: float) -> str:
+    return _block({"mass": mass, "inertia": mass * length**2 / 12, "com": 0.5 * length})
+
+
+def _delay(table: BoomTable, first: float) -> float:
+    """Time constant (s) of damping that grows with stiffness, for the damping ratio at the `first` frequency (Hz)."""
+    return table.damping_ratio / (math.pi * first)
+
+
+def _postures(table: BoomTable) -> list[str]:
+    """Those of the table, or the boom as straight as its ranges allow, and in the middle of them."""
+    if table.postures:
+        return ["postures:", *(f"  {yaml_text(name)}: {_list(angles)}" for name, angles in table.postures.items())]
+    ranges = np.array([joint.range_deg for joint in table.joints])
+    relative = {"stretched": np.clip(0.0, *ranges.T), "middle": ranges.mean(axis=1)}
+    lines = ["# section angles to the base, degrees: sums of joint angles, those next to 0 and those amid range_deg"]
+    return [*lines, "postures:", *(f"  {name}: {_list(np.cumsum(angles))}" for name, angles in relative.items())]
+
+
+def _item(rows: list[Row]) -> list[str]:
+    """A block of a list, a key a line."""
+    lines = []
+    for number, (key, value, told) in enumerate(rows):
+        own = f"  {'-' if number == 0 else ' '} {key}: {value}".rstrip() if key.strip() else ""
+        lines.append(f"{own:{WIDTH}}  # {told}" if told else own)
+    return lines
+
+
+def _block(values: Mapping[str, float | list[float]]) -> str:
+    shown = (f"{key}: {_list(value) if isinstance(value, list) else _number(value)}" for key, value in values.items())
+    return "{" + ", ".join(shown) + "}"
+
+
+def _list(values: Iterable[float]) -> str:
+    return "[" + ", ".join(map(_number, values)) + "]"
+
+
+def _number(value: float | None) -> str:
+    """Six digits; what is not a whole number in them has a point, as YAML wants it."""
+    return f"{value or 0.0:.6g}"

@@ -1,0 +1,111 @@
+"""The envelope against `statics`, against moments by hand, and its command."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin.analysis.envelope import Envelope, envelope
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.cli.main import main
+from boom_twin.errors import SolverError
+from boom_twin.scene import Scene, load_scene
+
+
+@pytest.fixture(scope="module")
+def boom() -> Scene:
+    """Two sections of the default boom, the first of them with a height."""
+    scene = load_scene()
+    sections = (scene.sections[0].model_copy(update={"height": 0.2}), scene.sections[1])
+    update = {"sections": sections, "joints": scene.joints[:2], "postures": {"flat": (0.0, 0.0), "up": (60.0, 20.0)}}
+    return scene.model_copy(update=update)
+
+
+@pytest.fixture(scope="module")
+def found(boom: Scene) -> Envelope:
+    return envelope(boom)
+
+
+def test_every_named_posture_is_that_of_statics(boom: Scene, found: Envelope) -> None:
+    assert found.names[:2] == ("flat", "up") and set(found.names[2:]) == {""}
+    for row, name in enumerate(("flat", "up")):
+        rest = statics(boom, posture=name, modes=3)
+        assert found.tips[row] == pytest.approx(rest.tip, abs=1e-9)
+        assert found.deflections[row] == pytest.approx(np.hypot(*(rest.tip - rest.tip_rigid)), abs=1e-9)
+        assert found.forces[row] == pytest.approx(rest.cylinder_forces, rel=1e-9)
+        assert found.frequencies[row] == pytest.approx(rest.frequencies, rel=1e-4)
+        assert found.angles[row] == pytest.approx(boom.postures[name])
+
+
+def test_the_grid_covers_the_ranges(boom: Scene, found: Envelope) -> None:
+    relative = np.diff(found.angles, prepend=0.0, axis=1)
+    for i, joint in enumerate(boom.joints):
+        assert relative[:, i].min() == pytest.approx(joint.range_deg[0])
+        assert relative[:, i].max() == pytest.approx(joint.range_deg[1])
+    assert len(found.names) + sum(found.skipped.values()) == 2 + 11**2
+
+
+def test_moment_and_stress_at_the_root_are_those_by_hand(boom: Scene, found: Envelope) -> None:
+    """Of all that lies outboard of the root of section 2, held there: the cylinder's lever is within the section before."""
+    section = boom.sections[1]
+    assert section.beam is not None and section.rho_A is not None and section.head is not None
+    x0, x1 = section.beam
+    moment = 9.81 * (section.rho_A * (x1 - x0) ** 2 / 2 + section.head.mass * (section.head.com[0] - x0))
+    assert -found.moments[0, 1] == pytest.approx(moment, rel=5e-3)
+    inertia = boom.sections[0].I
+    assert inertia is not None
+    assert found.stresses[:, 0] == pytest.approx(np.abs(found.moments[:, 0]) * 0.1 / inertia)
+    assert np.isnan(found.stresses[:, 1]).all()
+
+
+def test_postures_out_of_travel_are_counted(boom: Scene) -> None:
+    short = boom.joints[1].model_copy(update={"cylinder": boom.joints[1].cylinder.model_copy(update={"max_stroke": 0.2})})
+    found = envelope(boom.model_copy(update={"joints": (boom.joints[0], short)}))
+    assert found.skipped["out of a cylinder's travel"] > 20
+    with pytest.raises(SolverError, match="none of"):
+        none = short.model_copy(update={"cylinder": short.cylinder.model_copy(update={"max_stroke": 1e-4})})
+        envelope(boom.model_copy(update={"joints": (boom.joints[0], none)}))
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of the guide's boom with heights and without modes, which is quick."""
+    guide = (Path(__file__).parents[2] / "docs" / "your_boom.md").read_text(encoding="utf-8")
+    text = re.findall(r"```yaml\n(.*?)```", guide, re.DOTALL)[-1]
+    path = tmp_path_factory.mktemp("boom") / "boom.yaml"
+    path.write_text(text.replace("beta: 1.0e-3", "height: 0.2") + "modes: 0\n", encoding="utf-8")
+    return path
+
+
+def test_the_command_names_worst_postures_and_writes_files(
+    rigid: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["envelope", str(rigid), "--out", str(out), "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert json.loads((out / "envelope.json").read_text(encoding="utf-8")) == values
+    with (out / "envelope.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == values["postures"] and rows[0]["posture"] == "reach"
+    forces = [float(row["cylinder_2_force_N"]) for row in rows]
+    assert max(forces) == pytest.approx(values["cylinder_2_force_N_greatest"], rel=1e-8)
+    worst = rows[forces.index(max(forces))]
+    assert [float(worst[f"section_{i + 1}_deg"]) for i in range(2)] == pytest.approx(
+        values["cylinder_2_force_N_greatest_angles_deg"], rel=1e-8, abs=1e-8
+    )
+    assert (out / "envelope.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_heights_it_says_what_stresses_need(found: Envelope) -> None:
+    from boom_twin.cli.envelope import _report, quantities_of
+
+    words = [quantity.words for quantity in quantities_of(found)]
+    assert "section 1 bending stress" in words and "section 2 bending stress" not in words
+    lines = _report(found, [quantity for quantity in quantities_of(found) if quantity.unit != "MPa"])
+    assert "give sections[i].height" in lines[-1]
+    assert any("flat" in line for line in lines)

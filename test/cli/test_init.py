@@ -1,0 +1,104 @@
+"""`boom_twin init`: from the example table, from answers, and what it refuses."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+from boom_twin.cli.main import main
+from boom_twin.scene import load_scene
+
+ANSWERS = """Small boom
+0, 0
+0.40, -1100 mm
+12 kg/m
+25
+
+
+2
+4000 mm
+0.55, 3.75
+200 kg
+200 mm
+120 mm
+6 mm
+0.55, -0.12
+
+0, 75
+100 mm
+70 mm
+3.5
+0.25, 3.5
+150 mm
+90 mm
+6 mm
+B1
+-150, 0
+80 mm
+50 mm
+-0.82, 0.18
+-0.14, -0.04
+0.12, 0.062
+0.42
+0.377
+4
+3
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_example_table_makes_a_scene_that_passes_strict(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["init", "--example-table"]) == 0
+    Path("table.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 0
+    out, err = capsys.readouterr()
+    assert "Next: boom_twin check boom.yaml" in out and err == ""
+    assert main(["check", "boom.yaml", "--strict"]) == 0
+
+
+def test_nothing_is_written_over(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("boom.yaml").write_text("mine", encoding="utf-8")
+    main(["init", "--example-table"])
+    Path("table.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
+    assert "is not written over" in capsys.readouterr().err
+    assert main(["init", "--table", "table.yaml", "--out", "table.yaml"]) == 1
+    assert Path("boom.yaml").read_text(encoding="utf-8") == "mine"
+    assert main(["init", "--table", "table.yaml"]) == 1
+    assert "--out is absent" in capsys.readouterr().err
+
+
+def test_answers_make_a_scene_and_are_kept(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(ANSWERS))
+    assert main(["init", "--out", "boom.yaml"]) == 0
+    out = capsys.readouterr().out
+    assert "sections[0].height = '200 kg': `kg` is no unit of this key, which is in m" in out
+    scene = load_scene("boom.yaml")
+    assert [joint.kind for joint in scene.joints] == ["A", "B1"]
+    assert pytest.approx(3.696e-3) == scene.sections[0].A and scene.base.cylinder_pin == (0.4, -1.1)
+    assert main(["init", "--table", "boom.table.yaml", "--out", "again.yaml"]) == 0
+    assert load_scene("again.yaml") == scene
+
+
+def test_answers_that_end_too_early_write_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO("Small boom\n0, 0\n"))
+    assert main(["init", "--out", "boom.yaml"]) == 1
+    assert "the answers end at `base.cylinder_pin" in capsys.readouterr().err
+    assert list(folder.iterdir()) == []
+
+
+def test_a_faulty_table_is_refused_with_its_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("table.yaml").write_text("base: {pivot: [0, 0]}\nsections: []\n", encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
+    err = capsys.readouterr().err
+    assert "base.cylinder_pin is absent" in err and "sections" in err and not Path("boom.yaml").exists()

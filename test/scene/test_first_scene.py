@@ -1,0 +1,118 @@
+"""A first scene from a table: its numbers against formulas written down here, its checks, both formats, refusals."""
+
+from __future__ import annotations
+
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from boom_twin.errors import SceneError
+from boom_twin.scene.boom_table import read_table
+from boom_twin.scene.first_scene import first_scene
+from boom_twin.scene.kinematics import stroke_curve
+from boom_twin.scene.load import examine
+from boom_twin.scene.schema import Scene
+
+EXAMPLE = (files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8")
+CSV = """length [mm],beam_start [mm],beam_end [mm],height [mm],width [mm],wall [mm],rod_pin_x,rod_pin_y,kind,range_deg_low,\
+range_deg_high,bore [mm],rod [mm],C_x [mm],C_y [mm],D_x [mm],D_y [mm],E_x [mm],E_y [mm],lL [mm],lR [mm],mL,mR,\
+cylinder_pin_x,cylinder_pin_y,pivot_x,pivot_y,pipe,payload
+8300,1320,7800,560,420,8,1.32,-0.264,A,-5,85,180,125,,,,,,,,,,,0.99,-2.75,0,0,25,60
+7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1795,396,-308,-88,264,136,924,829,35,28,,,,,25,
+""".replace("\\\n", "")
+
+
+def scene_of(folder: Path, text: str, name: str = "table.yaml") -> tuple[str, Scene, list[Any]]:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return first_scene(*read_table(path), name)
+
+
+def test_what_is_worked_out_is_what_the_formulas_give(tmp_path: Path) -> None:
+    text, scene, oddities = scene_of(tmp_path, EXAMPLE)
+    assert oddities == []
+    section, cylinder = scene.sections[1], scene.joints[1].cylinder
+    assert pytest.approx(2 * 0.34 * 0.006 + 2 * (0.45 - 0.012) * 0.006, rel=1e-5) == section.A
+    flanges = 2 * (0.34 * 0.006**3 / 12 + 0.34 * 0.006 * 0.222**2)
+    assert pytest.approx(flanges + 2 * 0.006 * 0.438**3 / 12, rel=1e-5) == section.I
+    assert section.rho_A == pytest.approx(7850 * section.A + 25, rel=1e-5)
+    assert section.height == 0.45 and section.section_modulus == pytest.approx(2 * section.I / 0.45)
+    assert section.root is not None and section.root.mass == pytest.approx(1.2 * section.rho_A * 0.55, rel=1e-5)
+    piston, ring, middle = math.pi * 0.1**2, math.pi * (0.1**2 - 0.06**2), 0.5 * cylinder.max_stroke
+    k = 1.4e9 * (piston**2 / (5e-4 + piston * middle) + ring**2 / (5e-4 + ring * middle))
+    assert cylinder.k == pytest.approx(k, rel=1e-5)
+    assert all(f"# {formula}" in text for formula in ("[b h^3 - (b - 2 t)(h - 2 t)^3] / 12", "rho A + pipe", "[estimate]"))
+
+
+def test_cylinders_cover_the_range_and_postures_are_in_it(tmp_path: Path) -> None:
+    import numpy as np
+
+    _, scene, _ = scene_of(tmp_path, EXAMPLE)
+    for i, joint in enumerate(scene.joints):
+        strokes = stroke_curve(scene, i, np.radians(np.linspace(*joint.range_deg, 500)))
+        assert 0.0 < strokes.min() < 0.04 * joint.cylinder.max_stroke
+        assert 0.96 * joint.cylinder.max_stroke < strokes.max() < joint.cylinder.max_stroke
+    assert list(scene.postures) == ["stretched", "middle"]
+    assert scene.postures["stretched"] == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_first_mode_gets_the_damping_that_was_asked_for(tmp_path: Path) -> None:
+    from boom_twin.analysis.equilibrium import statics
+
+    _, scene, _ = scene_of(tmp_path, EXAMPLE)
+    omega = 2 * math.pi * statics(scene, posture="stretched", modes=1).frequencies[0]
+    for section, joint in zip(scene.sections, scene.joints, strict=True):
+        assert section.beta is not None and 0.5 * omega * section.beta == pytest.approx(0.01, rel=0.1)
+        assert 0.5 * omega * (joint.cylinder.d or 0) / (joint.cylinder.k or 1) == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
+    _, scene, oddities = scene_of(tmp_path, CSV, "table.csv")
+    _, whole, _ = scene_of(tmp_path, EXAMPLE)
+    assert oddities == []
+    assert scene.base == whole.base and scene.tip == whole.tip
+    for i in range(2):
+        assert scene.sections[i].model_copy(update={"beta": 0}) == whole.sections[i].model_copy(update={"beta": 0})
+        drives = [each.joints[i].cylinder.model_copy(update={"d": 0}) for each in (scene, whole)]
+        assert drives[0] == drives[1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path", "words"),
+    [
+        ("wall: 6 mm", "wall: 6", "sections[1].wall", "two walls fill the box"),
+        ("wall: 6 mm", "wall: 6 kg", "sections[1].wall", "`kg` is no unit of this key, which is in m"),
+        ("rod: 120 mm", "rod: 220 mm", "joints[1].rod", "thinner than the bore"),
+        ("height: 450 mm", "hight: 450 mm", "sections[1].hight", "nearest known key here is `height`"),
+        ("lL: 924 mm", "lL: 92.4 mm", "joints[1].range_deg", "do not meet at any angle"),
+        ("D: [-308 mm, -88 mm],", "", "joints[1].D", "needs it"),
+        ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are worked out with it"),
+        ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
+    ],
+)
+def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
+    assert old in EXAMPLE
+    with pytest.raises(SceneError) as caught:
+        scene_of(tmp_path, EXAMPLE.replace(old, new))
+    faults = {fault.path: fault for fault in caught.value.faults}
+    assert path in faults and words in str(faults[path]), str(caught.value)
+    line = EXAMPLE.replace(old, new).splitlines()[(faults[path].line or 0) - 1]
+    assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
+
+
+@pytest.mark.parametrize(
+    ("header", "row"), [("lenght,kind", "3,A"), ("length", ""), ("C,C_x,length_x", "1,2,3"), ("length", "1" * 200_000)]
+)
+def test_a_csv_table_that_is_none_is_refused(tmp_path: Path, header: str, row: str) -> None:
+    with pytest.raises(SceneError, match=r"no such column|it is needed|no row under|not a readable CSV"):
+        scene_of(tmp_path, f"{header}\n{row}\n", "table.csv")
+
+
+def test_the_written_scene_is_the_one_examined(tmp_path: Path) -> None:
+    text, scene, _ = scene_of(tmp_path, EXAMPLE)
+    path = tmp_path / "scene.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert examine(path) == (scene, [])

@@ -1,0 +1,110 @@
+"""Slips of a newcomer, each by one edit of the default scene: all load, all are warned of at the key that is wrong."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from boom_twin.cli.main import main
+from boom_twin.scene.load import clearance_text, default_text, examine, examine_text
+from boom_twin.scene.yaml_reader import with_end_mark
+
+Place = tuple[str | int, ...]
+
+
+def s(i: int, *rest: str | int) -> Place:
+    return ("sections", i, *rest)
+
+
+def j(i: int, *rest: str | int) -> Place:
+    return ("joints", i, *rest)
+
+
+SLIPS: dict[str, tuple[Place, Any, str, tuple[str, ...]]] = {
+    "k in kN/m": (j(0, "cylinder", "k"), 40e3, "joints[0].cylinder.k", ("kN/m?", "4e+07")),
+    "k of the last cylinder in kN/m": (j(3, "cylinder", "k"), 6e3, "joints[3].cylinder.k", ("kN/mm?",)),
+    "k ten times too small": (j(1, "cylinder", "k"), 3.0e6, "joints[1].cylinder.k", ("gives way by", "2 % of its stroke")),
+    "k in N/m times a thousand": (j(2, "cylinder", "k"), 2e10, "joints[2].cylinder.k", ("expected from 1e6 to 1e9",)),
+    "d in kN s/m": (j(0, "cylinder", "d"), 120.0, "joints[0].cylinder.d", ("would damp a mode of",)),
+    "d 100 times too large": (j(1, "cylinder", "d"), 9e6, "joints[1].cylinder.d", ("would damp a mode of",)),
+    "beta in ms": (s(0, "beta"), 1.0, "sections[0].beta", ("would damp a mode of",)),
+    "beta as damping ratio": (s(2, "beta"), 0.02, "sections[2].beta", ("2 zeta / omega",)),
+    "I decimal": (s(0, "I"), 3.6e-4, "sections[0].I", ("sqrt(I/A)", "expected")),
+    "I of another power": (s(1, "I"), 2.0e-6, "sections[1].I", ("walls of",)),
+    "A decimal": (s(0, "A"), 4.9e-4, "sections[0].I", ("sqrt(I/A)",)),
+    "height in cm": (s(1, "height"), 17.2, "sections[1].I", ("for a box 17.2 m high",)),
+    "height as half of it": (s(0, "height"), 0.1, "sections[0].I", ("0.1 m high",)),
+    "rho_A of the box less pipe, decimal": (s(0, "rho_A"), 5.2, "sections[0].rho_A", ("rho A",)),
+    "rho_A is less than rho A": (s(2, "rho_A"), 20.0, "sections[2].rho_A", ("expected 23.6 to",)),
+    "rho_A of the whole section": (s(1, "rho_A"), 160.0, "sections[1].rho_A", ("one metre",)),
+    "rho_I as rho": (s(0, "rho_I"), 7850.0, "sections[0].rho_I", ("rho I",)),
+    "centre of a head from the outboard pivot": (s(1, "head", "com"), [-0.12, 0.0], "sections[1].head.com", ("INBOARD",)),
+    "centre of a root in the beam": (s(0, "root", "com"), [1.3, 0.0], "sections[0].root.com", ("inside the root",)),
+    "inertia about the pivot": (s(0, "head", "inertia"), 222.0, "sections[0].head.inertia", ("OWN centre",)),
+    "mass of a root in t": (s(0, "root", "mass"), 0.036, "sections[0].root.mass", ("not tonnes",)),
+    "mass of a head in g": (s(1, "head", "mass"), 13000.0, "sections[1].head.mass", ("not grams",)),
+    "mass of a link in g": (j(1, "mL"), 4000.0, "joints[1].mL", ("not grams",)),
+    "mass of a barrel in t": (j(1, "cylinder", "barrel", "mass"), 0.016, "joints[1].cylinder.barrel.inertia", ("gyration",)),
+    "centre of a rod from the other pin": (j(2, "cylinder", "rod", "com"), 1.0, "joints[2].cylinder.rod.com", ("rod pin",)),
+    "beam end as length": (s(0, "beam"), [0.6, 3.0], "sections[0].beam", ("length of the beam, then x1 = 3.6",)),
+    "beam end as length, section 3": (s(2, "beam"), [0.25, 2.45], "sections[2].beam", ("x1 = 2.7",)),
+    "gravity along x": (("gravity",), [-9.81, 0.0], "gravity", ("-y", "base.inclination")),
+    "gravity for a slope": (("gravity",), [0.5, -9.797], "gravity", ("-y", "base.inclination")),
+    "inclination in degrees": (("base", "inclination"), 3.0, "base.inclination", ("degrees?",)),
+    "inclination of half a radian": (("base", "inclination"), 0.25, "base.inclination", ("0.2 rad",)),
+    "E of another power": (("material", "E"), 2.06e10, "material.E", ("expected from 6.3e+10",)),
+    "concrete as a whole": (("line_fill",), 400.0, "line_fill", ("whole load",)),
+    "open length as stroke": (j(1, "cylinder", "max_stroke"), 1.13, "joints[1].cylinder.max_stroke", ("not the open length",)),
+    "payload in g": (("tip",), {"payload": 40e3}, "tip.payload", ("half of what the boom weighs",)),
+    "stiffness falls outwards too fast": (s(3, "I"), 0.45e-6, "sections[3].I", ("expected",)),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_is_warned_of_at_its_key(bench: Any, slip: str) -> None:
+    place, value, path, words = SLIPS[slip]
+
+    def edit(values: Any) -> None:
+        for step in place[:-1]:
+            values = values[step]
+        values[place[-1]] = value
+
+    told = {oddity.path: oddity for oddity in bench.oddities(edit)}
+    assert path in told, [str(oddity) for oddity in told.values()]
+    assert told[path].remedy and all(word in str(told[path]) for word in words), str(told[path])
+    assert len(told) <= 2, [str(oddity) for oddity in told.values()]
+
+
+def test_sound_scenes_have_no_warning() -> None:
+    guide = (Path(__file__).parents[2] / "docs/your_boom.md").read_text(encoding="utf-8")
+    whole = re.findall(r"```yaml\n(.*?)```", guide, re.DOTALL)[-1]
+    clearance = with_end_mark(f"{default_text()}\n{clearance_text()}")
+    loaded = with_end_mark(f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}")
+    for text in (default_text(), clearance, whole, loaded):
+        assert [str(oddity) for oddity in examine_text(text, "scene")[1]] == []
+
+
+def test_strict_makes_warnings_errors(bench: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(bench.edited(lambda values: values["joints"][0]["cylinder"].update(k=40e3)))
+    assert main(["check", path]) == 0
+    assert "Warnings: 1" in capsys.readouterr().out
+    assert main(["check", path, "--strict"]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and "1 fault" in err and "joints[0].cylinder.k = 40000.0" in err
+    assert main(["check", "--strict"]) == 0
+    assert examine(path)[1]
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-30, 1e30])
+def test_absurd_values_are_told_of_without_an_accident(bench: Any, size: float) -> None:
+    def edit(values: Any) -> None:
+        values["material"].update(E=size, rho=size)
+        for section in values["sections"]:
+            section.update(A=size, I=size, rho_A=size, rho_I=size, beta=size, height=size)
+        for joint in values["joints"]:
+            joint["cylinder"].update(k=size, d=size)
+
+    assert bench.oddities(edit)

@@ -1,0 +1,110 @@
+"""Values with units: the same scene as in SI numbers, and what is said of a unit that does not fit."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from boom_twin.scene.glossary import MEANING
+from boom_twin.scene.load import examine, load_scene
+from boom_twin.scene.schema import Material, Scene
+from boom_twin.scene.units import converted, unit_of
+
+OTHER = {
+    "m": (1000, "mm"), "m^2": (1e4, "cm^2"), "m^4": (1e8, "cm4"), "kg": (1e-3, "t"), "kg/m": (1e-3, "kg/mm"),
+    "Pa": (1e-9, "GPa"),
+    "N/m": (1e-6, "kN/mm"), "N s/m": (1e-3, "kN*s/m"), "s": (1e3, "ms"), "kg/m^3": (1e-3, "g/cm³"), "m/s^2": (1e2, "cm/s^2"),
+    "kg m^2": (1e4, "kg cm²"), "kg m": (1e2, "kg·cm"), "degrees": (1, "deg"),
+}  # fmt: skip
+"""Of every unit of a scene another one, and how many of it are one of the first."""
+
+
+def in_other_units(value: Any, unit: str) -> Any:
+    if isinstance(value, list):
+        return [in_other_units(item, unit) for item in value]
+    factor, name = OTHER[unit]
+    return f"{float(value) * factor:.12g} {name}"
+
+
+def rewritten(block: Any, model: type[BaseModel] = Scene) -> Any:
+    """A block of a scene with all its values in other units."""
+    from boom_twin.scene.glossary import BLOCKS
+
+    found = {}
+    for key, value in block.items():
+        inner, unit = BLOCKS.get(model, {}).get(key), unit_of(MEANING[model][key])
+        if key == "postures":
+            found[key] = {name: in_other_units(angles, "degrees") for name, angles in value.items()}
+        elif isinstance(value, list) and inner is not None:
+            found[key] = [rewritten(item, inner) for item in value]
+        elif inner is not None:
+            found[key] = rewritten(value, inner)
+        else:
+            found[key] = value if unit is None else in_other_units(value, unit)
+    return found
+
+
+def test_a_scene_in_other_units_is_the_same_to_the_bit(bench: Any) -> None:
+    path = bench.edited(lambda values: values.update(rewritten(values)))
+    text = path.read_text(encoding="utf-8")
+    assert all(f" {name}" in text for _, name in OTHER.values() if name != "kg·cm") and "mm" in text
+    assert load_scene(path) == load_scene()
+
+
+def test_every_number_of_a_scene_has_a_unit_or_is_a_pure_number() -> None:
+    pure = {"modes", "nu", "exponent", "restitution", "friction"}
+    for model, words in MEANING.items():
+        for key, meaning in words.items():
+            if re.search(r"\b(float|int)\b", str(model.model_fields[key].annotation)):
+                assert (unit_of(meaning) in OTHER | {"rad": 0}) != (key in pure), (model.__name__, key)
+
+
+def test_angles_take_degrees_and_radians(bench: Any) -> None:
+    def edit(values: Any) -> None:
+        values["base"]["inclination"] = "3 deg"
+        values["joints"][0]["range_deg"] = ["-5°", "1.4835298641951802 rad"]
+
+    scene, _ = examine(bench.edited(edit))
+    assert scene.base.inclination == pytest.approx(0.05235987755982989, abs=1e-17)
+    assert scene.joints[0].range_deg == pytest.approx((-5.0, 85.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("30 kg/mm", ("`kg/mm` is no unit of this key, which is in N/m", "Give the stiffness of the oil spring, N/m.")),
+        ("30 kN/mn", ("`kN/mn` is no unit that is known", "N/m")),
+        ("30 deg", ("`deg` is no unit of this key", "N/m")),
+        ("1e999999999999999999999 kN/mm", ("is no number that can be had in N/m",)),
+        ("30 kN/mm/mm**9", ("is no unit of this key",)),
+        ("30 kN/m**99999999", ("a number is needed, not text",)),
+        ("30 __import__('os')", ("a number is needed, not text",)),
+        ("0,3 kN/mm", ("a number is needed, not text",)),
+    ],
+)
+def test_a_unit_that_does_not_fit_is_refused_by_name(bench: Any, value: str, words: tuple[str, ...]) -> None:
+    (fault,) = bench.faults(lambda values: values["joints"][1]["cylinder"].update(k=value))
+    assert fault.path == "joints[1].cylinder.k" and fault.line
+    assert all(word in str(fault) for word in words), str(fault)
+
+
+def test_a_percentage_is_no_angle_and_a_pure_number_takes_no_unit(bench: Any) -> None:
+    (angle,) = bench.faults(lambda values: values["base"].update(inclination="3 m/m"))
+    assert "`m/m` is no unit of this key, which is in rad" in angle.bound
+    (pure,) = bench.faults(lambda values: values["material"].update(nu="0.3 mm"))
+    assert "a number without a unit is needed" in pure.bound
+
+
+def test_a_new_key_of_the_glossary_needs_no_more_than_its_meaning() -> None:
+    assert converted(("8 bar", 3.0), unit_of("the pressure in Pa, 2e7 at work")) == (800000.0, 3.0)
+    assert unit_of(MEANING[Material]["name"]) is None
+
+
+def test_a_scene_in_plain_numbers_imports_no_library_of_units() -> None:
+    code = "import sys; from boom_twin.scene import load_scene; load_scene(); sys.exit('pint' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
