@@ -43,6 +43,7 @@ class DrawnJoint(Part):
     E: Point | None = None
     lL: Positive | None = None
     lR: Positive | None = None
+    side: Literal["left", "right"] | None = None
     R: Point | None = None
     mL: NotNegative | None = None
     mR: NotNegative | None = None
@@ -94,7 +95,7 @@ TABLE = Format(
             "pipe": _PIPE,
         },
         DrawnJoint: {
-            **{key: MEANING[Joint][key] for key in ("kind", "range_deg", "C", "D", "E", "lL", "lR", "R", "mL", "mR")},
+            **{key: MEANING[Joint][key] for key in ("kind", "range_deg", "C", "D", "E", "lL", "lR", "side", "R", "mL", "mR")},
             "bore": "the diameter of the piston, m",
             "rod": "the diameter of the rod, m",
             "closed_length": "the length from pin to pin at stroke 0, m; without it, worked out from the pins",

@@ -18,6 +18,7 @@ from ..kernels.elements.linkage import cylinder_length
 from .boom_table import BoomTable, BoxSection, DrawnJoint
 from .kinematics import linkage_of
 from .load import examine_text
+from .oil_spring import middle_stiffness
 from .schema import Cylinder, Joint, Scene, Section
 from .straight_boom import straight_boom
 from .yaml_reader import Document, with_end_mark, words
@@ -39,7 +40,7 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
     """
     try:
         scene, _ = examine_text(_text(table, source, None), source)
-        found = straight_boom(scene, np.array([joint.cylinder.k for joint in scene.joints], float))
+        found = straight_boom(scene, np.array([middle_stiffness(joint.cylinder) for joint in scene.joints]))
         text = _text(table, source, float(found.frequencies[0]) if len(found.frequencies) else None)
         return text, *examine_text(text, source)
     except SceneError as error:
@@ -114,9 +115,9 @@ def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[st
 
 
 def _joint(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
-    shared = joint.model_dump(include={"C", "D", "E", "lL", "lR", "R", "mL", "mR"}, exclude_none=True)
+    shared = joint.model_dump(include={"C", "D", "E", "lL", "lR", "side", "R", "mL", "mR"}, exclude_none=True)
     rows = [("kind", joint.kind, ""), ("range_deg", _list(joint.range_deg), "lowest and highest joint angle, degrees")]
-    rows += [(key, _list(value) if isinstance(value, tuple) else _number(value), "") for key, value in shared.items()]
+    rows += [(key, _shown(value), "") for key, value in shared.items()]
     rows.append(("cylinder", "", ""))
     return rows + [(f"  {key}", value, told) for key, value, told in _cylinder(table, i, joint, first)]
 
@@ -154,7 +155,7 @@ def _stroke(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float, 
 
 def _lengths(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float]:
     """Least and greatest distance (m) of the pins over the range; 1 and 2 where they are not complete or do not meet at all."""
-    shared = joint.model_dump(include={"kind", "range_deg", "C", "D", "E", "lL", "lR", "R"})
+    shared = joint.model_dump(include={"kind", "range_deg", "C", "D", "E", "lL", "lR", "side", "R"})
     drawn = Joint(**shared, cylinder=Cylinder(closed_length=1.0, max_stroke=1.0))
     first = Section(length=table.sections[0].length, rod_pin=table.sections[0].rod_pin)
     try:
@@ -198,6 +199,11 @@ def _item(rows: list[Row]) -> list[str]:
 def _block(values: Mapping[str, float | list[float]]) -> str:
     shown = (f"{key}: {_list(value) if isinstance(value, list) else _number(value)}" for key, value in values.items())
     return "{" + ", ".join(shown) + "}"
+
+
+def _shown(value: str | float | tuple[float, ...]) -> str:
+    """As YAML writes it: a word, a number, or a list of numbers."""
+    return value if isinstance(value, str) else _list(value) if isinstance(value, tuple) else _number(value)
 
 
 def _list(values: Iterable[float]) -> str:

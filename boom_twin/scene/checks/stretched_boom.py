@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..oil_spring import middle_stiffness
 from ..schema import Scene
 from ..straight_boom import StraightBoom, straight_boom
 from ..yaml_reader import Place
@@ -32,7 +33,7 @@ def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Findi
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
-    stiffnesses = np.array([math.inf if joint.cylinder.k is None else joint.cylinder.k for joint in scene.joints])
+    stiffnesses = np.array([middle_stiffness(joint.cylinder) for joint in scene.joints])
     found = straight_boom(scene, stiffnesses)
     checks = (_payload, _give, _frequency, _damping)
     return next((told for check in checks if (told := list(check(draft, scene, found)))), [])
@@ -58,8 +59,9 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Findin
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         if section.beta:
             parts.append((("sections", i, "beta"), section.beta, section.beta))
-        if joint.cylinder.d and joint.cylinder.k:
-            parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, joint.cylinder.d / joint.cylinder.k))
+        if joint.cylinder.d:
+            delay = joint.cylinder.d / middle_stiffness(joint.cylinder)
+            parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, delay))
     slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
     first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
     odd = [part for part in parts if first * part[2] < PART_DAMPING[0] or second * part[2] > PART_DAMPING[1]]
@@ -76,7 +78,7 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Findin
 
 def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Iterator[Finding]:
     betas = np.array([section.beta or 0.0 for section in scene.sections])
-    delays = np.array([(joint.cylinder.d or 0.0) / (joint.cylinder.k or math.inf) for joint in scene.joints])
+    delays = np.array([(joint.cylinder.d or 0.0) / middle_stiffness(joint.cylinder) for joint in scene.joints])
     ratio = float(found.damping_ratios(betas, delays)[0])
     if not DAMPING[0] <= ratio <= DAMPING[1]:
         low, high = (100.0 * limit for limit in DAMPING)
@@ -86,15 +88,16 @@ def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple
 
 def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
     for i, joint in enumerate(scene.joints):
-        k, lever = joint.cylinder.k, abs(float(found.levers[i]))
-        if k is not None and lever > 0.0:
+        k, lever = middle_stiffness(joint.cylinder), abs(float(found.levers[i]))
+        if math.isfinite(k) and lever > 0.0:
             force, most = float(found.moments[i]) / lever, GIVE * joint.cylinder.max_stroke
             if force > k * most:
                 bound = (
                     f"stretched out, the boom loads the cylinder with about {force / 1e3:.3g} kN, and its oil gives way by "
                     f"{1e3 * force / k:.3g} mm; expected at most {1e3 * most:.3g} mm, 2 % of its stroke"
                 )
-                yield warning(draft, ("joints", i, "cylinder", "k"), k, bound, "Check k (N/m), and the masses.")
+                key = "k" if joint.cylinder.oil is None else "oil"
+                yield warning(draft, ("joints", i, "cylinder", key), k, bound, "Check k (N/m), and the masses.")
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
