@@ -148,8 +148,10 @@ def beam(step: Step, row: int, z: Vector, q: Vector) -> tuple[Vector, Vector]:
     inertial = t.point_mass[row, :points, None] * (motion.gain * (places[:points] + z[:2] - hat) - t.gravity)
     twist = np.zeros(points, complex)
     if part.rotary:
-        twist = t.point_rotary[row, :points] * motion.gain * (
-            z[THETA] + angles[:points] - motion.hat[part.history + 2 * points + np.arange(points)]
+        twist = (
+            t.point_rotary[row, :points]
+            * motion.gain
+            * (z[THETA] + angles[:points] - motion.hat[part.history + 2 * points + np.arange(points)])
         )
     out = np.array([z[X] + places[-1, 0], z[Y] + places[-1, 1], z[THETA] + angles[-1], 0.0, 0.0, 0.0], complex)
     out[QX:] = z[QX:] - inertial.sum(axis=0)
