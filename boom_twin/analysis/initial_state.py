@@ -223,8 +223,10 @@ def _check_loops(plan: Plan, state: State, work: Work, initial: InitialState, le
     for name, gap, speed in zip(names, gaps, speeds, strict=True):
         if abs(gap) > OPEN or abs(speed) > OPEN:
             raise UsageError(
-                f"{name}: {gap:.3g} m apart at the start, parting at {speed:.3g} m/s; {OPEN:g} is let pass. Give coordinates and "
-                "rates that close the loops, as those of an earlier run do, and an incompressible cylinder the rate of its drive."
+                f"{name}: {gap:.3g} m apart at the start, parting at {speed:.3g} m/s; {OPEN:g} is let pass. Give coordinates "
+                f"and "
+                "rates that close the loops, as those of an earlier run do, and an incompressible cylinder the rate of its "
+                "drive."
             )
 
 

@@ -20,7 +20,10 @@ LOOKS = {  # pins, program: colour, width, dashes
 
 @dataclass(frozen=True)
 class StopTrace:
-    """A stop in one posture: tip's rise (mm), vertical acceleration (m/s^2) and force of cylinder 1 (kN) over time (s), (m,)."""
+    """A stop in one posture, m rows.
+
+    Times (s), rise of the tip (mm), its vertical acceleration (m/s^2) and the force of cylinder 1 (kN), each (m,).
+    """
 
     posture: str
     pins: str
@@ -53,7 +56,10 @@ def posture_picture(path: Path, title: str, note: str, peer: str, traces: list[S
 
 @dataclass(frozen=True)
 class LetGoTrace:
-    """A boom let go from the undeflected posture: name, times (s) and height over that posture (mm), (m,); height at rest (mm)."""
+    """A boom let go from the undeflected posture.
+
+    Name; times (s) and height over that posture (mm), shape (m,); that height at rest (mm).
+    """
 
     name: str
     times: Array

@@ -1,7 +1,7 @@
 """Motion without Coriolis and centrifugal accelerations: the second paper's low-speed form, and what leaving them out costs.
 
-Mass points then accelerate by J q'' instead of (J q')': with q'' = A (q - q_hat) the place from which a point's acceleration is counted
-is x_hat = x - J (q - q_hat), found from the exact kinematics by central differences, and made anew in every pass.
+Mass points then accelerate by J q'' instead of (J q')': with q'' = A (q - q_hat) the place from which a point's acceleration
+is counted is x_hat = x - J (q - q_hat), found from the exact kinematics by central differences, and made anew in every pass.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, v
     settle(plan, state, work, move.first, move.angles)
     scheme = prepare(GENERALISED_ALPHA, RHO, step, work.weights)
     weights, count = work.weights, round(move.duration / step)
-    strokes, rates = move(step * np.arange(count + 1))
+    strokes, rates = move(np.asarray(step * np.arange(count + 1), float))
     rows = [state.history[X, plan.tables.tip : plan.tables.tip + 3].copy()]
     for k in range(1, count + 1):
         old, unknowns = state.history.copy(), len(state.z)

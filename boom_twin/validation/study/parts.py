@@ -113,7 +113,7 @@ LOW_SPEED = Variant("without Coriolis and centrifugal accelerations", "low-speed
 
 
 def _low_speed(scene: Scene, full: Response, course: StrokeCourse) -> VariantCost:
-    """The papers' low-speed form, which is no edit of a scene: the same at rest, without time of its own, for it is not compiled."""
+    """The papers' low-speed form: no edit of a scene, the same at rest, and not timed, for its program is not compiled."""
     off = np.linalg.norm(tip_of_move(scene, course.motion, course.step, course.every, False)[:, :2] - full.tip, axis=1)
     apart = Deviation(0.0, course.names[0], float(np.sqrt(np.mean(off**2))), float(off.max()))
     return VariantCost(LOW_SPEED, apart, np.zeros(FREQUENCIES), float("nan"), unknowns(scene), "ok")

@@ -1,7 +1,7 @@
-"""Zeros of boundary residuals by bisection, as the second paper finds them, beside Newton's method and the count of frequencies.
+"""Zeros of boundary residuals by bisection, as the second paper finds them.
 
-Equilibrium: section 1 is held at an angle, all else comes to rest by Newton passes, and the torque that the held pivot then bears
-is the residual of the boundary M = 0. Its sign changes at the equilibrium; the interval is halved until it is 1e-7 wide.
+Equilibrium: section 1 is held at an angle, all else comes to rest by Newton passes, and the torque that the held pivot then
+bears is the residual of the boundary M = 0. Its sign changes at the equilibrium; the interval is halved until it is 1e-7 wide.
 
 Vibration: the determinant of what the sweep leaves of K - omega^2 M at the base changes its sign at a natural frequency.
 """
@@ -63,7 +63,7 @@ def equilibrium(scene: Scene, posture: str) -> BoundaryZero:
     """Both ways in a posture; ideal pins."""
     refuse_clearance(scene, "the bisection of the boundary")
     strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    plan, state, work = rest_at(scene, strokes, angles)
+    plan, state, _ = rest_at(scene, strokes, angles)
     at = plan.tables.joints[0].z + Z_SECTION
     newton = float(state.z[at])
     held = HeldBoom(scene, strokes, angles)

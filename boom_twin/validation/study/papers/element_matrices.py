@@ -1,9 +1,10 @@
 """Transfer matrices of the elements in the papers' state vector Z = [x, y, theta, M, qx, qy, 1], of one time step.
 
 Every element is written as the map from its input to its output vector that the papers' signs ask for: a massless hinge passes
-q unchanged, m a = q_I - q_O + m g, with accelerations a = A (r - r_hat) and velocities C r + D of the step's scheme. Its transfer matrix
-is the derivative of that map, by complex steps exact to rounding (Squire and Trapp, SIAM Review 40, 1998), with a last column
-that makes it exact at the vector it was taken at. Nothing here knows of the sweeps, which `substructures` compares with it.
+q unchanged, m a = q_I - q_O + m g, with accelerations a = A (r - r_hat) and velocities C r + D of the step's scheme. Its
+transfer matrix is the derivative of that map, by complex steps exact to rounding (Squire and Trapp, SIAM Review 40, 1998),
+with a last column that makes it exact at the vector it was taken at. Nothing here knows of the sweeps, which `substructures`
+compares with it.
 """
 
 from __future__ import annotations

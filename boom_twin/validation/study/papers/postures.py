@@ -54,8 +54,8 @@ class Comparison:
     ----------
     flight : float
         When a journal first left its bush, s; the end where none did. Errors are taken up to there.
-    tip : float
-        rms distance, m.
+    tip, tip_throughout : float
+        rms distance, m; the second to the end, whatever flies.
     forces, acceleration : float
         rms difference as a share of the rms.
     penetration : float
@@ -66,6 +66,7 @@ class Comparison:
     peer: PostureRun
     flight: float
     tip: float
+    tip_throughout: float
     forces: float
     acceleration: float
     penetration: float
@@ -117,14 +118,16 @@ def compare(own: PostureRun, peer: PostureRun) -> Comparison:
     """How far two programs are apart, up to the first flight of a journal in either."""
     flying = np.flatnonzero(((own.penetration < -NEAR) | (peer.penetration < -NEAR)).any(axis=1))
     until = int(flying[0]) if len(flying) else len(own.times)
+    apart = np.linalg.norm(own.tip - peer.tip, axis=1)
     deepest, both = own.penetration[:until], peer.penetration[:until]
     return Comparison(
         own,
         peer,
         float(own.times[until - 1]),
-        float(_rms(np.linalg.norm((own.tip - peer.tip)[:until], axis=1))),
-        float(_rms((own.forces - peer.forces)[:until]) / _rms(peer.forces[:until])),
-        float(_rms((own.acceleration - peer.acceleration)[:until]) / _rms(peer.acceleration[:until])),
+        _rms(apart[:until]),
+        _rms(apart),
+        _rms((own.forces - peer.forces)[:until]) / _rms(peer.forces[:until]),
+        _rms((own.acceleration - peer.acceleration)[:until]) / _rms(peer.acceleration[:until]),
         float(np.abs(deepest - both).max() / both.max()) if deepest.size else float("nan"),
     )
 

@@ -13,7 +13,7 @@ from ....analysis.initial_state import undeflected
 from ....analysis.modal import damping_ratio, natural_modes
 from ....analysis.motions import motion_of
 from ....analysis.simulate import simulate
-from ....compiler.compile import compile_scene
+from ....compiler.compile import BasisName, compile_scene
 from ....errors import UsageError
 from ....plots.papers import LetGoTrace, StopTrace, low_speed_picture, posture_picture
 from ....scene.kinematics import posture_angles, skeleton, strokes_of_posture
@@ -101,16 +101,18 @@ def _matrices(scene: Scene, step: float) -> MatrixCheck:
 
 def _bases(scene: Scene, posture: str) -> BasisRow:
     strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    found, damping = [], 0.0
-    for basis in ("end-shapes", "cantilever"):
-        plan = compile_scene(scene, basis)  # type: ignore[arg-type]
+    found: dict[BasisName, tuple[float, ...]] = {}
+    bases: tuple[BasisName, ...] = ("cantilever", "end-shapes")
+    for basis in bases:
+        plan = compile_scene(scene, basis)
         state, work = plan.state(), plan.work()
         settle(plan, state, work, strokes, angles)
         modes = natural_modes(plan, state, work, MODES)
-        found.append(tuple(mode.frequency for mode in modes))
-        damping = damping or damping_ratio(plan, modes[0])
+        found[basis] = tuple(mode.frequency for mode in modes)
+        damping = damping_ratio(plan, modes[0])
     rest = statics(scene, posture=posture, modes=0)
-    return BasisRow(posture, float(np.hypot(*(rest.tip - rest.tip_rigid))), *found, damping)
+    sag = float(np.hypot(*(rest.tip - rest.tip_rigid)))
+    return BasisRow(posture, sag, found["end-shapes"], found["cantilever"], damping)
 
 
 def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
@@ -170,7 +172,7 @@ def _numbers(found: PapersStudy) -> dict[str, object]:
         "bases": found.bases,
         "low_speed": {"tip_m_s": found.speeds[:, 0], "error_max_m": found.speeds[:, 1], "error_rms_m": found.speeds[:, 2]},
         "stops": [
-            {"posture": s.own.posture, "pins": s.own.pins, "until_s": s.flight, "tip_rms_m": s.tip, "forces": s.forces,
+            {"posture": s.own.posture, "pins": s.own.pins, "until_s": s.flight, "tip_rms_m": s.tip, "tip_rms_throughout_m": s.tip_throughout, "forces": s.forces,
              "acceleration": s.acceleration, "penetration": s.penetration}
             for s in found.stops
         ],
@@ -192,8 +194,10 @@ def as_markdown(found: PapersStudy) -> str:
 def _head() -> list[str]:
     return [
         "# The method's papers, item by item\n",
-        "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. 2014, "
-        "doi 10.1155/2014/943847. Their rig and its data are not public, and most of their numbers are not in the text this was made "
+        "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. "
+        "2014, "
+        "doi 10.1155/2014/943847. Their rig and its data are not public, and most of their numbers are not in the text this "
+        "was made "
         "from: all parameters here are surrogates, and no curve of theirs can be laid over one of ours.\n",
         table(("paper", "item", "counterpart"), ITEMS),
     ]
@@ -209,32 +213,27 @@ def _matrices_text(found: PapersStudy) -> list[str]:
     rows = [(1e3 * one.step, *one.differences, one.base_error, one.condition) for one in found.matrices]
     return [
         "## 1. Element matrices, substructures, and their product\n",
-        f"At {INSTANT:g} s of the reference move. Matrices of the elements in [x y theta M qx qy 1], assembled with E1, E2, E3 (A) and eight "
+        f"At {INSTANT:g} s of the reference move. Matrices of the elements in [x y theta M qx qy 1], assembled with E1, E2, "
+        f"E3 (A) and eight "
         "loop unknowns (B), beside those that the sweep condenses: largest difference as a share of the largest entry, "
-        "displacements and forces scaled alike. Then the papers' way: the product of all, its boundary known at base and tip, solved for the "
+        "displacements and forces scaled alike. Then the papers' way: the product of all, its boundary known at base and tip, "
+        "solved for the "
         "force at the base. It loses digits as the step falls; the Riccati form does not.\n",
         table(head, rows),
     ]
 
 
 def _zeros_text(found: PapersStudy) -> list[str]:
-    rows = [
-        (
-            f"{z.posture}, angle of section 1, rad",
-            f"{z.bisected:.9f}",
-            f"{z.newton:.9f}",
-            abs(z.bisected - z.newton),
-            z.halvings,
-        )
-        for z in found.zeros
-    ]
-    rows += [
-        (f"mode {k + 1}, Hz", f"{near:.9f}", f"{counted:.9f}", abs(near - counted), "-")
-        for k, (near, counted) in enumerate(found.bisected)
-    ]
+    rows: list[tuple[object, ...]] = []
+    for z in found.zeros:
+        off = abs(z.bisected - z.newton)
+        rows.append((f"{z.posture}, angle of section 1, rad", f"{z.bisected:.9f}", f"{z.newton:.9f}", off, z.halvings))
+    for k, (near, counted) in enumerate(found.bisected):
+        rows.append((f"mode {k + 1}, Hz", f"{near:.9f}", f"{counted:.9f}", abs(near - counted), None))
     return [
         "## 2. Zeros of the boundary by bisection\n",
-        "As the second paper finds them, to an interval of 1e-7. Equilibrium: torque at the base pivot while section 1 is held, "
+        "As the second paper finds them, to an interval of 1e-7. Equilibrium: torque at the base pivot while section 1 is "
+        "held, "
         "beside Newton's method. Frequencies: sign of the determinant at the base (interval 1e-7 of the frequency), beside "
         "the count of Wittrick and Williams.\n",
         table(("zero", "bisection", "Newton, count", "difference", "halvings"), rows),
@@ -252,7 +251,8 @@ def _bases_text(found: PapersStudy) -> list[str]:
     )  # fmt: skip
     return [
         "## 3. Three cantilever modes a part, and how long the boom swings\n",
-        "Frequencies with the default shapes, and by how much three cantilever modes a part are off: parts end in torques and shear "
+        "Frequencies with the default shapes, and by how much three cantilever modes a part are off: parts end in torques and "
+        "shear "
         "forces, which no sum of cantilever modes has. Sag: of the tip at rest, from the undeflected posture.\n",
         table(head, rows),
     ]
@@ -270,12 +270,15 @@ def _low_speed_text(found: PapersStudy) -> list[str]:
     dip = int(np.argmin(lifted.height))
     return [
         "## 4. Low speed, and a boom that starts undeflected\n",
-        "The reference move at six speeds, with and without Coriolis and centrifugal accelerations (a row of `study parts` has the usual "
+        "The reference move at six speeds, with and without Coriolis and centrifugal accelerations (a row of `study parts` "
+        "has the usual "
         f"speed). The error grows with the square of the speed: slope {slope(found):.2f} between the two slowest.\n",
         table(("fastest tip, m/s", "largest error, mm", "rms, mm"), found.speeds * [1.0, 1e3, 1e3]),
-        f"Let go from the undeflected posture with the drives held, the tip falls, freely at first, to {held.height[lowest]:.0f} mm at "
+        f"Let go from the undeflected posture with the drives held, the tip falls, freely at first, to "
+        f"{held.height[lowest]:.0f} mm at "
         f"{held.times[lowest]:.2f} s and swings about its rest at {held.rest:.0f} mm. Lifted meanwhile, it first falls to "
-        f"{lifted.height[dip]:.0f} mm at {lifted.times[dip]:.2f} s and then rises to {lifted.rest:.0f} mm: what the second paper "
+        f"{lifted.height[dip]:.0f} mm at {lifted.times[dip]:.2f} s and then rises to {lifted.rest:.0f} mm: what the second "
+        f"paper "
         "tells of its model, which starts there.\n",
         "![Tip of a boom let go; error of the low-speed form](papers_low_speed.png)\n",
     ]
@@ -283,15 +286,18 @@ def _low_speed_text(found: PapersStudy) -> list[str]:
 
 def _stops_text(found: PapersStudy) -> list[str]:
     rows = [
-        (s.own.posture, s.own.pins, s.flight, 1e3 * s.tip, 100.0 * s.acceleration, 100.0 * s.forces, 100.0 * s.penetration,
+        (s.own.posture, s.own.pins, s.flight, 1e3 * s.tip, 1e3 * s.tip_throughout, 100.0 * s.acceleration, 100.0 * s.forces, 100.0 * s.penetration,
          float(np.abs(s.own.acceleration[:, 1]).max()))
         for s in found.stops
     ]  # fmt: skip
-    head = ("posture", "pins", "until, s", "tip, rms mm", "acceleration, rms %", "cylinder forces, rms %", "penetration, largest %",
-            "largest vertical acceleration, m/s²")  # fmt: skip
+    head = (
+        "posture", "pins", "until, s", "tip, rms mm", "tip to the end, rms mm", "acceleration, rms %", "cylinder forces, rms %", "penetration, largest %",
+        "largest vertical acceleration, m/s²",
+    )  # fmt: skip
     return [
         "## 5. Four postures, with and without clearance in four pins\n",
-        "Full speed, then a stop within 50 ms; ideal pins, and contact in the pins of all four rods. Beside Exudyn: geometrically "
+        "Full speed, then a stop within 50 ms; ideal pins, and contact in the pins of all four rods. Beside Exudyn: "
+        "geometrically "
         f"exact beams, contact by functions of its own; its steps {1e3 * PEER_STEPS['ideal']:g} ms, with contact "
         f"{1e3 * PEER_STEPS['worn']:g} ms, ours 1 ms with sub-steps. Differences up to the first flight of a journal; after it "
         "motions differ by where flights end.\n",

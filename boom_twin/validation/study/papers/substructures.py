@@ -1,6 +1,7 @@
 """Transfer matrices of substructures A, B1, B2, B3, assembled from those of the elements, and their product.
 
-A, by the papers' equations (3) to (5) [Z]: U_1 is the root up to the rod pin P, U_c the cylinder's branch, U_o what lies outboard,
+A, by the papers' equations (3) to (5) [Z]: U_1 is the root up to the rod pin P, U_c the cylinder's branch, U_o what lies
+outboard,
 
     Z_O = U_o (U_1 Z_I1 + E1 U_c Z_I2),     E2 U_1 Z_I1 = E2 U_c Z_I2,     E3 U_c Z_I2 = 0.
 
@@ -8,8 +9,8 @@ E1 lets the branch add its forces, E2 takes the rows x and y, E3 the row M. (In 
 printed as output vectors; they have to be the inputs.)
 
 B reaches from the cut before its barrel pin C to the cut before the next one. Of its six-bar eight unknowns are eliminated, the
-force in pin C (2), the angle of the cylinder, the force in pin D (2), the angles of link L, link R and the turned section, by eight
-equations: no torque in four pins, two pins that meet.
+force in pin C (2), the angle of the cylinder, the force in pin D (2), the angles of link L, link R and the turned section, by
+eight equations: no torque in four pins, two pins that meet.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Transfer matrices of substructures by the package's sweep, and the solution of the papers' boundary problem by their product."""
+"""Transfer matrices of substructures by the package's sweep, and the papers' boundary problem solved by their product."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ....analysis.drive import PASSES, TOLERANCE
 from ....analysis.equilibrium import settle
+from ....analysis.motions import motion_of
 from ....compiler.compile import BasisName, compile_scene
 from ....compiler.plan import Plan
 from ....errors import SolverError
@@ -16,7 +17,6 @@ from ....kernels.tables import OK, Motion, State, Work
 from ....kernels.transfer.matrix_product import SIX, new_product, open_end, transfer_matrix
 from ....kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
 from ....kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
-from ....analysis.motions import motion_of
 from ....scene.schema import Scene
 from ....types import Array
 from .element_matrices import Step
