@@ -57,6 +57,7 @@ MEANING: dict[type[BaseModel], dict[str, str]] = {
         "rho_A": "the mass per metre, kg/m",
         "rho_I": "the rotary inertia per metre, kg m",
         "beta": "the stiffness-proportional damping, s",
+        "height": "the outer height of the box, m",
         "modes": "the number of bending coordinates per flexible part: a whole number from 0 to 10",
         "axial": "true or false, whether flexible parts stretch",
         "geometric": "true or false, whether flexible parts have geometric stiffness",

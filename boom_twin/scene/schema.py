@@ -63,8 +63,9 @@ class RigidPart(Part):
 class Section(Part):
     """One boom section, pivot to pivot; lengths in m from the inboard pivot.
 
-    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s). ``modes``,
-    ``axial`` and ``geometric`` take the boom's where the section does not name them.
+    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s). ``height`` is the
+    outer height of the box: no part of the model, but stresses and checks need it. ``modes``, ``axial`` and ``geometric`` take
+    the boom's where the section does not name them.
     """
 
     length: Positive
@@ -74,12 +75,18 @@ class Section(Part):
     rho_A: Positive | None = None
     rho_I: NotNegative | None = None
     beta: NotNegative | None = None
+    height: Positive | None = None
     modes: Modes | None = None
     axial: bool | None = None
     geometric: bool | None = None
     root: RigidPart | None = None
     head: RigidPart | None = None
     rod_pin: Point | None = None
+
+    @property
+    def section_modulus(self) -> float | None:
+        """2 I / height, m^3: a bending moment over it is the stress in the flanges; None without I or height."""
+        return None if self.I is None or self.height is None else 2.0 * self.I / self.height
 
 
 class CylinderPart(Part):
@@ -214,8 +221,10 @@ SHARE = 0.05  # of its length, where a section has no A and I
 
 
 def section_depth(scene: Scene, i: int) -> float:
-    """Depth (m) to draw section `i` (0-based) with: that of a box with its A and I, else a share of its length."""
+    """Depth (m) to draw section `i` (0-based) with: its height, or that of a box with its A and I, else a share of its length."""
     section = scene.sections[i]
+    if section.height is not None:
+        return section.height
     if section.A is None or section.I is None:
         return SHARE * section.length
     return DEEP * math.sqrt(section.I / section.A)

@@ -15,7 +15,7 @@ from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
-BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "modes", "axial", "geometric", "head")
+BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "height", "modes", "axial", "geometric", "head")
 LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "R", "mL", "mR")
 NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
@@ -151,7 +151,7 @@ def _several(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-LENGTHS = ("length", "beam", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
+LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
            "closed_length", "max_stroke")  # fmt: skip
 MASSES = ("mass", "mL", "mR", "payload")
 
