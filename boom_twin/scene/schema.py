@@ -221,7 +221,8 @@ SHARE = 0.05  # of its length, where a section has no A and I
 
 
 def section_depth(scene: Scene, i: int) -> float:
-    """Depth (m) to draw section `i` (0-based) with: its height, or that of a box with its A and I, else a share of its length."""
+    """Depth (m) to draw section `i` (0-based) with: its height, or that of a box with its A and I, else a share of its "
+    "length."""
     section = scene.sections[i]
     if section.height is not None:
         return section.height

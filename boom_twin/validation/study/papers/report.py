@@ -172,7 +172,8 @@ def _numbers(found: PapersStudy) -> dict[str, object]:
         "bases": found.bases,
         "low_speed": {"tip_m_s": found.speeds[:, 0], "error_max_m": found.speeds[:, 1], "error_rms_m": found.speeds[:, 2]},
         "stops": [
-            {"posture": s.own.posture, "pins": s.own.pins, "until_s": s.flight, "tip_rms_m": s.tip, "tip_rms_throughout_m": s.tip_throughout, "forces": s.forces,
+            {"posture": s.own.posture, "pins": s.own.pins, "until_s": s.flight, "tip_rms_m": s.tip, "tip_rms_throughout_m":
+            s.tip_throughout, "forces": s.forces,
              "acceleration": s.acceleration, "penetration": s.penetration}
             for s in found.stops
         ],
@@ -286,12 +287,14 @@ def _low_speed_text(found: PapersStudy) -> list[str]:
 
 def _stops_text(found: PapersStudy) -> list[str]:
     rows = [
-        (s.own.posture, s.own.pins, s.flight, 1e3 * s.tip, 1e3 * s.tip_throughout, 100.0 * s.acceleration, 100.0 * s.forces, 100.0 * s.penetration,
+        (s.own.posture, s.own.pins, s.flight, 1e3 * s.tip, 1e3 * s.tip_throughout, 100.0 * s.acceleration, 100.0 * s.forces,
+         100.0 * s.penetration,
          float(np.abs(s.own.acceleration[:, 1]).max()))
         for s in found.stops
     ]  # fmt: skip
     head = (
-        "posture", "pins", "until, s", "tip, rms mm", "tip to the end, rms mm", "acceleration, rms %", "cylinder forces, rms %", "penetration, largest %",
+        "posture", "pins", "until, s", "tip, rms mm", "tip to the end, rms mm", "acceleration, rms %", "cylinder forces, rms "
+        "%", "penetration, largest %",
         "largest vertical acceleration, m/s²",
     )  # fmt: skip
     return [
