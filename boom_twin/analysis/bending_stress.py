@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..compiler.compile import compile_scene
-from ..errors import UsageError
+from ..errors import BoomTwinError, UsageError
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array, Estimate, Prediction
@@ -88,19 +88,26 @@ class BendingStressModel:
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
 
     def influence(self, strokes: Array) -> Array:
-        """Moment (N m) by the x and y of a force at the tip (N), shape (k, 2), at `strokes` (m), shape (n,)."""
+        """Moment (N m) by x and y of a force at the tip (N), shape (k, 2), at `strokes` (m), (n,); NaN where there is no rest."""
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
-            settle(self._plan, self._state, self._work, strokes, joint_angles_of_strokes(self._scene, strokes))
-            self._influence, self._at = moments_by_tip_force(self._plan, self._state, self._work), strokes.copy()
+            self._at = strokes.copy()
+            try:
+                settle(self._plan, self._state, self._work, strokes, joint_angles_of_strokes(self._scene, strokes))
+            except BoomTwinError:
+                self._influence = np.full_like(self._influence, np.nan)
+            else:
+                self._influence = moments_by_tip_force(self._plan, self._state, self._work)
         return self._influence
 
     def at(self, prediction: Prediction, estimate: Estimate | None) -> BendingStresses:
         """Of one prediction and the estimate beside it, as a `boom_twin.types.Report` has both."""
         assert prediction.moments is not None
-        if estimate is None:
+        influence = np.full((len(self.stations), 2), np.nan)
+        if estimate is not None and estimate.load.any():  # until anything is measured it is exactly zero
+            influence = self.influence(prediction.strokes)
+        if estimate is None or np.isnan(influence).any():
             nothing = np.full(len(self.stations), np.nan)
             return BendingStresses(prediction.moments, nothing, prediction.moments / self.moduli, nothing)
-        influence = self.influence(prediction.strokes)
         moments = prediction.moments + influence @ estimate.load
         sigmas = np.sqrt(influence**2 @ estimate.load_variance)
         return BendingStresses(moments, sigmas, moments / self.moduli, sigmas / self.moduli)
