@@ -88,7 +88,7 @@ class BendingStressModel:
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
 
     def influence(self, strokes: Array) -> Array:
-        """Moment (N m) by x and y of a force at the tip (N), shape (k, 2), at `strokes` (m), (n,); NaN where there is no rest."""
+        """Moment (N m) by x and y of a force at the tip (N), shape (k, 2), at `strokes` (m, shape (n,)); NaN without a rest."""
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
             self._at = strokes.copy()
             try:

@@ -49,6 +49,5 @@ class StressWatch:
         most = int(abs(found.stresses).argmax())
         sigma = float(found.stress_sigmas[most])
         deviation = f" ± {sigma / MEGA:.2g}" if math.isfinite(sigma) else ""
-        return judge.finish(
-            f"{found.stresses[most] / MEGA:.3g}{deviation} MPa in {places[most].name}, the most of all stations"
-        )
+        largest = f"{found.stresses[most] / MEGA:.3g}{deviation} MPa"
+        return judge.finish(f"{largest} in {places[most].name}, the most of all stations")

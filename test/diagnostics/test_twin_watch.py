@@ -164,7 +164,7 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     assert watch is not None and prediction is not None and watch.status(at) is None
     for load, told in (
         (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
-        (np.array([0.0, -100.0]), "-98 ± 0.73 MPa in section 1"),
+        (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
     ):
         variance = np.full(2, 400.0)
         estimate = Estimate(10**18, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), variance)
