@@ -78,8 +78,8 @@ def moments_by_unknowns(plan: Plan) -> Array:
     return found
 
 
-def moments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
-    """Bending moment (N m) that a force at the tip adds at every station at rest, by its x and y (N); shape (stations, 2).
+def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
+    """Increments of the unknowns that a force at the tip causes at rest, by its x and y (N), shape (unknowns, 2).
 
     By a sweep in which the force on the tip is minus the one that is applied; `state` is an equilibrium with its drives, and
     stays.
@@ -94,5 +94,5 @@ def moments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
         work.p[0], work.p[1] = -force[0], -force[1]
         sweep_in(t, state, work, motion, state.drives[0], still, ROOT, last, FREE, work.condensed)
         sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
-        found.append(moments_by_unknowns(plan) @ work.dz)
+        found.append(work.dz.copy())
     return np.column_stack([one - found[0] for one in found[1:]])

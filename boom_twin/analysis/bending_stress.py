@@ -15,10 +15,9 @@ import numpy as np
 
 from ..compiler.compile import compile_scene
 from ..errors import BoomTwinError, UsageError
-from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array, Estimate, Prediction
-from .bending_moments import Station, moments_by_tip_force, stations
+from .bending_moments import Station, increments_by_tip_force, moments_by_unknowns, stations
 from .equilibrium import settle
 
 BOX = 2.4
@@ -83,20 +82,27 @@ class BendingStressModel:
         if not self.stations:
             raise UsageError("sections: none of the scene is flexible, so it has no bending moments. Give a section a beam.")
         self.moduli = section_moduli(scene, heights)[[station.section for station in self.stations]]
-        self._scene, self._plan = scene, compile_scene(scene)
+        self._plan = compile_scene(scene)
+        self._by_unknowns = moments_by_unknowns(self._plan)
         self._state, self._work = self._plan.state(), self._plan.work()
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
 
-    def influence(self, strokes: Array) -> Array:
-        """Moment (N m) by x and y of a force at the tip (N), shape (k, 2), at `strokes` (m, shape (n,)); NaN without a rest."""
+    def influence(self, strokes: Array, joints: Array) -> Array:
+        """Moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
+
+        Parameters
+        ----------
+        strokes, joints : ndarray, shape (n,)
+            m; joint angles near those of the equilibrium, rad.
+        """
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
             self._at = strokes.copy()
             try:
-                settle(self._plan, self._state, self._work, strokes, joint_angles_of_strokes(self._scene, strokes))
+                settle(self._plan, self._state, self._work, strokes, joints)
             except BoomTwinError:
                 self._influence = np.full_like(self._influence, np.nan)
             else:
-                self._influence = moments_by_tip_force(self._plan, self._state, self._work)
+                self._influence = self._by_unknowns @ increments_by_tip_force(self._plan, self._state, self._work)
         return self._influence
 
     def at(self, prediction: Prediction, estimate: Estimate | None) -> BendingStresses:
@@ -104,7 +110,7 @@ class BendingStressModel:
         assert prediction.moments is not None
         influence = np.full((len(self.stations), 2), np.nan)
         if estimate is not None and estimate.load.any():  # until anything is measured it is exactly zero
-            influence = self.influence(prediction.strokes)
+            influence = self.influence(prediction.strokes, prediction.joints)
         if estimate is None or np.isnan(influence).any():
             nothing = np.full(len(self.stations), np.nan)
             return BendingStresses(prediction.moments, nothing, prediction.moments / self.moduli, nothing)

@@ -172,10 +172,9 @@ class EnergyBalance:
     def __str__(self) -> str:
         return (
             f"energy: the drives did {self.work:.6g} J; kinetic and potential energy changed by {self.change:.6g} J, "
-            f"damping took {self.damping:.4g} J, contact {self.contact:.4g} J. The balance is open by {self.gap:.3g} J at "
-            f"most, "
-            f"{100.0 * self.share:.2g} % of {self.moved:.4g} J moved; in the end time integration "
-            f"(steps of {self.step:.3g} s) took {self.left:.3g} J"
+            f"damping took {self.damping:.4g} J, contact {self.contact:.4g} J. "
+            f"The balance is open by {self.gap:.3g} J at most, {100.0 * self.share:.2g} % of {self.moved:.4g} J moved; "
+            f"in the end time integration (steps of {self.step:.3g} s) took {self.left:.3g} J"
         )
 
 

@@ -24,7 +24,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import LINK_L, LINK_R
-from ..kernels.elements.pin_contact import COLUMNS, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN
+from ..kernels.elements.pin_contact import COLUMNS, LINK_L_PIN, LINK_R_PIN, LOST, PIVOT, Q_PIN
 from ..kernels.integrators import NEWMARK, A, P, V, X, prepare
 from ..kernels.tables import JOINT_B, OK, SENTENCES, State, Work
 from ..kernels.transfer.clearance_pins import offset_of
@@ -146,6 +146,7 @@ def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -
     state, work = plan.state(), plan.work()
     _check(plan, initial)
     state.contacts[:] = initial.contacts
+    state.contacts[:, LOST] = 0.0
     length, rate = _drive(plan, times, strokes, 0.0)
     state.drives[0], state.drives[1] = length, rate
     _place_moving(plan, state, work, initial)
@@ -175,6 +176,8 @@ def _check(plan: Plan, initial: InitialState) -> None:
         )
     if initial.contacts.shape != (len(plan.pins), COLUMNS):
         raise UsageError(f"the initial state knows {len(initial.contacts)} pins, the boom has {len(plan.pins)}. Take its own.")
+    if not np.isfinite(initial.contacts).all():
+        raise UsageError("what the initial state says of the pins is not finite. Give a state that a simulation left.")
     for name, value, rate in zip(initial.names, initial.values, initial.rates, strict=True):
         if not (math.isfinite(value) and math.isfinite(rate)):
             raise UsageError(f"{name} = {value:g}, its rate {rate:g}: not finite. Give numbers.")

@@ -26,7 +26,8 @@ FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--posture", required=True, metavar="NAME", help="the posture that the first row belongs to")
+    told = "the posture that the first row belongs to; not needed with a file of --start"
+    parser.add_argument("--posture", metavar="NAME", help=told)
     parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
@@ -55,7 +56,7 @@ def run(args: Namespace) -> int:
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
-    angles = _angles_near(scene, args.posture, strokes[0])
+    angles = _angles(args, scene, strokes[0])
     start = _start(args, scene, strokes[0], angles)
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
     for doubt in result.doubts:
@@ -81,7 +82,16 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _start(args: Namespace, scene: Scene, first: Array, angles: Array) -> InitialState | None:
+def _angles(args: Namespace, scene: Scene, first: Array) -> Array | None:
+    """Joint angles (rad) next to which the motion starts; None where a file says all of it."""
+    if args.posture is not None:
+        return _angles_near(scene, args.posture, first)
+    if args.start in ("rest", "undeflected"):
+        raise UsageError(f"--posture: not given, and the boom starts {args.start} in one. Name that of the first row.")
+    return None
+
+
+def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:
     """State of ``--start``; None for rest."""
     from ..analysis.initial_state import read_state, undeflected
 

@@ -10,6 +10,7 @@ have closed are added up, and turning points of those that have not go before th
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
@@ -30,6 +31,7 @@ CUT_OFF = 1e8
 KNEE = 5e6
 GIVEN = 2e6
 SMALL = 1e5  # Pa; cycles below are noise, and do no damage in any category
+BIN = 1e4  # Pa, in which ranges are added up
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class RainflowCounter:
 
     def __init__(self) -> None:
         self._rainflow, self._open = _package(), np.zeros(0)
-        self._closed: list[tuple[float, float]] = []
+        self._closed: Counter[int] = Counter()  # by range in `BIN`
 
     def add(self, stress: Array) -> None:
         """Take the next values, shape (k,), Pa."""
@@ -70,15 +72,17 @@ class RainflowCounter:
         left: set[int] = {0, len(series) - 1}
         for size, _, count, start, end in self._rainflow.extract_cycles(series):
             if count == 1.0:
-                self._closed += [(size, count)] if size > SMALL else []
+                self._closed[round(size / BIN)] += 1
             else:
                 left |= {start, end}
         self._open = series[sorted(left)]
 
     def cycles(self) -> list[tuple[float, float]]:
-        """Range (Pa) and count of all so far: closed cycles, and halves of those that have not closed."""
-        halves = ((size, count) for size, _, count, _, _ in self._rainflow.extract_cycles(self._open))
-        return [*self._closed, *(row for row in halves if row[0] > SMALL)]
+        """Range (Pa) and count of all so far above `SMALL`: closed cycles, and halves of those that have not closed."""
+        found = Counter({size: float(count) for size, count in self._closed.items()})
+        for size, _, count, _, _ in self._rainflow.extract_cycles(self._open):
+            found[round(size / BIN)] += count
+        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > SMALL]
 
 
 class FatigueCounter:

@@ -286,6 +286,7 @@ class SectionLoads:
                     float(history.stamps_s[row]),
                     static,
                     history.strokes[row].copy(),
+                    history.joints[row].copy(),
                     load[row].copy(),
                     variance[row].copy(),
                 )
@@ -300,7 +301,7 @@ class SectionLoads:
         for own in self._largest.values():
             unknown = sigma = math.nan
             if own.load.any():
-                influence = model.influence(own.strokes)[own.column]
+                influence = model.influence(own.strokes, own.joints)[own.column]
                 unknown, sigma = float(influence @ own.load), math.sqrt(float(influence**2 @ own.variance))
             place, modulus = self._places[own.column], float(model.moduli[own.column])
             found.append(Load(place, own.column, own.moment, own.time, own.static, unknown, sigma, modulus))
@@ -308,13 +309,15 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far: column, N m, when (s), static part; strokes, load at the tip, its variance then."""
+    """Largest moment of a section so far: column, N m, when (s), static part; strokes, joints, load at the tip, its variance "
+    "then."""
 
     column: int
     moment: float
     time: float
     static: float
     strokes: Array
+    joints: Array
     load: Array
     variance: Array
 

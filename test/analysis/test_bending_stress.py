@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.analysis.bending_moments import moments_by_tip_force, moments_by_unknowns, stations
+from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.motions import motion_of
@@ -98,10 +98,9 @@ def moving_moments(course, span):
 
 
 def test_a_force_at_the_tip_bends_as_a_payload_does():
-    """Difference of two payloads of 1 kg: their weight is a force down; and of a tilted gravity there is no such."""
+    """The weight of half a kilogram is a force down."""
     plan, state, work = rest("arch")
-    influence = moments_by_tip_force(plan, state, work)
-    heavy = SCENE.model_copy(update={"tip": {"payload": 0.5}})
+    influence = moments_by_unknowns(plan) @ increments_by_tip_force(plan, state, work)
     heavy = type(SCENE).model_validate(SCENE.model_dump(exclude_none=True) | {"tip": {"payload": 0.5}})
     loaded, moved, _ = rest("arch", heavy)
     more = moments_by_unknowns(loaded) @ moved.z - moments_by_unknowns(plan) @ state.z

@@ -16,6 +16,7 @@ from boom_twin.validation.study.clearance.scenes import with_play
 
 SCENE = load_scene()
 QUIET = {"estimate_errors": False}
+HEADER = "t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m"
 
 
 def pendulum():
@@ -113,11 +114,17 @@ def test_the_command_starts_undeflected_saves_and_goes_on(tmp_path, capsys):
     times, strokes, _ = held(SCENE, "horizontal", 0.2, 21)
     table = np.column_stack([times, strokes])
     drive, end = tmp_path / "drive.csv", tmp_path / "end.json"
-    np.savetxt(drive, table, delimiter=",", comments="", header="t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m")
+    np.savetxt(drive, table, delimiter=",", comments="", header=HEADER)
     common = ["simulate", "--posture", "horizontal", "--drive", str(drive), "--no-error-estimate"]
     begun = [*common, "--out", str(tmp_path / "a.csv"), "--start", "undeflected", "--joint-rates", "0,0,0,0.1"]
     assert main([*begun, "--save-state", str(end), "--check"]) == 0
     assert "The balance is open by" in capsys.readouterr().out
+    far = table[:, 1:] + np.array([0.02, 0.0, 0.0, 0.0])  # of no posture's strokes, as where a move was interrupted
+    np.savetxt(tmp_path / "far.csv", np.column_stack([times, far]), delimiter=",", comments="", header=HEADER)
+    bare = ["simulate", "--drive", str(tmp_path / "far.csv"), "--no-error-estimate", "--out", str(tmp_path / "d.csv")]
+    assert main([*bare, "--start", str(end)]) == 0
+    assert main(bare) == 1
+    assert "--posture: not given" in capsys.readouterr().err
     assert main([*common, "--out", str(tmp_path / "b.csv"), "--start", str(end)]) == 0
     first, second = (np.genfromtxt(tmp_path / name, delimiter=",", names=True) for name in ("a.csv", "b.csv"))
     assert second["tip_y_m"][0] == pytest.approx(first["tip_y_m"][-1], abs=1e-9)

@@ -114,7 +114,12 @@ LOW_SPEED = Variant("without Coriolis and centrifugal accelerations", "low-speed
 
 def _low_speed(scene: Scene, full: Response, course: StrokeCourse) -> VariantCost:
     """The papers' low-speed form: no edit of a scene, the same at rest, and not timed, for its program is not compiled."""
-    off = np.linalg.norm(tip_of_move(scene, course.motion, course.step, course.every, False)[:, :2] - full.tip, axis=1)
+    try:
+        tip = tip_of_move(scene, course.motion, course.step, course.every, velocity_terms=False)[:, :2]
+    except SolverError as error:
+        nothing = Deviation(np.inf, "", np.inf, np.inf)
+        return VariantCost(LOW_SPEED, nothing, np.full(FREQUENCIES, np.nan), float("nan"), unknowns(scene), str(error))
+    off = np.linalg.norm(tip - full.tip, axis=1)
     apart = Deviation(0.0, course.names[0], float(np.sqrt(np.mean(off**2))), float(off.max()))
     return VariantCost(LOW_SPEED, apart, np.zeros(FREQUENCIES), float("nan"), unknowns(scene), "ok")
 

@@ -62,6 +62,8 @@ def bisect(residual: Callable[[float], float], low: float, high: float, width: f
 def equilibrium(scene: Scene, posture: str) -> BoundaryZero:
     """Both ways in a posture; ideal pins."""
     refuse_clearance(scene, "the bisection of the boundary")
+    if scene.joints[0].cylinder.k is None:
+        raise UsageError("joints[0].cylinder.k: not given, so section 1 cannot be held at another angle. Give it a stiffness.")
     strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
     plan, state, _ = rest_at(scene, strokes, angles)
     at = plan.tables.joints[0].z + Z_SECTION
