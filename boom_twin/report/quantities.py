@@ -309,8 +309,10 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far: column, N m, when (s), static part; strokes, joints, load at the tip, its variance "
-    "then."""
+    """Largest moment of a section so far: column, N m, when (s), its static part; and what there was then.
+
+    Strokes (m), joint angles (rad), estimated load at the tip (N) and its variance (N^2).
+    """
 
     column: int
     moment: float
