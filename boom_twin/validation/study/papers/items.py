@@ -17,7 +17,7 @@ ITEMS: tuple[tuple[str, str, str], ...] = (
         "A a slider-crank, B a six-bar; B1, B2, B3 by which link bears the cylinder",
         "`kernels/transfer/slider_crank.py`, `six_bar.py`: one program, B1 to B3 differ in the rod pin's place",
     ),
-    (Z, "every boom is A + Bi + Bj + ..", "`compile_scene`: any number of sections; `study stability` has booms of up to 48"),
+    (Z, "every boom is A + Bi + Bj + ..", "`compile_scene`: any number of sections; `study stability` has booms of up to 200"),
     (
         Z,
         "(1) state vector [x y theta M qx qy 1], signs",
