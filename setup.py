@@ -54,6 +54,7 @@ setup(
             "import-linter>=2.0,<3",
             "aiohttp>=3.14.4,<4",
             "playwright>=1.56,<2",
+            "rainflow>=3.2,<4",
         ],
         "peers": ["exudyn>=1.13,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
@@ -64,6 +65,7 @@ setup(
             "psutil>=5.9,<8",
             "bokeh>=3.4,<4",  # Dask's dashboard
         ],
+        "fatigue": ["rainflow>=3.2,<4"],
         "docs": [
             "mkdocs>=1.6.1,<2",
             "mkdocs-material>=9.8.1,<10",

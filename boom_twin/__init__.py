@@ -5,6 +5,7 @@ The stable API, imported when first used::
     load_scene(path=None) -> Scene                      the boom; without a path, the default scene
     statics(scene, strokes=None, posture=None)          equilibrium, forces, natural frequencies
     simulate(scene, times, strokes, dt=1e-3)            the boom's answer to given strokes
+    undeflected(scene, strokes, joint_rates=None)       a state that a simulation may start from
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session through the twin
 """
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.equilibrium import statics
+    from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
     from .config.settings import Settings, load_settings
     from .offline.replay import replay
@@ -37,6 +39,7 @@ _HOMES = {
     "replay": "offline.replay",
     "simulate": "analysis.simulate",
     "statics": "analysis.equilibrium",
+    "undeflected": "analysis.initial_state",
 }
 
 __all__ = [
@@ -51,6 +54,7 @@ __all__ = [
     "replay",
     "simulate",
     "statics",
+    "undeflected",
 ]
 
 

@@ -13,6 +13,10 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ..compiler.plan import Plan
+from ..kernels.tables import Motion, State, Work
+from ..kernels.transfer.clearance_pins import load_pins
+from ..kernels.transfer.forward_kinematics import place
+from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..scene.schema import Scene
 from ..scene.segmentation import flexible_parts
 from ..types import Array
@@ -72,3 +76,23 @@ def moments_by_unknowns(plan: Plan) -> Array:
         rows = slice(len(PLACES) * part, len(PLACES) * (part + 1))
         found[rows, row.z : row.z + row.bending] = tables.stiffness[part, 0, 0] * shapes
     return found
+
+
+def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
+    """Increments of the unknowns that a force at the tip causes at rest, by its x and y (N), shape (unknowns, 2).
+
+    By a sweep in which the force on the tip is minus the one that is applied; `state` is an equilibrium with its drives, and
+    stays.
+    """
+    t, still = plan.tables, np.zeros(plan.joints)
+    place(t, state, work)
+    motion, last = Motion(0.0, 0.0, work.position.copy(), np.zeros_like(work.position)), np.int64(len(t.operations))
+    load_pins(t, state, work, motion)
+    found = []
+    for force in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
+        clear_cut(work, FREE)
+        work.p[0], work.p[1] = -force[0], -force[1]
+        sweep_in(t, state, work, motion, state.drives[0], still, ROOT, last, FREE, work.condensed)
+        sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
+        found.append(work.dz.copy())
+    return np.column_stack([one - found[0] for one in found[1:]])

@@ -7,6 +7,7 @@ overshoot. `scipy.interpolate.PchipInterpolator` gives the same, but takes longe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.plan import Plan, first_row, taken_apart, width_of
+from ..errors import SolverError
 from ..kernels.elements.pin_contact import LOST
-from ..kernels.integrators import GENERALISED_ALPHA
+from ..kernels.integrators import GENERALISED_ALPHA, prepare
 from ..kernels.result_row import Results
-from ..kernels.tables import State, Work
-from ..kernels.transfer.time_step import run
+from ..kernels.tables import OK, SENTENCES, State, Work
+from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, run
 from ..types import Array
 
 
@@ -76,7 +78,7 @@ class Run(NamedTuple):
     """A motion: status and the row of the drive that it got to, results at the rows, and sums over its steps.
 
     passes : Newton passes per step, mean. square : sum of h^2 over all steps, s^2. longest : step, s. rates : of the drive
-    at the rows, m/s. lost : how often each pin with clearance lost contact.
+    at the rows, m/s. lost : how often each pin with clearance lost contact. end : the boom after the last row.
     """
 
     status: int
@@ -89,16 +91,17 @@ class Run(NamedTuple):
     longest: float
     rates: Array
     lost: NDArray[np.int64]
+    end: State
 
 
 @dataclass(frozen=True)
-class DriveFromRest:
-    """Rows of a drive, and the boom at rest at the first of them.
+class DriveCourse:
+    """Rows of a drive, and the boom at the first of them.
 
     Attributes
     ----------
     start : State
-        In equilibrium; stays as it is.
+        In equilibrium, or in motion; stays as it is.
     times : ndarray, shape (m,)
         s.
     strokes : ndarray, shape (m, n)
@@ -124,11 +127,29 @@ class DriveFromRest:
             plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, TOLERANCE, PASSES, None,
             out[1:],
         )  # fmt: skip
-        at_rows = np.vstack([np.zeros((1, plan.joints)), rates[np.cumsum(counts) - 1]])
+        at_rows = np.vstack([self.start.drives[1], rates[np.cumsum(counts) - 1]])
         return Run(
             int(status), int(row), taken_apart(plan, out), passes / max(int(counts.sum()), 1), jolt, shake,
-            float(counts @ steps**2), float(steps.max(initial=0.0)), at_rows, state.contacts[:, LOST].astype(np.int64),
+            float(counts @ steps**2), float(steps.max(initial=0.0)), at_rows, state.contacts[:, LOST].astype(np.int64), state,
         )  # fmt: skip
+
+    def states(self, dt: float, finer: int = 1) -> Iterator[tuple[float, State]]:
+        """Follow the curve through all rows in the same steps, one by one: each step (s), and the boom after it.
+
+        The boom is one and the same state throughout, which goes on with the next step. SolverError where a step fails.
+        """
+        plan, work, state, row = self.plan, self.work, State(*(array.copy() for array in self.start)), 0
+        steps, counts, drives, rates = self._drive(self.times, self.strokes, dt, finer)
+        for span, count in zip(steps.tolist(), counts.tolist(), strict=True):
+            scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
+            for _ in range(count):
+                status, _, _ = advance(
+                    plan.tables, state, work, scheme, drives[row], rates[row], TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
+                )
+                if status != OK:
+                    raise SolverError(f"step {row + 1} of {len(drives)} failed: {SENTENCES[status]}.")
+                row += 1
+                yield span, state
 
     def _drive(self, times: Array, strokes: Array, dt: float, finer: int) -> tuple[Array, NDArray[np.int64], Array, Array]:
         """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""

@@ -21,7 +21,7 @@ from ..config.settings import STROKE_RATE
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
 from ..types import Array
-from .drive import DriveFromRest, Run
+from .drive import DriveCourse, Run
 
 COARSE = 0.01  # estimated error as a share of the tip's travel
 SHORTEST = 1e-3  # m of travel that an error is measured against at least
@@ -110,13 +110,13 @@ BY_STEPS = 2.0  # error over the change that a finer step makes; by halves 4/3 f
 BY_ROWS = 1.5  # error over the change that every second row makes: 1/3 for smooth drives, 1 and more at kinks
 
 
-def step_errors(course: DriveFromRest, own: Run, dt: float) -> tuple[EstimatedError, ...]:
+def step_errors(course: DriveCourse, own: Run, dt: float) -> tuple[EstimatedError, ...]:
     """What steps of at most `dt` (s) added to the motion `own`; `differences` tells of what."""
     rows, finer = np.arange(len(course.times)), 8 if course.plan.pins else 2
     return _compared(course.times, own.rows, course.stepped(rows, dt, finer), BY_STEPS)
 
 
-def row_errors(course: DriveFromRest, own: Run) -> tuple[EstimatedError, ...]:
+def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
     """What may lie between the rows of the motion `own`; nothing for less than three rows.
 
     Rows are left out in both ways, the odd ones and the even ones, because a kink shows in one of them only.

@@ -1,4 +1,4 @@
-"""Simulate the boom's answer to a stroke history, from rest in equilibrium, with an estimate of its error."""
+"""Simulate the boom's answer to a stroke history, from rest or a given state, with an estimate of its error."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
-from .drive import DriveFromRest, Run
+from .drive import DriveCourse, Run
 from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
+from .initial_state import InitialState, started, state_now
 
 RHO = 0.8
 
@@ -51,6 +52,8 @@ class Simulation:
         cylinder's eye is the journal, of a section's pivot the outer section, of a link's pin the link, of Q link R.
     lost_contacts : ndarray of int, shape (k,)
         How often each of them lost contact.
+    end : InitialState
+        The boom at the last row, from which another simulation may go on.
     """
 
     times: Array
@@ -68,6 +71,7 @@ class Simulation:
     pin_names: tuple[str, ...]
     pins: Array
     lost_contacts: NDArray[np.int64]
+    end: InitialState
 
     @property
     def doubt(self) -> str:
@@ -97,8 +101,9 @@ def simulate(
     angles: Array | None = None,
     rho: float = RHO,
     estimate_errors: bool = True,
+    start: InitialState | None = None,
 ) -> Simulation:
-    """Start at rest in the equilibrium of the first row and follow the strokes.
+    """Start at rest in the equilibrium of the first row, or from a given state, and follow the strokes.
 
     Parameters
     ----------
@@ -117,6 +122,8 @@ def simulate(
     estimate_errors : bool
         Step the motion again with half the step and by every second row, to tell how far it can be trusted; takes four to
         seven times as long as stepping once.
+    start : InitialState, optional
+        Where the boom is and how it moves at the first row, instead of at rest: `boom_twin.undeflected`, or `Simulation.end`.
 
     Returns
     -------
@@ -126,13 +133,13 @@ def simulate(
     Raises
     ------
     UsageError
-        Rows that do not increase, values that are not finite or out of the cylinders' travel, dt not positive.
+        Rows that do not increase, values that are not finite or out of the cylinders' travel, dt not positive; a state of
+        another boom, or one that leaves loops open.
     SolverError
         No equilibrium at the first row, or a step that failed; says when.
     """
-    times, strokes = _checked(scene, times, strokes, dt)
-    plan, start, work = rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
-    course = DriveFromRest(plan, start, work, times, strokes, rho)
+    course = course_of(scene, times, strokes, dt, angles, rho, start)
+    times, strokes, plan = course.times, course.strokes, course.plan
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
         raise SolverError(f"step failed after t = {times[own.row]:.6g} s: {SENTENCES[own.status]}.")
@@ -145,8 +152,27 @@ def simulate(
     return Simulation(
         times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
-        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost,
+        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, state_now(plan, own.end),
     )  # fmt: skip
+
+
+def course_of(
+    scene: Scene,
+    times: Array,
+    strokes: Array,
+    dt: float = 1e-3,
+    angles: Array | None = None,
+    rho: float = RHO,
+    start: InitialState | None = None,
+) -> DriveCourse:
+    """What `simulate` steps through: the drive, checked, and the boom at its first row; arguments and errors as there."""
+    times, strokes = _checked(scene, times, strokes, dt)
+    plan, begin, work = (
+        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+        if start is None
+        else started(scene, start, times, strokes)
+    )
+    return DriveCourse(plan, begin, work, times, strokes, rho)
 
 
 def _doubts(

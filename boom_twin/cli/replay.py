@@ -8,6 +8,7 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import UsageError
 from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
@@ -35,8 +36,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
-    heights = "heights of the sections in m, for the stresses in the report; by default those of thin-walled boxes"
+    heights = (
+        "heights of the sections in m, for the stresses in the report; by default the scene's, else those of thin-walled boxes"
+    )
     parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
+    told = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
+    parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=told)
     told = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
     parser.add_argument("--table", choices=("csv", "parquet"), help=told)
     add_json(parser)
@@ -51,6 +56,8 @@ def run(args: Namespace) -> int:
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
+    if args.fatigue is not None and not args.report:
+        raise UsageError(f"--fatigue {args.fatigue:g}: goes into the report. Give --report too.")
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
     settings = load_settings(args.params)
@@ -59,7 +66,7 @@ def run(args: Namespace) -> int:
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
         options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
-        evaluator = Evaluator(scene.scene, settings, args.baseline)
+        evaluator = Evaluator(scene.scene, settings, args.baseline, heights, args.fatigue)
         table = SampleTable(building.folder, args.table, len(scene.scene.joints)) if args.table else None
 
         def take(stretch: Stretch) -> None:
@@ -68,7 +75,7 @@ def run(args: Namespace) -> int:
                 table.add(stretch)
 
         result = replay_into(building, args.bag, scene, *options, take=take)
-        found = evaluator.finish(result, building.folder, heights)
+        found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:
             files.append(table.finish().name)
@@ -91,7 +98,8 @@ def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionSce
     if not args.no_pictures:
         files += draw(result, found.history, out)
     if args.report:
-        subject = Subject(result, found, scene.scene, scene.source, args.section_height is not None)
+        known = args.section_height is not None or all(part.height for part in scene.scene.sections if part.beam is not None)
+        subject = Subject(result, found, scene.scene, scene.source, known)
         files.append(write_report(subject, out))
     return files
 

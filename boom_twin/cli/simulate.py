@@ -7,6 +7,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,24 +17,35 @@ from ..system.atomic_files import check_new, check_target, write_atomic
 from ..types import Array
 from .main import add_scene, open_scene
 
+if TYPE_CHECKING:
+    from ..analysis.initial_state import InitialState
+
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--posture", required=True, metavar="NAME", help="the posture that the first row belongs to")
+    told = "the posture that the first row belongs to; not needed with a file of --start"
+    parser.add_argument("--posture", metavar="NAME", help=told)
     parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
+    parser.add_argument("--check", action="store_true", help="print the balance of energy along the motion, stepped once more")
+    where = "where the boom is at the first row: rest (the default), undeflected, or a file of --save-state"
+    parser.add_argument("--start", default="rest", metavar="STATE", help=where)
+    parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
+    parser.add_argument("--save-state", metavar="FILE.json", help="the boom at the last row, for --start of another run")
     parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
 
 
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
-    from ..analysis.simulate import simulate
+    from ..analysis.energy_balance import energy_balance
+    from ..analysis.initial_state import write_state
+    from ..analysis.simulate import course_of, simulate
     from ..compiler.compile import compile_scene
 
     scene = open_scene(args.scene)
@@ -41,11 +53,12 @@ def run(args: Namespace) -> int:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
     check_target(Path(args.out), sources, _earlier(len(scene.joints)))
-    if args.orbits:
-        check_new(Path(args.orbits), sources)
+    for picture_or_state in filter(None, (args.orbits, args.save_state)):
+        check_new(Path(picture_or_state), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
-    angles = _angles_near(scene, args.posture, strokes[0])
-    result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)
+    angles = _angles(args, scene, strokes[0])
+    start = _start(args, scene, strokes[0], angles)
+    result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
     columns = result.columns()
@@ -55,6 +68,10 @@ def run(args: Namespace) -> int:
     write_atomic(Path(args.out), text.getvalue())
     for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
         print(f"{name}: contact lost {lost} times")
+    if args.save_state:
+        write_state(Path(args.save_state), result.end)
+    if args.check:
+        print(f"{energy_balance(course_of(scene, times, strokes, args.dt, angles, start=start), args.dt)}.")
     if args.orbits:
         from ..plots.history import Orbits
         from ..plots.posture import orbits_picture
@@ -63,6 +80,32 @@ def run(args: Namespace) -> int:
         orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
         orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
     return 0
+
+
+def _angles(args: Namespace, scene: Scene, first: Array) -> Array | None:
+    """Joint angles (rad) next to which the motion starts; None where a file says all of it."""
+    if args.posture is not None:
+        return _angles_near(scene, args.posture, first)
+    if args.start in ("rest", "undeflected"):
+        raise UsageError(f"--posture: not given, and the boom starts {args.start} in one. Name that of the first row.")
+    return None
+
+
+def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:
+    """State of ``--start``; None for rest."""
+    from ..analysis.initial_state import read_state, undeflected
+
+    if args.joint_rates is not None and args.start != "undeflected":
+        raise UsageError(f"--joint-rates {args.joint_rates}: go with --start undeflected. Leave them out, or start there.")
+    if args.start == "rest":
+        return None
+    if args.start != "undeflected":
+        return read_state(Path(args.start))
+    try:
+        rates = None if args.joint_rates is None else np.array([float(rate) for rate in args.joint_rates.split(",")])
+    except ValueError:
+        raise UsageError(f"--joint-rates {args.joint_rates}: give {len(scene.joints)} numbers with commas, rad/s.") from None
+    return undeflected(scene, first, rates, angles)
 
 
 def _earlier(joints: int) -> bytes:

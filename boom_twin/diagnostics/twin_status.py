@@ -14,6 +14,7 @@ from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, lev
 from .sensor_status import SensorJudge, SensorSpec
 from .source_status import PublishersJudge, Reception, ReceptionJudge
 from .stream_stats import StreamWatch
+from .stress_status import StressWatch
 from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
 
 
@@ -30,6 +31,8 @@ class TwinWatch:
         May be replaced while it runs.
     monotonic : callable
         The time, s, of a clock that only goes forward.
+    stress : StressWatch, optional
+        Of the boom, if its sections bend.
     """
 
     def __init__(
@@ -38,8 +41,9 @@ class TwinWatch:
         names: Mapping[Stream, str],
         thresholds: Thresholds,
         monotonic: Callable[[], float] = time.monotonic,
+        stress: StressWatch | None = None,
     ) -> None:
-        self._monotonic = monotonic
+        self._monotonic, self._stress = monotonic, stress
         self.thresholds = thresholds
         self._sensors = {stream: [SensorJudge(sensor) for sensor in each] for stream, each in sensors.items()}
         self._topics = {stream: TopicJudge(names[stream], each[0].required) for stream, each in sensors.items()}
@@ -74,6 +78,8 @@ class TwinWatch:
             self._model.took(each, duration if each is report else 0.0)
             if each.residuals:
                 self._residuals += each.residuals
+            if self._stress is not None and each.prediction is not None:
+                self._stress.took(each.prediction, each.estimate)
             if each.estimate is not None:
                 self._load.took(each.estimate)
             if each.health is not None:
@@ -142,6 +148,8 @@ class TwinWatch:
             found.append(self.health.status(at))
         if (load := self._load.status(at)) is not None:
             found.append(load)
+        if self._stress is not None and (stress := self._stress.status(at)) is not None:
+            found.append(stress)
         return found + sensors + self._look_at_residuals(at)
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:

@@ -13,6 +13,7 @@ from ..offline.replay import Replay
 from ..plots import History
 from ..scene.schema import Scene
 from ..types import Array
+from .fatigue import Fatigue, FatigueCounter
 from .quantities import Load, QuantityBuilder, write
 from .vibration import HoldFinder, HoldInterval
 
@@ -29,12 +30,18 @@ class Evaluation:
         Of the flexible sections.
     file : Path
         Where the figures are.
+    fatigue : list of Fatigue
+        Of all stations, if it was asked for.
+    category : float or None
+        Detail category (MPa) that it was asked for.
     """
 
     history: History
     still: list[HoldInterval]
     loads: list[Load]
     file: Path
+    fatigue: list[Fatigue]
+    category: float | None
 
 
 class Evaluator:
@@ -47,30 +54,38 @@ class Evaluator:
         Of the replay.
     baseline : Path, optional
         As for the replay.
+    heights : ndarray, shape (n,), optional
+        Of the sections, m, for the stresses; by default those of the scene, or of thin-walled boxes.
+    category : float, optional
+        Detail category (MPa) for the fatigue of all stations; without it fatigue is not looked at.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, baseline: Path | None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        baseline: Path | None,
+        heights: Array | None = None,
+        category: float | None = None,
+    ) -> None:
         self._scene, self._settings, self._baseline = scene, settings, baseline
         self._history = HistoryBuilder(scene)
-        self._quantities, self._holds = QuantityBuilder(scene), HoldFinder(scene)
+        self._quantities, self._holds, self._heights = QuantityBuilder(scene), HoldFinder(scene), heights
+        self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
 
     def add(self, stretch: Stretch) -> None:
         """Take the next stretch in."""
         own = self._history.add(stretch)
-        self._quantities.add(own)
+        self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
+        if self._fatigue is not None:
+            self._fatigue.add(own)
         self._holds.add(own)
 
-    def finish(self, result: Replay, folder: Path, heights: Array | None = None) -> Evaluation:
-        """What came out of the replay, whose figures are written into `folder`; to be called once.
-
-        Parameters
-        ----------
-        result : Replay
-        folder : Path
-        heights : ndarray, shape (n,), optional
-            Of the sections, m, for the stresses; by default those of thin-walled boxes.
-        """
+    def finish(self, result: Replay, folder: Path) -> Evaluation:
+        """What came out of the replay, whose figures are written into `folder`; to be called once."""
         still, usual = self._holds.finish(), baseline_of(result.session.path, self._baseline).baseline
         found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings, usual)
         file = write(folder, self._scene, found)
-        return Evaluation(self._history.history(result.recording), still, self._quantities.loads(heights), file)
+        fatigue, category = ([], None) if self._fatigue is None else (self._fatigue.found(), self._fatigue.category)
+        loads = self._quantities.loads(self._heights)
+        return Evaluation(self._history.history(result.recording), still, loads, file, fatigue, category)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..analysis.bending_stress import BOX
 from ..offline.recording import Recording
 from ..offline.replay import Replay
 from ..plots import AlarmSpan, History
@@ -19,8 +20,9 @@ from ..system.atomic_files import write_atomic
 from ..twin.events import EVENTS
 from ..types import NANO, SECOND, SENSORS, Alarm, Stream
 from .evaluation import Evaluation
+from .fatigue import SMALL
 from .html import heading, image, page, paragraph, table
-from .quantities import BOX, Load
+from .quantities import Load
 from .vibration import LEAST, NEAR, Vibration, course
 
 FILE_NAME = "report.html"
@@ -76,6 +78,7 @@ def write_report(subject: Subject, folder: Path) -> Path:
         *_vibration(subject, folder),
         *_tip(subject, folder),
         *_moments(subject, folder),
+        *_fatigue(subject.evaluation),
         *_events(subject),
         *_provenance(subject),
     ]
@@ -244,16 +247,48 @@ def _moments(subject: Subject, folder: Path) -> list[str]:
     moment_picture(path, subject.name, subject.history, rows, subject.origin)
     told = (
         "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
-        "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M h / (2 I) of bending alone: "
-        "no axial force, no notches, no welds. "
+        "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M / W with W = 2 I / h, of "
+        "bending "
+        "alone: no axial force, no notches, no welds. What a load at the tip adds that only sensors know of is its static "
+        "share, "
+        "with its standard deviation. "
     )
     told += "Heights as given." if subject.has_heights else ASSUMED
-    head = ("station", "largest moment, kN m", "at, s", "static part then, kN m", "height, m", "bending stress, MPa")
+    head = (
+        "station",
+        "largest moment, kN m",
+        "at, s",
+        "static part then, kN m",
+        "by unknown load, kN m",
+        "W, cm³",
+        "stress, MPa",
+    )
     return [title, paragraph(told, "note"), table(head, map(_load, found)), image(path, "bending moments")]
 
 
 def _load(load: Load) -> tuple[object, ...]:
-    return load.station.name, 1e-3 * load.moment, load.time, 1e-3 * load.static, load.height, 1e-6 * load.stress
+    unknown = "-" if np.isnan(load.sigma) else f"{1e-3 * load.unknown:+.3g} ± {1e-3 * load.sigma:.2g}"
+    deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
+    stress = f"{1e-6 * load.stress:.3g}{deviation}"
+    return load.station.name, 1e-3 * load.moment, load.time, 1e-3 * load.static, unknown, 1e6 * load.modulus, stress
+
+
+def _fatigue(found: Evaluation) -> list[str]:
+    if found.category is None or not found.fatigue:
+        return []
+    told = (
+        f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * SMALL:g} MPa; damage by the S-N "
+        f"curve "
+        f"of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial factors. "
+        f"Damage grows "
+        "with the third to fifth power of stress. The load that only sensors know of is not in it."
+    )
+    rows = [
+        (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, 1.0 / row.damage if row.damage else None)
+        for row in found.fatigue
+    ]
+    head = ("station", "cycles", "largest range, MPa", "damage", "sessions to a damage of 1")
+    return [heading("Fatigue", 3), paragraph(told, "note"), table(head, rows)]
 
 
 # -- what else --------------------------------------------------------------------------------------------------------

@@ -9,10 +9,12 @@ from dataclasses import asdict, dataclass
 from hashlib import sha256
 from math import hypot, sqrt
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..analysis.bending_moments import Station, stations
+from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.baseline import Baseline, judged_channels
@@ -56,8 +58,8 @@ class QuantityBuilder:
         self._travels = [PathLength() for _ in scene.joints]
         self._loads = SectionLoads(scene)
 
-    def add(self, history: History) -> None:
-        """Take the next stretch in, with all its rows."""
+    def add(self, history: History, load: Array, variance: Array) -> None:
+        """Take the next stretch in, with all its rows; `load`, `variance` as for `SectionLoads.add`."""
         for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
             values = column[np.isfinite(column)]
             means, squares = self._channels.setdefault(name, (BatchMeans(), BatchMeans()))
@@ -67,7 +69,7 @@ class QuantityBuilder:
         self._acceleration = max(self._acceleration, float(np.hypot(*history.tip_acceleration.T).max()))
         for travel, stroke in zip(self._travels, history.strokes.T, strict=True):
             travel.add(stroke)
-        self._loads.add(history)
+        self._loads.add(history, load, variance)
 
     def loads(self, heights: Array | None) -> list[Load]:
         """As `SectionLoads.loads`."""
@@ -230,10 +232,6 @@ def digest(scene: Scene) -> str:
     return sha256(scene.model_dump_json(exclude_none=True).encode()).hexdigest()
 
 
-BOX = 2.4
-"""Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
-
-
 @dataclass(frozen=True, slots=True)
 class Load:
     """The most loaded station of a section.
@@ -245,10 +243,11 @@ class Load:
         Of `History.moments`.
     moment, time, static : float
         The largest moment in magnitude (N m), when (s), and the static part of it then (N m).
-    height : float
-        Of the section, m.
-    stress : float
-        Of its outermost fibre by bending, Pa.
+    unknown, sigma : float
+        What the load at the tip that only sensors know of adds to it then, at rest, and the deviation of that, N m; NaN where
+        nothing but strokes was measured.
+    modulus : float
+        Of the section, m^3.
     """
 
     station: Station
@@ -256,8 +255,14 @@ class Load:
     moment: float
     time: float
     static: float
-    height: float
-    stress: float
+    unknown: float
+    sigma: float
+    modulus: float
+
+    @property
+    def stress(self) -> float:
+        """Of the outermost fibre by bending, Pa."""
+        return abs(self.moment) / self.modulus
 
 
 class SectionLoads:
@@ -265,30 +270,58 @@ class SectionLoads:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places = scene, stations(scene)
-        self._largest: dict[int, tuple[int, float, float, float]] = {}  # by section: column, moment, time, static part
+        self._largest: dict[int, _Largest] = {}  # by section
 
-    def add(self, history: History) -> None:
-        """Take the next stretch in, with all its rows."""
+    def add(self, history: History, load: Array, variance: Array) -> None:
+        """Take the next stretch in, with all its rows; estimated load at the tip (N) and its variance (N^2), each (m, 2)."""
         for section in sorted({station.section for station in self._places}):
             columns = [i for i, station in enumerate(self._places) if station.section == section]
             size = np.abs(history.moments[:, columns])
             row, best = np.unravel_index(int(size.argmax()), size.shape)
             column = columns[int(best)]
             moment = float(history.moments[row, column])
-            if section not in self._largest or abs(moment) > abs(self._largest[section][1]):
+            if section not in self._largest or abs(moment) > abs(self._largest[section].moment):
                 static = float(slow_part(history, column)[row])
-                self._largest[section] = column, moment, float(history.stamps_s[row]), static
+                about = (
+                    float(history.stamps_s[row]),
+                    static,
+                    history.strokes[row].copy(),
+                    history.joints[row].copy(),
+                    load[row].copy(),
+                    variance[row].copy(),
+                )
+                self._largest[section] = _Largest(column, moment, *about)
 
     def loads(self, heights: Array | None) -> list[Load]:
-        """One for every flexible section; `heights` (n,) of the sections in m, or None to take them for thin-walled boxes."""
-        found = []
-        for section, (column, moment, time, static) in self._largest.items():
-            part = self._scene.sections[section]
-            assert part.A is not None and part.I is not None
-            height = BOX * math.sqrt(part.I / part.A) if heights is None else float(heights[section])
-            stress = abs(moment) * height / 2.0 / part.I
-            found.append(Load(self._places[column], column, moment, time, static, height, stress))
+        """One for every flexible section; `heights` (n,) of the sections in m, or None for the scene's, or thin-walled "
+        "boxes'."""
+        if not self._largest:
+            return []
+        model, found = BendingStressModel(self._scene, heights), []
+        for own in self._largest.values():
+            unknown = sigma = math.nan
+            if own.load.any():
+                influence = model.influence(own.strokes, own.joints)[own.column]
+                unknown, sigma = float(influence @ own.load), math.sqrt(float(influence**2 @ own.variance))
+            place, modulus = self._places[own.column], float(model.moduli[own.column])
+            found.append(Load(place, own.column, own.moment, own.time, own.static, unknown, sigma, modulus))
         return found
+
+
+class _Largest(NamedTuple):
+    """Largest moment of a section so far: column, N m, when (s), its static part; and what there was then.
+
+    Strokes (m), joint angles (rad), estimated load at the tip (N) and its variance (N^2).
+    """
+
+    column: int
+    moment: float
+    time: float
+    static: float
+    strokes: Array
+    joints: Array
+    load: Array
+    variance: Array
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:

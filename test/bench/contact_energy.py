@@ -13,11 +13,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from oracle import booms, energy
+from oracle import booms
 from oracle.clearance import rigid
-from oracle.clearance.scenes import RODS, contact_energy, with_pins
+from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
@@ -69,7 +70,7 @@ class Closed:
 
     def energy(self):
         """J above rest."""
-        return energy.total(self.plan, self.state, self.drive) + contact_energy(self.plan, self.state) - self.rest
+        return Energies(self.plan).total(self.state) - self.rest
 
     def watch(self, steps, every):
         """Largest rise above the first energy, energy at the end (both over the first), contacts lost."""

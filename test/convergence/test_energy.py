@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from convergence import motions
-from oracle import booms, energy, segments
+from oracle import booms, segments
 
 from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, prepare
@@ -23,7 +24,8 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
     angles = np.diff(np.radians(scene.postures[posture]), prepend=0.0)
     drive = motions.smooth_drive(segments.Segments(scene, 0).lengths(angles), travel, 0.5)
     settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    scheme, start = prepare(GENERALISED_ALPHA, rho, step, work.weights), energy.total(plan, state, drive(0.0)[0])
+    energies, scheme = Energies(plan), prepare(GENERALISED_ALPHA, rho, step, work.weights)
+    start = energies.total(state)
     powers, gaps, done, lost = [(0.0, 0.0)], [], 0.0, 0.0
     for k in range(1, round(duration / step) + 1):
         length, rate, _ = drive(k * step)
@@ -31,10 +33,10 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
             plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
         )
         assert status == 0
-        powers.append((energy.power_of_drives(plan, state, rate), energy.dissipation(plan, state, rate)))
+        powers.append((energies.drive_power(state), energies.damping_power(state)))
         done += 0.5 * step * (powers[-1][0] + powers[-2][0])
         lost += 0.5 * step * (powers[-1][1] + powers[-2][1])
-        gaps.append(energy.total(plan, state, length) - start - done + lost)
+        gaps.append(energies.total(state) - start - done + lost)
     return np.abs(gaps).max(), abs(done), lost
 
 

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin import Twin
 from boom_twin.config.settings import Settings, Thresholds
 from boom_twin.diagnostics import twin_status as module
-from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.sensor_status import sensors_of
+from boom_twin.diagnostics.stress_status import stress_watch
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Estimate, Report, Residuals, Sample, Stream
 
 NAMES = {stream: stream.value for stream in Stream}
@@ -152,6 +155,25 @@ def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
     assert (status.level, status.message) == (Level.WARN, "not active")
     (status,) = module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0)
     assert status.message == "not active"
+
+
+def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() -> None:
+    scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
+    prediction = Twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
+    watch, at = stress_watch(scene), Evaluation(Thresholds(), 0.0, 0.0)
+    assert watch is not None and prediction is not None and watch.status(at) is None
+    for load, told in (
+        (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
+        (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
+    ):
+        variance = np.full(2, 400.0)
+        estimate = Estimate(10**18, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), variance)
+        watch.took(prediction, estimate)
+        status = watch.status(at)
+        assert status is not None and status.level == Level.OK and status.message.startswith(told), status.message
+    assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
+    rigid = scene.model_copy(update={"modes": 0})
+    assert stress_watch(rigid) is None
 
 
 def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:

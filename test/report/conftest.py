@@ -61,7 +61,7 @@ def replays(sessions: tuple[Path, Path], made_once: MadeOnce, tmp_path_factory: 
 
     def make(folder: Path) -> None:
         for session in sessions:
-            assert main(["replay", str(session), "--out", str(folder / session.name), "--report"]) == 0
+            assert main(["replay", str(session), "--out", str(folder / session.name), "--report", "--fatigue", "80"]) == 0
 
     folder = made_once.folder("report_replays", make, tmp_path_factory.mktemp("replays"))
     return folder / "healthy", folder / "faulty"

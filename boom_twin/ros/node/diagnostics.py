@@ -17,6 +17,7 @@ from ...bag.joint_names import extra_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Status
 from ...diagnostics.sensor_status import sensors_of
+from ...diagnostics.stress_status import stress_watch
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import SampleDecoder
@@ -174,7 +175,8 @@ class Diagnostics:
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
-        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
+        stress = stress_watch(twin.scene)
+        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
         self._counts = {"samples": twin.counts, "messages": decoder.oddities}
         self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()

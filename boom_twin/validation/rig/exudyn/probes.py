@@ -22,6 +22,7 @@ class Probes:
     roots: tuple[int, ...]
     heads: tuple[int, ...]
     forces: tuple[int, ...]
+    pins: tuple[tuple[int, int], ...]  # places of hole and journal of every pin with play
 
 
 def attach(boom: Boom) -> Probes:
@@ -36,6 +37,7 @@ def attach(boom: Boom) -> Probes:
         roots=tuple(_on_node(boom, section.root, kind.Coordinates) for section in boom.sections),
         heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
         forces=tuple(_on_drive(boom, drive, name) for drive, name in boom.drives),
+        pins=tuple((_on_marker(boom, bush.sides[0]), _on_marker(boom, bush.sides[1])) for bush in boom.bushes),
     )
 
 
@@ -46,7 +48,8 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     -------
     dict
         ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
-        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension.
+        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``pins`` (k, m, 2) m, offsets of
+        the journals that have play.
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
@@ -61,6 +64,7 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
         "tip_rate_dot": data(probes.head[1])[:, 3],
         "joints": roots - before,
         "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
+        "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins]),
     }
 
 
@@ -94,6 +98,11 @@ def _at_tip(boom: Boom, kind: Any) -> int:
 
 def _on_node(boom: Boom, station: Station, kind: Any) -> int:
     return int(boom.system.AddSensor(items.SensorNode(nodeNumber=station.node, **_inside(kind))))
+
+
+def _on_marker(boom: Boom, marker: int) -> int:
+    place = exudyn.OutputVariableType.Position
+    return int(boom.system.AddSensor(items.SensorMarker(markerNumber=marker, **_inside(place))))
 
 
 def _on_drive(boom: Boom, drive: int, name: str) -> int:

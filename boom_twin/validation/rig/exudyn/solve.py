@@ -19,6 +19,7 @@ from ....types import Array
 from .boom import SHEAR_OVER_AXIAL, build
 from .module import exudyn
 from .parameter_changes import ParameterChanges
+from .pin_clearance import pin_with_play
 from .probes import Probes, attach, read
 from .stepping import Course, Effort, Scheme, step_through
 from .system import Boom, section_frames
@@ -146,7 +147,8 @@ def simulate(
     dict
         The columns of a simulation (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_y_m``,
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
-        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``; each of shape (rows,).
+        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, and of pins with play the journals' offsets,
+        ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,).
     """
     first = drive(np.zeros(1))[0][0]
     return move(at_rest(scene, first, elements), drive, t_end, step, output_step, None, load, changes)[0]
@@ -196,7 +198,9 @@ def move(
     effort = step_through(resting.boom, course, step, output_step, scheme or Scheme())
     found = read(resting.boom, resting.probes, at_rest=False)
     found["forces"][0] = resting.forces  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
-    return _columns(found, strokes[::every], times[::every]), effort
+    worn = [pin_with_play(resting.boom.scene, index) for index in range(len(resting.boom.scene.joints))]
+    names = [pin.at.replace(".", "_") for pin in worn if pin is not None]
+    return _columns(found, strokes[::every], times[::every], names), effort
 
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
@@ -222,7 +226,7 @@ def _ratio(name: str, whole: float, step: float) -> int:
     return count
 
 
-def _columns(found: dict[str, Array], strokes: Array, times: Array) -> dict[str, Array]:
+def _columns(found: dict[str, Array], strokes: Array, times: Array, pins: Sequence[str]) -> dict[str, Array]:
     if len(found["t"]) != len(times) or np.abs(found["t"] - times).max() > 1e-6:
         raise SolverError(f"Exudyn recorded {len(found['t'])} of {len(times)} rows. Choose another output_step.")
     number = range(1, strokes.shape[1] + 1)
@@ -238,4 +242,5 @@ def _columns(found: dict[str, Array], strokes: Array, times: Array) -> dict[str,
         "tip_angle_rad": found["tip_angle"],
         "tip_angular_velocity_rad_s": found["tip_rate"],
         "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
+        **{f"{pin}_d{axis}_m": found["pins"][k][:, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
     }

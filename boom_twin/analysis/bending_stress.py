@@ -1,0 +1,119 @@
+"""Bending moments and stresses at the stations of a boom with what the sensors know beyond the prediction, and how sure that
+is.
+
+The prediction's moment at a station is EI times curvature. The force at the tip that only sensors know of (pump, wind, load)
+adds its static share, moment = influence times force, with the deviation that the estimate gives that force; the boom's
+dynamic answer to it is left out. Stress is moment over section modulus, of bending alone: no axial force, no notches, no welds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiler.compile import compile_scene
+from ..errors import BoomTwinError, UsageError
+from ..scene.schema import Scene
+from ..types import Array, Estimate, Prediction
+from .bending_moments import Station, increments_by_tip_force, moments_by_unknowns, stations
+from .equilibrium import settle
+
+BOX = 2.4
+"""Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
+POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force is made anew
+
+
+@dataclass(frozen=True)
+class BendingStresses:
+    """At k stations at one instant.
+
+    Attributes
+    ----------
+    moments, moment_sigmas : ndarray, shape (k,)
+        N m, positive where they bend the outer end up; standard deviation by the load at the tip, NaN without an estimate.
+    stresses, stress_sigmas : ndarray, shape (k,)
+        Pa, of the outermost fibre, with the sign of the moment.
+    """
+
+    moments: Array
+    moment_sigmas: Array
+    stresses: Array
+    stress_sigmas: Array
+
+
+def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
+    """Section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,), optional
+        Outer heights, m; by default those of the scene, and of a section without one that of a thin-walled box.
+    """
+    found = np.full(len(scene.sections), np.nan)
+    for i, section in enumerate(scene.sections):
+        if scene.is_flexible(i):
+            assert section.I is not None and section.A is not None
+            box = BOX * math.sqrt(section.I / section.A)
+            height = heights[i] if heights is not None else section.height or box
+            found[i] = 2.0 * section.I / height
+    return found
+
+
+class BendingStressModel:
+    """Moments and stresses of a boom at its stations, sample by sample.
+
+    Parameters
+    ----------
+    scene : Scene
+    heights : ndarray, shape (n,), optional
+        See `section_moduli`.
+
+    Attributes
+    ----------
+    stations : tuple of Station
+    moduli : ndarray, shape (k,)
+        Section modulus at every station, m^3.
+    """
+
+    def __init__(self, scene: Scene, heights: Array | None = None) -> None:
+        self.stations: tuple[Station, ...] = stations(scene)
+        if not self.stations:
+            raise UsageError("sections: none of the scene is flexible, so it has no bending moments. Give a section a beam.")
+        self.moduli = section_moduli(scene, heights)[[station.section for station in self.stations]]
+        self._plan = compile_scene(scene)
+        self._by_unknowns = moments_by_unknowns(self._plan)
+        self._state, self._work = self._plan.state(), self._plan.work()
+        self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
+
+    def influence(self, strokes: Array, joints: Array) -> Array:
+        """Moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
+
+        Parameters
+        ----------
+        strokes, joints : ndarray, shape (n,)
+            m; joint angles near those of the equilibrium, rad.
+        """
+        if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
+            self._at = strokes.copy()
+            try:
+                settle(self._plan, self._state, self._work, strokes, joints)
+            except BoomTwinError:
+                self._influence = np.full_like(self._influence, np.nan)
+            else:
+                self._influence = self._by_unknowns @ increments_by_tip_force(self._plan, self._state, self._work)
+        return self._influence
+
+    def at(self, prediction: Prediction, estimate: Estimate | None) -> BendingStresses:
+        """Of one prediction and the estimate beside it, as a `boom_twin.types.Report` has both."""
+        assert prediction.moments is not None
+        influence = np.full((len(self.stations), 2), np.nan)
+        if estimate is not None and estimate.load.any():  # until anything is measured it is exactly zero
+            influence = self.influence(prediction.strokes, prediction.joints)
+        if estimate is None or np.isnan(influence).any():
+            nothing = np.full(len(self.stations), np.nan)
+            return BendingStresses(prediction.moments, nothing, prediction.moments / self.moduli, nothing)
+        moments = prediction.moments + influence @ estimate.load
+        sigmas = np.sqrt(influence**2 @ estimate.load_variance)
+        return BendingStresses(moments, sigmas, moments / self.moduli, sigmas / self.moduli)

@@ -1,0 +1,236 @@
+"""Energy of a boom, and its balance along a motion: work of the drives = change of energy + what damping and contact take.
+
+What is left over is the time integration's: errors of the trapezoidal rule that the powers are summed by, which fall with the
+square of the step, and the numerical damping of generalised-alpha, which takes energy from fast vibrations (and from slow ones
+little, see `numerical_damping`). Coriolis and centrifugal forces do no work, and neither do pins and links.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..compiler.plan import Plan
+from ..kernels.elements.cylinder import compliance_and_lag
+from ..kernels.elements.pin_contact import (
+    CLEARANCE,
+    DAMPER,
+    FORCE,
+    LEAST_SHARE,
+    SEAT_X,
+    SEAT_Y,
+    SLIP,
+    SMOOTH,
+    SPRING,
+    approach,
+    penetration,
+)
+from ..kernels.integrators import V, X
+from ..kernels.tables import State
+from ..kernels.transfer.clearance_pins import axis_of
+from ..types import Array
+from .drive import DriveCourse
+
+FINER = 32
+"""Sub-steps of a step where journals touch and part: as many as a step is divided into at most."""
+
+
+class Energies:
+    """Energies and powers of a boom, from its state.
+
+    Parameters
+    ----------
+    plan : Plan
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        t, count = plan.tables, len(plan.names)
+        self._plan = plan
+        self._stiffness, self._damping = np.zeros((count, count)), np.zeros((count, count))
+        for row, beam in enumerate(t.beams):
+            own, axial = slice(int(beam.z), int(beam.z + beam.bending)), int(beam.z + beam.bending)
+            block = t.stiffness[row, : int(beam.bending), : int(beam.bending)]
+            self._stiffness[own, own], self._damping[own, own] = block, beam.beta * block
+            if beam.axial:
+                self._stiffness[axial, axial] = beam.axial_stiffness
+                self._damping[axial, axial] = beam.beta * beam.axial_stiffness
+        self._lengths, self._forces = np.array(t.cylinders.history), np.array(t.cylinders.z)
+        self._pins = [SimpleNamespace(**{name: row[name].item() for name in CLEARANCE.names or ()}) for row in t.clearances]
+
+    def kinetic(self, state: State) -> float:
+        """Of all mass points and inertias, J."""
+        return float(0.5 * self._plan.masses @ state.history[V] ** 2)
+
+    def weight(self, state: State) -> float:
+        """Potential energy of gravity, J."""
+        return float(-self._plan.weights @ state.history[X])
+
+    def strain(self, state: State) -> float:
+        """Of bent and stretched beams, J."""
+        return float(0.5 * state.z @ self._stiffness @ state.z)
+
+    def oil(self, state: State) -> float:
+        """Of the oil springs, J."""
+        return float(0.5 * self._oil(state.drives[0])[0] @ self._stretch(state) ** 2)
+
+    def _stretch(self, state: State) -> Array:
+        return np.asarray(state.history[X, self._lengths] - state.drives[0])
+
+    def _oil(self, drives: Array) -> tuple[Array, Array]:
+        """Stiffnesses (N/m) and dampings (N s/m) of the oil at lengths of the drives (m); 0 if incompressible."""
+        t = self._plan.tables
+        rows = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
+        found = [(1.0 / compliance, lag / compliance) if compliance > 0.0 else (0.0, 0.0) for compliance, lag in rows]
+        return np.array([each[0] for each in found]), np.array([each[1] for each in found])
+
+    def contact(self, state: State) -> float:
+        """Of contacts, J; of linearised pins, their springs.
+
+        Of a contact it is K times the integral of d^e over the gap, dg = (1 + s^2/(4 d^2)) dd.
+        """
+        total = 0.0
+        for row, memory in zip(self._pins, state.contacts, strict=True):
+            x, y = state.z[row.z], state.z[row.z + 1]
+            if memory[SPRING] > 0.0:
+                c, s = axis_of(self._plan.tables, state, row)
+                dx, dy = x - c * memory[SEAT_X] + s * memory[SEAT_Y], y - s * memory[SEAT_X] - c * memory[SEAT_Y]
+                total += 0.5 * memory[SPRING] * (dx * dx + dy * dy)
+                continue
+            (_, _, _, d, _), e = penetration(row, x, y), row.exponent
+            total += row.stiffness * (d ** (e + 1.0) / (e + 1.0) + 0.25 * SMOOTH**2 * d ** (e - 1.0) / (e - 1.0))
+        return float(total)
+
+    def total(self, state: State) -> float:
+        """Kinetic and potential energy, J."""
+        potential = self.weight(state) + self.strain(state) + self.oil(state) + self.contact(state)
+        return self.kinetic(state) + potential
+
+    def powers(self, state: State) -> Array:
+        """Of the drives, into the boom; of damping and of contact, out of it; shape (3,), W."""
+        return np.array([self.drive_power(state), self.damping_power(state), self.contact_power(state)])
+
+    def drive_power(self, state: State) -> float:
+        """Power that the drives put in, W: a drive that lengthens against compression (N < 0) does work.
+
+        So does one whose oil gets stiffer on its way: the spring is as long as before, and stores more.
+        """
+        drives, step = state.drives[0], 1e-6
+        stiffening = (self._oil(drives + step)[0] - self._oil(drives - step)[0]) / (2.0 * step)
+        stiffened = 0.5 * stiffening * self._stretch(state) ** 2
+        return float((stiffened - state.z[self._forces]) @ state.drives[1])
+
+    def damping_power(self, state: State) -> float:
+        """Power that beams and oil dampers take, W."""
+        rates = state.history[V]
+        own, slip = rates[: len(state.z)], rates[self._lengths] - state.drives[1]
+        return float(own @ self._damping @ own + self._oil(state.drives[0])[1] @ slip**2)
+
+    def contact_power(self, state: State) -> float:
+        """Power that contacts take, by restitution and friction, W; of linearised pins, their dampers."""
+        rates, total = state.history[V], 0.0
+        for row, memory in zip(self._pins, state.contacts, strict=True):
+            x, y, vx, vy = state.z[row.z], state.z[row.z + 1], rates[row.z], rates[row.z + 1]
+            if memory[SPRING] > 0.0:
+                total += memory[DAMPER] * (vx * vx + vy * vy)
+                continue
+            nx, ny, _, d, _ = penetration(row, x, y)
+            approaching = nx * vx + ny * vy
+            share = max(1.0 + row.loss * approaching / approach(memory, nx, ny, vx, vy), LEAST_SHARE)
+            total += row.stiffness * d**row.exponent * (share - 1.0) * approaching
+            if row.friction > 0.0:
+                slip = nx * vy - ny * vx + row.radius * rates[row.turn]
+                total += row.friction * memory[FORCE] * slip * slip / math.hypot(slip, SLIP)
+        return float(total)
+
+
+@dataclass(frozen=True)
+class EnergyBalance:
+    """Where the energy of a motion went, J.
+
+    Attributes
+    ----------
+    work : float
+        Of the drives.
+    change : float
+        Of kinetic and potential energy, from the first row to the last.
+    damping, contact : float
+        Taken by beams and oil dampers; by contacts.
+    gap : float
+        Largest of work - change - damping - contact at any step, in magnitude.
+    left : float
+        That difference at the end: what time integration took, negative if it gave.
+    moved : float
+        What `gap` is measured against: the largest of the drives' work, kinetic energy, and change of that of weight.
+    step : float
+        Longest step, s.
+    """
+
+    work: float
+    change: float
+    damping: float
+    contact: float
+    gap: float
+    left: float
+    moved: float
+    step: float
+
+    @property
+    def share(self) -> float:
+        """`gap` as a share of `moved`."""
+        return self.gap / self.moved if self.moved > 0.0 else 0.0
+
+    def __str__(self) -> str:
+        return (
+            f"energy: the drives did {self.work:.6g} J; kinetic and potential energy changed by {self.change:.6g} J, "
+            f"damping took {self.damping:.4g} J, contact {self.contact:.4g} J. "
+            f"The balance is open by {self.gap:.3g} J at most, {100.0 * self.share:.2g} % of {self.moved:.4g} J moved; "
+            f"in the end time integration (steps of {self.step:.3g} s) took {self.left:.3g} J"
+        )
+
+
+def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
+    """Balance along a motion.
+
+    Parameters
+    ----------
+    course : DriveCourse
+        See `boom_twin.analysis.simulate.course_of`.
+    dt : float
+        Longest step, s. Where journals touch and part, each is divided by `FINER`, so that powers in impacts can be summed.
+
+    Returns
+    -------
+    EnergyBalance
+    """
+    energies, start = Energies(course.plan), course.start
+    first, heavy = energies.total(start), energies.weight(start)
+    before, sums = energies.powers(start), np.zeros(3)
+    gap, left, moved, longest = 0.0, 0.0, energies.kinetic(start), 0.0
+    impacts = bool((course.plan.tables.clearances.linear == 0).any())
+    for step, state in course.states(dt, FINER if impacts else 1):
+        now = energies.powers(state)
+        sums += 0.5 * step * (before + now)
+        before, longest = now, max(longest, step)
+        left = float(sums[0] - sums[1] - sums[2] - (energies.total(state) - first))
+        gap = max(gap, abs(left))
+        moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
+    work, damping, lost = sums.tolist()
+    return EnergyBalance(work, work - damping - lost - left, damping, lost, gap, left, float(moved), longest)
+
+
+def numerical_damping(frequency: float, step: float, rho: float) -> float:
+    """Damping ratio that generalised-alpha gives an undamped oscillator of `frequency` (Hz) in steps of `step` (s).
+
+    From the spectral radius R of its amplification matrix over (x, v, p): -ln R over the angle turned. About (omega h)^3.
+    """
+    am, af, w = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0), (2.0 * math.pi * frequency * step) ** 2
+    gamma = 0.5 + af - am
+    beta = 0.25 * (gamma + 0.5) ** 2
+    after = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - af) * w, 0.0, 1.0 - am]])  # of x', h v', h^2 p'
+    before = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-af * w, 0.0, -am]])
+    own = np.linalg.eigvals(np.linalg.solve(after, before))
+    principal = own[int(np.argmax(np.abs(own.imag)))]
+    return float(-math.log(abs(principal)) / abs(np.angle(principal)))

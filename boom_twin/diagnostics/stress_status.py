@@ -1,0 +1,53 @@
+"""Status of the bending stresses: the newest at every station, with what sensors know beyond the prediction."""
+
+from __future__ import annotations
+
+import math
+
+from ..analysis.bending_moments import stations
+from ..analysis.bending_stress import BendingStressModel
+from ..scene.schema import Scene
+from ..types import Estimate, Prediction
+from .levels import ComponentJudge, Evaluation, Status
+
+MEGA = 1e6
+
+
+def stress_watch(scene: Scene) -> StressWatch | None:
+    """Of a boom, if any of its sections bends."""
+    return StressWatch(BendingStressModel(scene)) if stations(scene) else None
+
+
+class StressWatch:
+    """Tells moments and stresses at the newest stamp; they are never a fault, for no limit is known.
+
+    Parameters
+    ----------
+    model : BendingStressModel
+    """
+
+    def __init__(self, model: BendingStressModel) -> None:
+        self._model, self._judge = model, ComponentJudge("bending")
+        self._newest: tuple[Prediction, Estimate | None] | None = None
+
+    def took(self, prediction: Prediction, estimate: Estimate | None) -> None:
+        """Go on with a prediction and the estimate beside it."""
+        self._newest = prediction, estimate
+
+    def status(self, at: Evaluation) -> Status | None:
+        """Moment, stress and its deviation at every station; None before the first prediction."""
+        if self._newest is None:
+            return None
+        found, judge, places = self._model.at(*self._newest), self._judge, self._model.stations
+        judge.begin(at)
+        columns = found.moments, found.stresses, found.stress_sigmas
+        for station, moment, stress, sigma in zip(places, *columns, strict=True):
+            name = f"section_{station.section + 1}_at_{station.place:.2f}_m"
+            judge.note(f"{name}_Nm", float(moment))
+            judge.note(f"{name}_MPa", float(stress) / MEGA)
+            judge.note(f"{name}_sigma_MPa", float(sigma) / MEGA)
+        most = int(abs(found.stresses).argmax())
+        sigma = float(found.stress_sigmas[most])
+        deviation = f" ± {sigma / MEGA:.2g}" if math.isfinite(sigma) else ""
+        largest = f"{found.stresses[most] / MEGA:.3g}{deviation} MPa"
+        return judge.finish(f"{largest} in {places[most].name}, the most of all stations")

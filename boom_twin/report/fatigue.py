@@ -1,0 +1,126 @@
+"""Fatigue of a session: rainflow counts of the bending stress at every station, and damage by the S-N curves of EN 1993-1-9.
+
+A cycle of range S (Pa) does the damage 1/N(S) (Palmgren and Miner). For a detail category C, the range endured 2e6 times,
+
+    N = 2e6 (C/S)^3  above the range D that is endured 5e6 times,   5e6 (D/S)^5  below it,   endless below L, endured 1e8 times.
+
+Cycles are counted by the package `rainflow` (ASTM E1049). Of a long session they are counted stretch by stretch: cycles that
+have closed are added up, and turning points of those that have not go before the next stretch, which leaves the count as it is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+
+import numpy as np
+
+from ..analysis.bending_moments import Station, stations
+from ..analysis.bending_stress import section_moduli
+from ..errors import UsageError
+from ..plots import History
+from ..scene.schema import Scene
+from ..types import Array
+
+CATEGORY = 71.0
+"""MPa, of a welded box where nothing better is known."""
+CUT_OFF = 1e8
+KNEE = 5e6
+GIVEN = 2e6
+SMALL = 1e5  # Pa; cycles below are noise, and do no damage in any category
+BIN = 1e4  # Pa, in which ranges are added up
+
+
+@dataclass(frozen=True)
+class Fatigue:
+    """Of one station in one session: cycles above `SMALL`, their largest range (Pa), damage; 1 is the end of its life."""
+
+    station: Station
+    cycles: float
+    largest: float
+    damage: float
+
+
+def endured(ranges: Array, category: float) -> Array:
+    """Cycles N that a detail of `category` (MPa) endures at stress `ranges` (Pa), shape (k,); infinite below the cut-off."""
+    knee = 1e6 * category * (GIVEN / KNEE) ** (1.0 / 3.0)
+    limit = knee * (KNEE / CUT_OFF) ** 0.2
+    with np.errstate(divide="ignore", over="ignore"):
+        steep, flat = GIVEN * (1e6 * category / ranges) ** 3, KNEE * (knee / ranges) ** 5
+    return np.where(ranges >= knee, steep, np.where(ranges >= limit, flat, np.inf))
+
+
+def damage_of(cycles: Iterable[tuple[float, float]], category: float) -> float:
+    """Damage of cycles: range (Pa) and count of each."""
+    table = np.array([*cycles], float).reshape(-1, 2)
+    return float(np.sum(table[:, 1] / endured(table[:, 0], category)))
+
+
+class RainflowCounter:
+    """Counts the cycles of a stress that comes in parts; needs the package `rainflow`."""
+
+    def __init__(self) -> None:
+        self._rainflow, self._open = _package(), np.zeros(0)
+        self._closed: Counter[int] = Counter()  # by range in `BIN`
+
+    def add(self, stress: Array) -> None:
+        """Take the next values, shape (k,), Pa."""
+        series = np.concatenate([self._open, stress])
+        left: set[int] = {0, len(series) - 1}
+        for size, _, count, start, end in self._rainflow.extract_cycles(series):
+            if count == 1.0:
+                self._closed[round(size / BIN)] += 1
+            else:
+                left |= {start, end}
+        self._open = series[sorted(left)]
+
+    def cycles(self) -> list[tuple[float, float]]:
+        """Range (Pa) and count of all so far above `SMALL`: closed cycles, and halves of those that have not closed."""
+        found = Counter({size: float(count) for size, count in self._closed.items()})
+        for size, _, count, _, _ in self._rainflow.extract_cycles(self._open):
+            found[round(size / BIN)] += count
+        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > SMALL]
+
+
+class FatigueCounter:
+    """Adds up the stretches of a session.
+
+    Parameters
+    ----------
+    scene : Scene
+    category : float
+        Detail category of all stations, MPa.
+    heights : ndarray, shape (n,), optional
+        Outer heights of the sections, m; see `boom_twin.analysis.bending_stress.section_moduli`.
+    """
+
+    def __init__(self, scene: Scene, category: float, heights: Array | None = None) -> None:
+        if not (np.isfinite(category) and category > 0.0):
+            raise UsageError(f"--fatigue {category:g}: a detail category is above 0, in MPa. Take {CATEGORY:g}.")
+        self.category, self._stations = category, stations(scene)
+        self._moduli = section_moduli(scene, heights)[[station.section for station in self._stations]]
+        self._counters = [RainflowCounter() for _ in self._stations]
+
+    def add(self, history: History) -> None:
+        """Take the next stretch in, with all its rows."""
+        for counter, stress in zip(self._counters, (history.moments / self._moduli).T, strict=True):
+            counter.add(stress)
+
+    def found(self) -> list[Fatigue]:
+        """One for every station, base to tip."""
+        rows = []
+        for station, counter in zip(self._stations, self._counters, strict=True):
+            cycles = counter.cycles()
+            count, largest = sum(count for _, count in cycles), max((size for size, _ in cycles), default=0.0)
+            rows.append(Fatigue(station, count, largest, damage_of(cycles, self.category)))
+        return rows
+
+
+def _package() -> ModuleType:
+    try:
+        return import_module("rainflow")
+    except ImportError:
+        raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.") from None
