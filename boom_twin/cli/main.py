@@ -36,6 +36,7 @@ COMMANDS: dict[str, str] = {
     "record": "record the session topics from ROS 2",
     "recover": "save what is whole of a damaged session",
     "scene": "print the default scene file",
+    "mapping": "print the default mapping of topics and sensors",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "simulate": "the boom's answer to a stroke history",

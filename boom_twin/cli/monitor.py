@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
+from .arguments import add_window, window_of
 from .main import add_session_scene, open_scene, open_session_scene, warn_incomplete
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
+    add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     parser.add_argument(
@@ -98,7 +100,7 @@ def _feed(args: Namespace) -> Iterator[Feed]:
         settings = load_settings(args.params)
         warn_incomplete(scan(args.bag))
         scene = open_session_scene(args.bag, args.scene)
-        with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline)) as feed:
+        with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline, window_of(args))) as feed:
             yield feed
         return
     from ..ros.startup import require_rclpy
