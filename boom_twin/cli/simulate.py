@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from argparse import ArgumentParser, Namespace
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_new, check_target, write_atomic
+from ..system.csv_table import read_csv
+from ..system.summary_display import numbers
 from ..types import Array
-from .main import add_scene, open_scene
+from .main import add_json, add_scene, open_scene, print_result
+
+if TYPE_CHECKING:
+    from ..analysis.simulate import Simulation
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 
@@ -22,10 +27,11 @@ FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--posture", required=True, metavar="NAME", help="the posture that the first row belongs to")
+    parser.add_argument("--posture", metavar="NAME", help="the posture that the first row must be in; else it may be any")
     parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
+    add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
     parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
@@ -44,7 +50,7 @@ def run(args: Namespace) -> int:
     if args.orbits:
         check_new(Path(args.orbits), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
-    angles = _angles_near(scene, args.posture, strokes[0])
+    angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
@@ -53,16 +59,53 @@ def run(args: Namespace) -> int:
     text = StringIO(newline="")
     np.savetxt(text, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     write_atomic(Path(args.out), text.getvalue())
-    for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
-        print(f"{name}: contact lost {lost} times")
+    print_result(args.json, as_json(result, args.out), as_text(result, args.out))
     if args.orbits:
-        from ..plots.history import Orbits
-        from ..plots.posture import orbits_picture
-
-        gaps = compile_scene(scene).tables.clearances.gap
-        orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-        orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
+        _draw_orbits(args, scene, result)
     return 0
+
+
+def as_json(result: Simulation, out: str) -> dict[str, object]:
+    """What was done, and its figures."""
+    x, y = result.tip[:, 0], result.tip[:, 1]
+    return {
+        "out": out,
+        "rows": len(result.times),
+        "duration_s": float(result.times[-1] - result.times[0]),
+        "stroke_m": result.strokes[0],
+        "tip_start_m": [x[0], y[0]],
+        "tip_end_m": [x[-1], y[-1]],
+        "tip_travel_m": float(np.hypot(np.diff(x), np.diff(y)).sum()),
+        "tip_acceleration_max_m_s2": float(np.hypot(*result.tip_acceleration[:, :2].T).max()),
+        "cylinder_force_max_N": np.abs(result.cylinder_forces).max(axis=0),
+        "lost_contacts": [f"{name}: {lost}" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)],
+        "warnings": result.doubts,
+    }
+
+
+def as_text(result: Simulation, out: str) -> list[str]:
+    """The same for people."""
+    told = as_json(result, out)
+    (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
+    lines = [
+        f"started at rest   strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
+        f"followed          {told['rows']} rows, {told['duration_s']:g} s; the tip went {told['tip_travel_m']:.3f} m "
+        f"to x {end_x:.4f} m, y {end_y:.4f} m",
+        f"tip acceleration  {told['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
+        f"cylinder forces   {numbers(told['cylinder_force_max_N'], 1e-3)} kN at most",
+    ]
+    lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
+    return [*lines, out]
+
+
+def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
+    from ..compiler.compile import compile_scene
+    from ..plots.history import Orbits
+    from ..plots.posture import orbits_picture
+
+    gaps = compile_scene(scene).tables.clearances.gap
+    orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
+    orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
 
 
 def _earlier(joints: int) -> bytes:
@@ -78,29 +121,10 @@ def read_drive(path: Path, n: int) -> tuple[Array, Array]:
     UsageError
         The file cannot be read, has another header, no rows, or a value that is not a number; says where.
     """
-    wanted = ["t_s", *(f"stroke_{i + 1}_m" for i in range(n))]
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}. Give a CSV file.") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise UsageError(f"{path}: no column {', '.join(missing)} in its first line. It needs {','.join(wanted)}.")
-    if len(rows) < 2:
-        raise UsageError(f"{path}: no rows below the header. Give at least one.")
-    places = [header.index(name) for name in wanted]
-    table = np.array([[_number(path, line, row, header, place) for place in places] for line, row in enumerate(rows[1:], 2)])
-    return table[:, 0], table[:, 1:]
-
-
-def _number(path: Path, line: int, row: list[str], header: list[str], place: int) -> float:
-    try:
-        return float(row[place])
-    except (ValueError, IndexError):
-        value = row[place] if place < len(row) else ""
-        raise UsageError(f"{path}, line {line}: {header[place]} = {value!r} is not a number.") from None
+    table = read_csv(path, UsageError)
+    strokes = [f"stroke_{i + 1}_m" for i in range(n)]
+    table.require(["t_s", *strokes])
+    return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in strokes])
 
 
 def _angles_near(scene: Scene, posture: str, first: Array) -> Array:
