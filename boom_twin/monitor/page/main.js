@@ -3,6 +3,7 @@
 import { theme } from "./colours.js";
 import { Lamps } from "./lamps.js";
 import { Connection } from "./connection.js";
+import { Path } from "./path.js";
 import { Shape } from "./shape.js";
 import { HtmlTable } from "./html_table.js";
 import { SpectrumTab } from "./spectrum.js";
@@ -18,7 +19,7 @@ const get = id => document.getElementById(id);
 const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
 new Actions(connection, view);
 const spectrum = new SpectrumTab(connection, new HtmlTable("peaks"));
-const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), state: null };
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
