@@ -29,7 +29,7 @@ setup(
         ("share/boom_twin/launch", files("boom_twin/launch")),
     ],
     python_requires=">=3.11",
-    classifiers=[f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12)],
+    classifiers=[f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)],
     install_requires=[  # the lowest versions have no flaw that is known and met here: docs/security.md says why each
         "numpy>=2.0,<3",
         "scipy>=1.13,<2",

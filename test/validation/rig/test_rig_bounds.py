@@ -1,9 +1,11 @@
-"""The bundled moves on other booms, and bounds and list of the faults; needs no Exudyn."""
+"""The bundled moves on other booms, and bounds and list of the faults."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+
+pytest.importorskip("exudyn")
 
 from boom_twin import load_scene
 from boom_twin.errors import UsageError
