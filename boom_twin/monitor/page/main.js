@@ -51,6 +51,12 @@ function pause() {
 for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => selectTab(button.dataset.tab);
 get("window").onchange = event => view.set({ window: Number(event.target.value), zoom: null });
 get("pause").onclick = pause;
+get("sessions").onchange = event => connection.send({ do: "session", value: Number(event.target.value) });
+
+function showSessions({ sessions, session }) {
+  get("sessions").hidden = sessions.length < 2;
+  get("sessions").replaceChildren(...sessions.map((name, i) => new Option(name, i, i === session, i === session)));
+}
 get("all").onclick = () => view.set({ zoom: null });
 get("theme").onclick = () => setTheme(theme() === "dark" ? "light" : "dark");
 
@@ -66,6 +72,7 @@ addEventListener("keydown", event => {
 
 connection.addEventListener("hello", event => {
   get("title").textContent = event.detail.title;
+  showSessions(event.detail);
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
 });
