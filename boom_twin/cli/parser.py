@@ -13,13 +13,12 @@ class DefaultsFormatter(RawDescriptionHelpFormatter):
 
     def _get_help_string(self, action: Action) -> str | None:
         told, default = action.help, action.default
-        if not told or told == SUPPRESS or not action.option_strings or default in (None, False, SUPPRESS, [], ()):
+        if not told or told == SUPPRESS or not action.option_strings or default is False or default in (None, SUPPRESS, [], ()):
             return told
-        text = " ".join(map(str, default)) if isinstance(default, list | tuple) else f"{default}"
-        for known in (text, f"{default:g}" if isinstance(default, float) else text):
-            if f"({known}" in told or f"default {known}" in told:
-                return told
-        return f"{told} ({text.replace('%', '%%')})"
+        text = " ".join(map(str, default)) if isinstance(default, list | tuple) else str(default)
+        text = f"{default:g}" if isinstance(default, float) else text
+        is_told = f"({text}" in told or f"default {text}" in told
+        return told if is_told else f"{told} ({text.replace('%', '%%')})"
 
 
 class CommandParser(ArgumentParser):

@@ -146,7 +146,7 @@ def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
             target = start + (high - low) * (move.target - float(at[model])) / wide[model]
             low_end, high_end = min(start, low + free), max(start, high - free)
             moves.append(replace(move, cylinder=i, target=min(max(target, low_end), high_end)))
-    times = np.linspace(0.0, BUNDLED_DURATION, 1201)
+    times = np.linspace(0.0, BUNDLED_DURATION, 401)
     while True:
         programme = Programme(tuple(first.tolist()), tuple(moves))
         fastest = float(tip_speed(scene, programme, times).max())
