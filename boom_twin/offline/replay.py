@@ -329,7 +329,8 @@ def _truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list
     if truth is None or window == WHOLE:
         return truth
     first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
-    return truth.since((begin - first) * NANO)
+    found = truth.since((begin - first) * NANO)
+    return found if len(found.times) else None
 
 
 def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
