@@ -115,4 +115,4 @@ setInterval(() => lamps.watch(timeline.isReplay), 500);
 setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 selectTab("traces");
 requestAnimationFrame(draw);
-Object.assign(window, { twin: { connection, view, timeline, delays, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious
+Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious

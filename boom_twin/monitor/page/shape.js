@@ -43,7 +43,7 @@ export class Shape {
     this.drawLine(frame, trace, { colour: lineColour(2), width: 2 });
     forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
     this.drawLoad(frame, large.at(-1));
-    placeLabels(frame);
+    this.drawn = { boxes: placeLabels(frame), segments: frame.segments };
     this.describe(bent.at(-1), straight.at(-1), bent, forces);
   }
 
@@ -126,7 +126,7 @@ function placeLabels({ context, segments, labels, width, height }) {
     context.fillStyle = themeColour("ink");
     context.fillText(label, left + 3, bottom - 4);
   }
-  labels.boxes = taken;
+  return taken;
 }
 
 const POINTER = 30, HIGH = 18; // px
