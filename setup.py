@@ -29,6 +29,7 @@ setup(
         ("share/boom_twin/launch", files("boom_twin/launch")),
     ],
     python_requires=">=3.11",
+    classifiers=[f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)],
     install_requires=[  # the lowest versions have no flaw that is known and met here: docs/security.md says why each
         "numpy>=2.0,<3",
         "scipy>=1.13,<2",
@@ -55,6 +56,11 @@ setup(
             "aiohttp>=3.14.4,<4",
             "playwright>=1.56,<2",
             "rainflow>=3.2,<4",
+            "pandas>=2.2,<4",
+            "nbclient>=0.10,<1",
+            "nbformat>=5.10,<6",
+            "ipykernel>=6.29,<8",
+            "argcomplete>=3.4,<4",
         ],
         "peers": ["exudyn>=1.13,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
@@ -66,6 +72,8 @@ setup(
             "bokeh>=3.4,<4",  # Dask's dashboard
         ],
         "fatigue": ["rainflow>=3.2,<4"],
+        "notebook": ["pandas>=2.2,<4", "nbclient>=0.10,<1", "nbformat>=5.10,<6", "ipykernel>=6.29,<8"],
+        "completion": ["argcomplete>=3.4,<4"],
         "docs": [
             "mkdocs>=1.6.1,<2",
             "mkdocs-material>=9.8.1,<10",

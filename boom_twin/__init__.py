@@ -3,11 +3,14 @@
 The stable API, imported when first used::
 
     load_scene(path=None) -> Scene                      the boom; without a path, the default scene
-    statics(scene, strokes=None, posture=None)          equilibrium, forces, natural frequencies
+    statics(scene, "arch")                              equilibrium, forces, natural frequencies; or at strokes
     simulate(scene, times, strokes, dt=1e-3)            the boom's answer to given strokes
     undeflected(scene, strokes, joint_rates=None)       a state that a simulation may start from
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session through the twin
+    TimeWindow(start, duration)                         a part of a session, for replay
+
+A scene is a `Scene`, a file, a dict with its keys, or None for the default one.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from .analysis.equilibrium import statics
     from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
+    from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .offline.replay import replay
     from .scene import Scene, load_scene
@@ -33,6 +37,7 @@ _HOMES = {
     "Scene": "scene",
     "Settings": "config.settings",
     "Stream": "types",
+    "TimeWindow": "bag.time_window",
     "Twin": "twin.twin",
     "load_scene": "scene",
     "load_settings": "config.settings",
@@ -48,6 +53,7 @@ __all__ = [
     "Scene",
     "Settings",
     "Stream",
+    "TimeWindow",
     "Twin",
     "load_scene",
     "load_settings",

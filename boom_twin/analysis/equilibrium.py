@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
@@ -19,6 +19,8 @@ from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
+from ..system.summary_display import SummaryDisplay, numbers
 from ..types import Array
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
@@ -119,8 +121,8 @@ FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full loa
 LEAST_SHARE = 1e-3  # of the clearances, likewise
 
 
-@dataclass(frozen=True)
-class Equilibrium:
+@dataclass(frozen=True, repr=False)
+class Equilibrium(SummaryDisplay):
     """A boom at rest. n sections.
 
     Attributes
@@ -155,16 +157,28 @@ class Equilibrium:
         """Natural frequencies, Hz, ascending, shape (modes,)."""
         return np.array([mode.frequency for mode in self.modes])
 
+    def summary_rows(self) -> dict[str, str]:
+        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        return {
+            "tip": f"{numbers(self.tip)} m",
+            "deflection": f"{numbers(self.tip - self.tip_rigid, 1e3)} mm",
+            "cylinder forces": f"{numbers(self.cylinder_forces, 1e-3)} kN",
+            "frequencies": f"{numbers(self.frequencies)} Hz",
+            "doubts": "; ".join(self.doubts) or "none",
+        }
 
-def statics(scene: Scene, strokes: Array | None = None, posture: str | None = None, modes: int = 6) -> Equilibrium:
+
+def statics(
+    scene: SceneSource = None, strokes: ArrayLike | str | None = None, posture: str | None = None, modes: int = 6
+) -> Equilibrium:
     """Equilibrium under gravity at absolute `strokes` (m), shape (n,), or at a named `posture` of the scene.
 
     Parameters
     ----------
-    scene : Scene
-        The boom.
-    strokes : ndarray, shape (n,), optional
-        Absolute strokes, m.
+    scene : Scene, path or mapping
+        The boom, of n sections: a `Scene`, a scene file, a dict with its keys; None: the default scene.
+    strokes : array_like, shape (n,), or str, optional
+        Absolute strokes, m; or the name of a posture.
     posture : str, optional
         A posture of the scene; just one of strokes and posture is given.
     modes : int
@@ -182,13 +196,16 @@ def statics(scene: Scene, strokes: Array | None = None, posture: str | None = No
     SolverError
         No stable equilibrium was found.
     """
+    scene = as_scene(scene)
+    if isinstance(strokes, str):
+        strokes, posture = None, strokes if posture is None else None
     if (strokes is None) == (posture is None):
         raise UsageError("give either strokes or a posture, not both and not neither.")
     if posture is not None:
         strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
     else:
         assert strokes is not None
-        strokes = checked_strokes(scene, strokes)
+        strokes = checked_strokes(scene, np.asarray(strokes, dtype=float))
         angles = joint_angles_of_strokes(scene, strokes)
     plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))

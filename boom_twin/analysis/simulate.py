@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
+from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .drive import DriveCourse, Run
 from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
@@ -22,8 +25,8 @@ from .initial_state import InitialState, started, state_now
 RHO = 0.8
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(SummaryDisplay):
     """Results at the rows of the drive. m rows, n sections.
 
     Attributes
@@ -79,7 +82,13 @@ class Simulation:
         return "; ".join(self.doubts)
 
     def columns(self) -> dict[str, Array]:
-        """Columns of the CSV that `boom_twin simulate` writes, by name with unit."""
+        """The motion as the columns of the CSV that `boom_twin simulate` writes.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (m,)
+            By name with unit.
+        """
         n = self.strokes.shape[1]
         columns = {"t_s": self.times}
         columns |= {f"stroke_{i + 1}_m": self.strokes[:, i] for i in range(n)}
@@ -92,9 +101,22 @@ class Simulation:
                 columns[f"{name.replace('.', '_')}_{quantity}"] = self.pins[:, k, j]
         return columns
 
+    def to_frame(self) -> Any:
+        """`columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
+        return data_frame(self.columns())
+
+    def summary_rows(self) -> dict[str, str]:
+        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        return {
+            "rows": f"{len(self.times)}, {self.times[-1] - self.times[0]:.4g} s",
+            "tip at the end": f"{numbers(self.tip[-1, :2])} m",
+            "tip acceleration": f"{float(np.hypot(*self.tip_acceleration[:, :2].T).max()):.3g} m/s² at most",
+            "doubts": self.doubt or "none",
+        }
+
 
 def simulate(
-    scene: Scene,
+    scene: SceneSource,
     times: Array,
     strokes: Array,
     dt: float = 1e-3,
@@ -107,8 +129,8 @@ def simulate(
 
     Parameters
     ----------
-    scene : Scene
-        The boom, of n sections.
+    scene : Scene, path or mapping
+        The boom, of n sections; as for `boom_twin.statics`.
     times : ndarray, shape (m,)
         s, increasing, any spacing.
     strokes : ndarray, shape (m, n)
@@ -138,6 +160,7 @@ def simulate(
     SolverError
         No equilibrium at the first row, or a step that failed; says when.
     """
+    scene = as_scene(scene)
     course = course_of(scene, times, strokes, dt, angles, rho, start)
     times, strokes, plan = course.times, course.strokes, course.plan
     own = course.stepped(np.arange(len(times)), dt)

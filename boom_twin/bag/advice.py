@@ -22,9 +22,8 @@ SKEW = 0.05
 JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
 
 
-def names_missing(info: BagInfo, joints: int) -> list[str]:
+def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Names of the channels of a scene with so many joints that are not in (all) messages, one sentence for each."""
-    topics = mapping_of(info.session.path).topics
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
         own = _names(topics, stream, joints)
@@ -35,9 +34,8 @@ def names_missing(info: BagInfo, joints: int) -> list[str]:
     return found
 
 
-def names_extra(info: BagInfo, joints: int) -> list[str]:
+def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Names that no replay with so many joints uses, one sentence for each."""
-    topics = mapping_of(info.session.path).topics
     used: dict[str, set[str]] = {}
     for stream, tally in _joint_states(info, topics):
         used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
@@ -49,18 +47,19 @@ def names_extra(info: BagInfo, joints: int) -> list[str]:
     ]
 
 
-def missing(info: BagInfo, joints: int, scene: str = "") -> list[str]:
+def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
     """What is missing for a replay, one sentence for each, the worst first; empty when all is there.
 
     Parameters
     ----------
     info : BagInfo
+    topics : Topics
+        How its topics and sensors are named.
     joints : int
         Of the scene.
     scene : str
         Where that was taken from.
     """
-    topics = mapping_of(info.session.path).topics
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
     found = list(other_names(topics, names, joints, scene))
     for stream, topic in topics.inputs.items():
@@ -76,19 +75,19 @@ def missing(info: BagInfo, joints: int, scene: str = "") -> list[str]:
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)
-    lacking = names_missing(info, joints)
+    lacking = names_missing(info, topics, joints)
     remedy = "The channel stays empty there: name the driver's own names in a mapping, see topics.yaml."
     return found + [f"{sentence}. {remedy}" for sentence in lacking]
 
 
-def remarks(info: BagInfo) -> list[str]:
+def remarks(info: BagInfo, topics: Topics) -> list[str]:
     """What else a reader should know: checksums, origin, clocks."""
     found: list[str] = []
     if not info.session.checked:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
     if info.synthetic is None:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
-    inputs = mapping_of(info.session.path).topics.inputs.values()
+    inputs = topics.inputs.values()
     known = [tally for topic in inputs if (tally := info.tally(topic.name)) and tally.skewed]
     for one, other in pairwise(known):
         apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO

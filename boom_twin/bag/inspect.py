@@ -8,16 +8,13 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
 
-from mcap.reader import NonSeekingReader
-
 from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
-from ..system.received_files import open_received
 from ..types import NANO, Stream
 from .integrity import as_bag_error
-from .mcap_records import LARGEST, chunk_at, heads
-from .mcap_summary import McapFile
 from .reader import Session, scan
+from .session_file import SessionFile
+from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
 """Different lists of names that are told apart in one topic."""
@@ -135,9 +132,9 @@ class BagInfo:
     library : str
         The program that wrote the first file, in its own words.
     compression : str
-        Of the chunks: ``zstd``, ``lz4``, ``none``, or ``no chunks``.
+        Of the chunks: ``zstd``, ``lz4``, ``none``, ..; or that the file has none.
     size : int
-        Bytes of all .mcap files.
+        Bytes of all files.
     """
 
     session: Session
@@ -157,8 +154,8 @@ class BagInfo:
         return next((each for each in self.tallies if each.name.lstrip("/") == name.lstrip("/")), None)
 
 
-def inspect(path: Path) -> BagInfo:
-    """Read a session once, one chunk in memory at a time.
+def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
+    """Read a session once; what is outside the window, which counts from its first message, is not told of.
 
     Raises
     ------
@@ -169,31 +166,23 @@ def inspect(path: Path) -> BagInfo:
     tallies = {topic.name: Tally(topic.name, topic.type, False, topic.type == _NAMED) for topic in session.topics}
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
-        _count(file, tallies)
+        _count(file, tallies, window.bounds(session.start))
     with as_bag_error(files[0].path):
-        library, compression = _writer(files[0])
+        library, compression = files[0].written_by()
     size = sum(file.path.stat().st_size for file in files)
     return BagInfo(session, tuple(tallies.values()), library, compression, size)
 
 
-def _count(file: McapFile, tallies: dict[str, Tally]) -> None:
-    """Take in all messages of one file."""
+def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:
+    """Take in the messages of one file with log times from the first to before the second bound; all are counted."""
     own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
     for key, channel in file.channels.items():
         schema = file.schemas.get(channel.schema_id)
         own[key].stamped = schema is not None and has_header(schema)
     seen: Counter[int] = Counter()
     with as_bag_error(file.path):
-        for key, log_time, data in heads(file.path, file.chunks):
+        for key, log_time, data in file.heads():
             seen[key] += 1
-            own[key].add(log_time, data)
+            if bounds[0] <= log_time < bounds[1]:
+                own[key].add(log_time, data)
     file.check_counts("statistics", file.counts, "read", seen)
-
-
-def _writer(file: McapFile) -> tuple[str, str]:
-    """The program that wrote a file, and the compression of its first chunk."""
-    with open_received(file.path) as stream:
-        library = NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library
-        if not file.chunks:
-            return library, "no index of chunks"
-        return library, chunk_at(stream, file.chunks[0]).compression or "none"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from io import SEEK_END
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
 from mcap.records import (
     Channel,
     Chunk,
@@ -27,11 +28,14 @@ from mcap.records import (
 from mcap.stream_reader import StreamReader
 
 from ..errors import BagError
+from ..messages.message_block import MessageBlock
 from ..system.received_files import open_received
+from .chunk_reader import message_blocks
 from .chunk_table import ChunkPlace, ChunkTable
-from .integrity import FOOTER, as_bag_error, check_ends, compare_counts
-from .mcap_records import LARGEST, by_topic, records
+from .integrity import FOOTER, as_bag_error, check_ends
+from .mcap_records import LARGEST, chunk_at, heads, records
 from .recovery.chunk_head import head_at
+from .session_file import SessionFile
 
 PROFILE = "ros2"
 NOTES = "boom_twin"
@@ -39,39 +43,37 @@ NOTES = "boom_twin"
 
 
 @dataclass(frozen=True, slots=True)
-class McapFile:
-    """What one file holds.
+class McapFile(SessionFile):
+    """What one .mcap file holds.
 
     Attributes
     ----------
-    path : Path
-    channels : dict of int to Channel
-    schemas : dict of int to Schema
-    counts : dict of int to int
-        Messages by channel.
-    start, end : int
-        First and last log time in nanoseconds; 0 without messages.
     chunks : ChunkTable
         Empty when the file has no complete index and must be read as a whole.
-    checked : bool
-        Whether its messages are under a checksum and counted. If not, a flipped bit can pass without notice.
-    notes : dict of str to str
     """
 
-    path: Path
-    channels: dict[int, Channel]
-    schemas: dict[int, Schema]
-    counts: dict[int, int]
-    start: int
-    end: int
     chunks: ChunkTable
-    checked: bool
-    notes: dict[str, str]
 
-    def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
-        """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
-        one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
-        compare_counts(self.path, source, one, other, two)
+    @property
+    def storage(self) -> str:
+        """See `SessionFile`."""
+        return "mcap"
+
+    def written_by(self) -> tuple[str, str]:
+        """See `SessionFile`."""
+        with open_received(self.path) as stream:
+            library = NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library
+            if not self.chunks:
+                return library, "no index of chunks"
+            return library, chunk_at(stream, self.chunks[0]).compression or "none"
+
+    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+        """See `SessionFile`; in the order of the file, one chunk in memory."""
+        return heads(self.path, self.chunks)
+
+    def blocks(self) -> Iterator[MessageBlock]:
+        """See `SessionFile`."""
+        return message_blocks(self.path, self.chunks)
 
 
 def summarise(path: Path) -> McapFile:
@@ -204,7 +206,7 @@ def _walk(path: Path) -> McapFile:
                 told = record
     start = start if counts else 0
     checked = is_summed or (chunks_summed == {True} and told is not None)
-    held = McapFile(path, channels, schemas, dict(counts), start, end, ChunkTable(), checked, _notes(notes))
+    held = McapFile(path, channels, schemas, dict(counts), start, end, checked, _notes(notes), ChunkTable())
     if told is not None:
         held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
     return held

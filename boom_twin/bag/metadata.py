@@ -22,6 +22,8 @@ FILE_NAME = "metadata.yaml"
 VERSION = 9
 """Of the format, as Jazzy writes it."""
 
+STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
+"""Storages of rosbag2 that are read, by the ends of their files' names."""
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
@@ -100,9 +102,9 @@ def read_metadata(path: Path) -> BagMetadata:
     Raises
     ------
     BagError
-        If it is no such file, or its bag is stored in a way that is not read here (sqlite3, compressed as a whole).
+        If it is no such file, or its bag is stored in a way that is not read here (compressed as a whole).
     """
-    remedy = "Move it away: the .mcap files can be read without it."
+    remedy = "Move it away: the files of the session can be read without it."
     document = read_plain(path, BagError, remedy, received=True)
     try:
         metadata = BagMetadata.model_validate((document or {})[_ROOT])
@@ -111,9 +113,9 @@ def read_metadata(path: Path) -> BagMetadata:
     except ValidationError as error:
         faults = "; ".join(f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in error.errors())
         raise BagError(f"{path}: not rosbag2 metadata ({faults}). {remedy}") from error
-    if metadata.storage_identifier != "mcap":
+    if metadata.storage_identifier not in STORAGES.values():
         raise BagError(
-            f"{path}: storage_identifier = {metadata.storage_identifier!r}: only mcap is read. "
+            f"{path}: storage_identifier = {metadata.storage_identifier!r}: only {' and '.join(STORAGES.values())} are read. "
             "Convert the bag with `ros2 bag convert` or `rosbags-convert`."
         )
     if metadata.compression_mode.lower() not in ("", "none"):

@@ -1,6 +1,6 @@
 """Read a recorded session: its files, what it holds, and its messages decoded in the order of their log times.
 
-A session is a rosbag2 directory, a directory of .mcap files without ``metadata.yaml``, or a bare .mcap.
+A session is a rosbag2 directory, a directory of its files without ``metadata.yaml``, or a file of `boom_twin.bag.storages`.
 """
 
 from __future__ import annotations
@@ -22,28 +22,32 @@ from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import holds_file, sha256_of
 from .integrity import compare_counts
-from .mcap_summary import McapFile, summarise
-from .metadata import FILE_NAME, BagMetadata, read_metadata
+from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata
 from .session_blocks import SessionBlocks
+from .session_file import CDR, SessionFile
 from .session_sheet import incompleteness
+from .storages import summarise
+from .time_window import WHOLE, TimeWindow
 
 
-def mcap_files(path: Path) -> list[Path]:
-    """The files of a session without metadata; BagError if there are none."""
+def stored_files(path: Path, storage: str = "") -> list[Path]:
+    """The files of a session without metadata, or those of one storage only; BagError if there are none."""
     if path.is_file():
         return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
     if not path.is_dir():
-        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or an .mcap file.")
-    files = sorted(path.glob("*.mcap"))
+        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or a file of a session.")
+    kinds = {suffix for suffix, kind in STORAGES.items() if kind.startswith(storage)}
+    files = sorted(file for file in path.iterdir() if file.suffix in kinds)
     if not files:
         there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
-        raise BagError(f"{path}: no .mcap file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
+        wanted = " or ".join(sorted(kinds, reverse=True))
+        raise BagError(f"{path}: no {wanted} file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
     return files
 
 
 def check_listed(path: Path, named: list[Path]) -> None:
     """Refuse to pass over a file that a recorder left behind when it was killed."""
-    if unlisted := sorted(file.name for file in path.glob("*.mcap") if file not in named):
+    if unlisted := sorted(file.name for file in path.iterdir() if file.suffix in STORAGES and file not in named):
         raise BagError(
             f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
             "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
@@ -61,7 +65,7 @@ def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
             raise
     named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else []
     there = [file for file in named if holds_file(file)]
-    others = [] if there and not any(path.glob("*.mcap")) else mcap_files(path)
+    others = [] if there and not any(path.glob("*.mcap")) else stored_files(path, "mcap")
     return there + sorted(set(others) - set(there), key=_by_number), metadata
 
 
@@ -70,7 +74,7 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
-def check_encoding(file: McapFile, topics: Container[str]) -> None:
+def check_encoding(file: SessionFile, topics: Container[str]) -> None:
     """Refuse what is not CDR, or was written with another definition of a message than Jazzy's.
 
     Raises
@@ -82,7 +86,7 @@ def check_encoding(file: McapFile, topics: Container[str]) -> None:
         if channel.topic not in topics:
             continue
         place = f"{file.path}: topic {channel.topic}"
-        if channel.message_encoding != "cdr":
+        if channel.message_encoding != CDR:
             raise BagError(f"{place}: message encoding {channel.message_encoding!r}: only cdr is read. Use ROS 2.")
         for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id]).items():
             known = jazzy().fielddefs.get(name)
@@ -121,7 +125,7 @@ class Session:
     ----------
     path : Path
         As it was given.
-    files : tuple of McapFile
+    files : tuple of SessionFile
     topics : tuple of TopicInfo
         By name.
     start, end : int
@@ -138,7 +142,7 @@ class Session:
     """
 
     path: Path
-    files: tuple[McapFile, ...]
+    files: tuple[SessionFile, ...]
     topics: tuple[TopicInfo, ...]
     start: int
     end: int
@@ -176,7 +180,7 @@ def scan(path: Path) -> Session:
 
 def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else mcap_files(path)
+    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else stored_files(path)
     files = tuple(summarise(file) for file in named)
     if metadata is not None:
         check_listed(path, named)
@@ -199,7 +203,7 @@ def _scan(path: Path, incomplete: str) -> Session:
     )
 
 
-def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, Any]]:
     """The messages of some topics by log time.
 
     Parameters
@@ -208,6 +212,8 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
         From `scan`.
     wanted : dict of str to str
         Message type by topic, with or without the leading slash.
+    window : TimeWindow, optional
+        Only the messages in it.
 
     Returns
     -------
@@ -218,14 +224,15 @@ def read(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int
     ------
     BagError
         At once if a topic is missing, empty, or of another type, encoding or definition; while iterating if a checksum
-        does not fit or a message cannot be decoded; at the end if the files did not hold what their statistics say.
+        does not fit, a message cannot be decoded, or none is in the window; at the end if the files did not hold what their
+        statistics say.
     """
-    return ((name, time, message) for name, time, _, message in read_both(session, wanted))
+    return ((name, time, message) for name, time, _, message in read_both(session, wanted, window))
 
 
-def read_both(session: Session, wanted: Mapping[str, str]) -> Iterator[tuple[str, int, bytes, Any]]:
+def read_both(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, bytes, Any]]:
     """As `read`, with the encoded message before the decoded one, which is None for a type that Jazzy does not have."""
-    return _one_by_one(read_blocks(session, wanted))
+    return _one_by_one(read_blocks(session, wanted, window))
 
 
 def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
@@ -235,17 +242,17 @@ def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
             yield blocks.sources[source].name, times[row], block.data(row), blocks.decoded(block, row)
 
 
-def read_blocks(session: Session, wanted: Mapping[str, str]) -> SessionBlocks:
+def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> SessionBlocks:
     """As `read`, many messages at a time, not decoded yet."""
     asked: dict[str, str] = {}
     for name, type_name in wanted.items():
         asked[check_topic(session, name, type_name).name] = name
     for file in session.files:
         check_encoding(file, asked)
-    return SessionBlocks(session.files, asked)
+    return SessionBlocks(session.files, asked, window)
 
 
-def _topics(path: Path, files: tuple[McapFile, ...]) -> tuple[TopicInfo, ...]:
+def _topics(path: Path, files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:
     """The topics of all files together."""
     counts: Counter[str] = Counter()
     types: dict[str, str] = {}

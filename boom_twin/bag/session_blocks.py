@@ -13,9 +13,9 @@ import numpy as np
 from ..errors import BagError
 from ..messages.message_block import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
-from .chunk_reader import message_blocks
 from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
-from .mcap_summary import McapFile
+from .session_file import SessionFile
+from .time_window import WHOLE, TimeWindow
 
 
 class Source(NamedTuple):
@@ -32,9 +32,11 @@ class SessionBlocks:
 
     Parameters
     ----------
-    files : sequence of McapFile
+    files : sequence of SessionFile
     asked : mapping of str to str
         As what each topic is asked for, by its name in the files.
+    window : TimeWindow
+        Only the messages in it.
 
     Attributes
     ----------
@@ -44,14 +46,16 @@ class SessionBlocks:
     Raises
     ------
     BagError
-        While iterating: a checksum does not fit; at the end: the files did not hold what their statistics say.
+        While iterating: a checksum does not fit, or no message is in the window; at the end: the files did not hold what their
+        statistics say.
     """
 
-    def __init__(self, files: Sequence[McapFile], asked: Mapping[str, str]) -> None:
+    def __init__(self, files: Sequence[SessionFile], asked: Mapping[str, str], window: TimeWindow) -> None:
         self.sources: list[Source] = []
+        self._window = window
         self._files = [(file, self._numbers(file, asked)) for file in files]
 
-    def _numbers(self, file: McapFile, asked: Mapping[str, str]) -> dict[int, int]:
+    def _numbers(self, file: SessionFile, asked: Mapping[str, str]) -> dict[int, int]:
         """Places in `sources` by channel; -1 for what was not asked for."""
         numbers = dict.fromkeys(file.channels, -1)
         for channel in file.channels.values():
@@ -62,7 +66,8 @@ class SessionBlocks:
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
-        return _merged([_wanted(file, numbers) for file, numbers in self._files])
+        blocks = _merged([_wanted(file, numbers) for file, numbers in self._files])
+        return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
         """One message of rosbags, None for a type that Jazzy does not have; BagError if it cannot be decoded."""
@@ -74,11 +79,11 @@ class SessionBlocks:
             raise BagError(f"{place}: {error} {REMEDY}") from error
 
 
-def _wanted(file: McapFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
+def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
     """The messages of one file whose channels have a number of 0 or more, their source; all are counted."""
     seen: Counter[int] = Counter()
     with as_bag_error(file.path):
-        for block in message_blocks(file.path, file.chunks):
+        for block in file.blocks():
             counts = np.bincount(block.sources)
             channels = np.flatnonzero(counts).tolist()
             seen.update({channel: int(counts[channel]) for channel in channels})

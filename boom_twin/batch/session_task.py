@@ -42,6 +42,8 @@ class SessionTask:
         Limits: seconds, and bytes of resident memory.
     retries : int
         How often a session that fails is tried again.
+    start, duration : float, float or None
+        The window of the session, see `boom_twin.bag.time_window.TimeWindow`.
     """
 
     key: str
@@ -57,6 +59,8 @@ class SessionTask:
     time: float
     memory: int
     retries: int
+    start: float = 0.0
+    duration: float | None = None
 
 
 def run_task(task: SessionTask) -> Row:
@@ -96,6 +100,7 @@ def row_of(task: SessionTask) -> Row:
     """
     from ..bag.reader import files_sha256
     from ..bag.session_model import scene_of
+    from ..bag.time_window import TimeWindow
     from ..config.settings import load_settings
     from ..offline.history import draw
     from ..offline.replay import replay_into
@@ -109,9 +114,12 @@ def row_of(task: SessionTask) -> Row:
     )
     assert session is not None
     scene, settings = scene_of(session, task.scene), load_settings(params)
+    window = TimeWindow(task.start, task.duration)
     evaluator = Evaluator(scene.scene, settings, baseline)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
-        result = replay_into(building, session, scene, settings, mapping=mapping, baseline=baseline, take=evaluator.add)
+        result = replay_into(
+            building, session, scene, settings, mapping=mapping, baseline=baseline, window=window, take=evaluator.add
+        )
         found = evaluator.finish(result, building.folder)
         if task.report:
             draw(result, found.history, building.folder)

@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from ..bag.session_sheet import sheet_path
+from ..bag.storages import is_session
 from ..errors import UsageError
 
 LIST = ".txt"
@@ -47,18 +48,14 @@ def _listed(file: Path) -> Iterator[Path]:
 
 
 def _matching(pattern: str) -> Iterator[Path]:
-    """The path, or the sessions that a glob fits: folders that hold one, and ``.mcap`` files."""
+    """The path, or the sessions that a glob fits: folders that hold one, and single files."""
     if not glob.has_magic(pattern) or Path(pattern).exists():
         yield Path(pattern)
         return
-    found = [path for path in map(Path, sorted(glob.glob(pattern, recursive=True))) if _is_session(path)]
+    found = [path for path in map(Path, sorted(glob.glob(pattern, recursive=True))) if is_session(path)]
     if not found:
-        raise UsageError(f"{pattern}: fits no session, a folder with .mcap files or an .mcap file. Check it, and quote it.")
+        raise UsageError(f"{pattern}: fits no session, a folder of a rosbag2 or a file of a session. Check it, and quote it.")
     yield from found
-
-
-def _is_session(path: Path) -> bool:
-    return path.suffix == ".mcap" if path.is_file() else any(path.glob("*.mcap"))
 
 
 def key_of(session: Path) -> str:

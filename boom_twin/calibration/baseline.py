@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
+from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.baseline import Baseline
@@ -68,6 +69,7 @@ def baseline_of(
     settings: Settings | None = None,
     mapping: str | Path | None = None,
     progress: Callable[[float, str], None] = lambda share, what: None,
+    window: TimeWindow = WHOLE,
 ) -> Baseline:
     """What model and sensors are off by in sessions in which all was well.
 
@@ -81,6 +83,8 @@ def baseline_of(
         Of topics and sensors; by default as the sessions were recorded.
     progress : callable, optional
         Told the share done and what comes next.
+    window : TimeWindow, optional
+        The part of each session that is used.
 
     Returns
     -------
@@ -97,7 +101,7 @@ def baseline_of(
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     progress(0.0, "reading")
     topics = common_mapping(paths, Path(mapping) if mapping else None, joints).topics
-    sessions = read_sessions(paths, topics, joints)
+    sessions = read_sessions(paths, topics, joints, window)
     mounts = topics.mounts(joints)
     names = [f"{session.name} {session.digest}" for session in sessions]
     return learn_baseline(scene, settings or Settings(), (session.samples() for session in sessions), names, mounts, progress)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bag.session_model import Mapped, mapping_of
+from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
@@ -103,6 +104,7 @@ def calibrate(
     settings: Settings | None = None,
     mapping: str | Path | None = None,
     progress: Progress = lambda share, what: None,
+    window: TimeWindow = WHOLE,
 ) -> Calibration:
     """Estimate parameters of `scene` from healthy sessions of its boom.
 
@@ -117,6 +119,8 @@ def calibrate(
         Of topics and sensors; by default as the sessions were recorded, see `boom_twin.messages.mapping`.
     progress : callable, optional
         Told the share done and what comes next.
+    window : TimeWindow, optional
+        The part of each session that is used.
 
     Returns
     -------
@@ -136,7 +140,7 @@ def calibrate(
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
-    sessions = read_sessions(paths, mapped.topics, joints)
+    sessions = read_sessions(paths, mapped.topics, joints, window)
     streams = (Stream.STROKES, *_compared(sessions))
     names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
     unknowns = unknowns_of(scene, names)

@@ -19,6 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from ..bag.joint_names import refuse_other_names
 from ..bag.reader import Session, check_topic, files_sha256, scan
+from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError
 from ..estimation.stroke_filter import corners
@@ -77,8 +78,8 @@ class MeasuredSession:
         return [sample for _, _, sample in merge(*streams, key=lambda item: item[:2])]
 
 
-def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[MeasuredSession]:
-    """Read sessions, all at once.
+def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: TimeWindow = WHOLE) -> list[MeasuredSession]:
+    """Read sessions, all at once, the same window of each.
 
     Raises
     ------
@@ -92,7 +93,7 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int) -> list[Me
     with ExitStack() as stack:
         readers = []
         for session, names in zip(sessions, wanted, strict=True):
-            readers.append(SampleReader(session.path, topics, names, joints))
+            readers.append(SampleReader(session.path, topics, names, joints, window))
             stack.callback(readers[-1].stop)
         return [_measured(session, reader, joints) for session, reader in zip(sessions, readers, strict=True)]
 

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .arguments import add_window, positive, window_of
 from .main import add_params
-from .play import positive
+from .progress import progress_of
 
 if TYPE_CHECKING:
     from ..batch.results import BatchFolder
@@ -35,6 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_params(parser)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors of all sessions; as for replay")
     parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
+    add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
     parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
@@ -96,7 +98,8 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
 
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping", "baseline")}
     contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
-    options = "\n".join([__version__, str(args.report), str(args.keep_bags), *contents])
+    window = window_of(args)
+    options = "\n".join([__version__, str(args.report), str(args.keep_bags), str(window), *contents])
     paths = {name: None if path is None else str(path.resolve()) for name, path in given.items()}
     return [
         SessionTask(
@@ -105,6 +108,8 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             out=str(folder.replay(key)),
             fingerprint=fingerprint(session, options),
             **paths,
+            start=window.start,
+            duration=window.duration,
             report=args.report,
             keep_bag=args.keep_bags,
             time=args.timeout,
@@ -124,15 +129,9 @@ def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None
 
 
 def _shown(rows: Iterator[Row], before: int, total: int) -> Iterator[Row]:
-    """The rows, with a bar on a terminal, else a line for every tenth of all."""
-    from tqdm import tqdm
-
-    if sys.stderr.isatty():
-        yield from tqdm(rows, total=total, initial=before, unit="session", desc="batch")
-        return
-    told = 10 * before // total
-    for count, row in enumerate(rows, before + 1):
+    """The rows, with their progress."""
+    progress = progress_of(total, "sessions", "batch", before)
+    for row in rows:
         yield row
-        if 10 * count // total > told:
-            told = 10 * count // total
-            print(f"{count} of {total} sessions, {10 * told} %", file=sys.stderr)
+        progress.update(1)
+    progress.close()

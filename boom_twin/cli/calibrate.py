@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
+from .arguments import add_window, window_of
 from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .progress import TenthLines
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -35,6 +37,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_params(parser)
     parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
+    add_window(parser)
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
@@ -61,7 +64,7 @@ def _learn(args: Namespace) -> int:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
     scene, settings = _scene(args), load_settings(args.params)
     with _bar() as progress:
-        learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress)
+        learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress, window_of(args))
     write_baseline(learnt, args.baseline, _credit(args), args.force)
     if args.json:
         print_json(learnt.model_dump(exclude={"mean", "covariance", "names"}))
@@ -105,7 +108,7 @@ def _calibrate(args: Namespace) -> int:
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()
     with _bar() as progress:
-        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress)
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress, window_of(args))
     wall = time.perf_counter() - began
     credit = _credit(args)
     refuse_overwriting(args.out, _sources(args), args.force)  # again: somebody may have put something there meanwhile
@@ -126,14 +129,28 @@ def _calibrate(args: Namespace) -> int:
 def _bar() -> Iterator[Progress]:
     from tqdm import tqdm
 
+    if not sys.stderr.isatty():
+        yield _tell_tenths(TenthLines(100, "%", "calibrate"))
+        return
     form = "{l_bar}{bar}| {elapsed}"
-    with tqdm(total=100, desc="calibrate", disable=None, bar_format=form, file=sys.stderr) as bar:
+    with tqdm(total=100, desc="calibrate", bar_format=form, file=sys.stderr) as bar:
 
         def progress(share: float, what: str) -> None:
             bar.set_description_str(f"calibrate: {what}", refresh=False)
             bar.update(100.0 * share - bar.n)
 
         yield progress
+
+
+def _tell_tenths(lines: TenthLines) -> Progress:
+    done = 0.0
+
+    def progress(share: float, what: str) -> None:
+        nonlocal done
+        lines.update(100.0 * share - done)
+        done = 100.0 * share
+
+    return progress
 
 
 def _draw(found: Calibration, out: Path) -> list[Path]:

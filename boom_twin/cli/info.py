@@ -8,42 +8,46 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO
+from .arguments import SESSION, add_mapping, add_window, window_of
 from .main import add_json, add_session_scene, open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally
-    from ..bag.session_model import SessionScene
+    from ..bag.session_model import Mapped, SessionScene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
+    parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session_scene(parser)
+    add_mapping(parser)
+    add_window(parser)
     add_json(parser)
 
 
 def run(args: Namespace) -> int:
     """Read the session once and tell."""
     from ..bag.inspect import inspect
+    from ..bag.session_model import mapping_of
 
-    info = inspect(Path(args.bag))
+    info = inspect(Path(args.bag), window_of(args))
     scene = open_session_scene(args.bag, args.scene)
-    told = as_json(info, scene)
+    told = as_json(info, scene, mapping_of(info.session.path, args.mapping))
     print_result(args.json, told, as_text(info, scene, told))
     return 0
 
 
-def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
+def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped) -> dict[str, Any]:
     """All that is known; lists have one entry for each of ``topics``."""
     from ..bag.advice import missing, names_extra, names_missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
-    joints = len(scene.scene.joints)
+    topics, joints = mapped.topics, len(scene.scene.joints)
     return {
         "path": str(session.path),
-        "storage": "mcap",
+        "storage": session.files[0].storage,
         "compression": info.compression,
-        "profile": "ros2",
+        "profile": "ros2" if session.files[0].storage == "mcap" else None,
         "distro": (metadata.ros_distro or None) if metadata else None,
         "metadata_version": metadata.version if metadata else None,
         "library": info.library,
@@ -68,12 +72,13 @@ def as_json(info: BagInfo, scene: SessionScene) -> dict[str, Any]:
         "log_minus_stamp_min_s": [_skew(tally, 0) for tally in tallies],
         "log_minus_stamp_mean_s": [_skew(tally, 2) for tally in tallies],
         "log_minus_stamp_max_s": [_skew(tally, 1) for tally in tallies],
-        "names_missing": names_missing(info, joints),
-        "names_extra": names_extra(info, joints),
+        "names_missing": names_missing(info, topics, joints),
+        "names_extra": names_extra(info, topics, joints),
         "scene": scene.source,
+        "mapping": mapped.source,
         "scene_sha256": scene.sha256,
-        "missing_for_replay": missing(info, joints, scene.source),
-        "remarks": remarks(info),
+        "missing_for_replay": missing(info, topics, joints, scene.source),
+        "remarks": remarks(info, topics),
     }
 
 
@@ -95,13 +100,15 @@ def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[st
     files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
     distro = told["distro"] or "distribution not noted"
     version = f"metadata version {told['metadata_version']}" if told["metadata_version"] else "no metadata.yaml"
+    profile = f"; profile {told['profile']}" if told["profile"] else ""
     lines = [
         f"session    {told['path']}",
-        f"stored     mcap, {files}, {told['bytes'] / 2**20:.2f} MiB, compression {told['compression']}, "
+        f"stored     {told['storage']}, {files}, {told['bytes'] / 2**20:.2f} MiB, compression {told['compression']}, "
         f"checksums {'present' if told['checksums'] else 'absent'}",
-        f"written    by {told['library'] or 'an unnamed program'}; profile ros2, {distro}, {version}",
+        f"written    by {told['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
         f"made by    {told['origin'] or 'origin not noted'} ({made})",
         f"scene      {told['scene']}, sha256 {told['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
+        f"mapping    {told['mapping']}",
         f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages",
         "",
         *_table(info),

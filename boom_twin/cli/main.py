@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """The console script: picks the command, and turns errors of the input into one message and an exit code.
 
 A command imports what it needs when it runs, so that help and usage errors are told at once.
@@ -11,7 +12,7 @@ import gc
 import json
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
@@ -21,6 +22,9 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO, cast
 from .. import __version__
 from ..errors import BoomTwinError, Fault
 from ..system.terminal_text import PrintableStream
+from .examples import epilog_of
+from .parser import CommandParser
+from .quiet import QuietStream
 
 if TYPE_CHECKING:
     from ..bag.reader import Session
@@ -37,6 +41,7 @@ COMMANDS: dict[str, str] = {
     "record": "record the session topics from ROS 2",
     "recover": "save what is whole of a damaged session",
     "scene": "print the default scene file",
+    "mapping": "print the default mapping of topics and sensors",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "envelope": "sag, forces, frequencies, stresses over the whole range",
@@ -55,6 +60,9 @@ COMMANDS: dict[str, str] = {
 COLLECT_AFTER = 100_000
 
 DESCRIPTION = "Digital twin of a concrete placing boom."
+EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
+COMPLETING = "_ARGCOMPLETE"
+"""Set in the environment by a shell that asks for completions."""
 
 
 class Command(Protocol):
@@ -99,7 +107,8 @@ def _run(arguments: Sequence[str]) -> int:
     try:
         args = _parser(arguments).parse_args(arguments)
         name = f" {args.command}"
-        code = _command(args.command).run(args)
+        with redirect_stderr(cast(TextIO, QuietStream(sys.stderr)) if args.quiet else sys.stderr):
+            code = _command(args.command).run(args)
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # the reader of stdout has gone; let nothing be flushed to it at exit
@@ -121,19 +130,35 @@ def _command(name: str) -> Command:
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:
     """The parser of all commands; only the module of the command that is named gets imported."""
-    parser = ArgumentParser(prog="boom_twin", description=DESCRIPTION)
+    parser = CommandParser(prog="boom_twin", description=DESCRIPTION, epilog=EXIT_CODES)
     parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
-        own = commands.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
-        if name in arguments:
+        about = purpose[0].upper() + purpose[1:] + "."
+        own = commands.add_parser(name, help=purpose, description=about, epilog=epilog_of(name))
+        own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
+        if is_completing or name in arguments:
             _command(name).add_arguments(own)
+    if is_completing:
+        _complete(parser)
     return parser
 
 
+def _complete(parser: ArgumentParser) -> None:
+    """Answer the shell's question for what may follow, where argcomplete is installed, and end."""
+    try:
+        from argcomplete import autocomplete
+    except ImportError:
+        sys.exit(1)
+    autocomplete(parser)
+
+
 def add_scene(parser: ArgumentParser) -> None:
-    """The scene file, as a positional argument; without it, the default scene."""
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help="scene file (YAML); without it, the default scene")
+    """The scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
+    either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
 
 
 def add_session_scene(parser: ArgumentParser) -> None:

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
+from .arguments import add_window, window_of
 from .main import add_session_scene, open_scene, open_session_scene, warn_incomplete
 
 if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
+    from ..monitor.data.session_list import SessionList
 
 
 PORT = 8420
@@ -31,12 +33,18 @@ BACKLOG = 128
 
 def add_arguments(parser: ArgumentParser) -> None:
     """What is shown, to whom, and what may be done."""
-    parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
+    parser.add_argument(
+        "--bag",
+        metavar="BAG",
+        type=Path,
+        help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
+    )
     add_session_scene(parser)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
     usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
+    add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     parser.add_argument(
@@ -64,8 +72,12 @@ def run(args: Namespace) -> int:
     write_log()
     recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
-        with _feed(args) as feed:
-            _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
+        if args.bag is not None:
+            with closing(_sessions(args)) as sessions:
+                _serve(args, sessions.feed, ViewerActions(sessions.feed, frozenset(args.allow)), sessions)
+        else:
+            with _live_feed(args) as feed:
+                _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
     finally:
         if recording is not None:
             recording.close()
@@ -86,21 +98,26 @@ def _lower_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
-@contextmanager
-def _feed(args: Namespace) -> Iterator[Feed]:
-    """Of a session, or live."""
-    if args.bag is not None:
-        from ..bag.reader import scan
-        from ..config.settings import load_settings
-        from ..monitor.data.bag_feed import bag_feed
+def _sessions(args: Namespace) -> SessionList:
+    """The sessions of ``--bag``, the first one open."""
+    from ..bag.reader import scan
+    from ..config.settings import load_settings
+    from ..monitor.data.bag_feed import bag_feed
+    from ..monitor.data.session_list import SessionList, sessions_in
 
-        print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
-        settings = load_settings(args.params)
-        warn_incomplete(scan(args.bag))
-        scene = open_session_scene(args.bag, args.scene)
-        with closing(bag_feed(args.bag, scene, settings, args.mapping, args.baseline)) as feed:
-            yield feed
-        return
+    settings, window = load_settings(args.params), window_of(args)
+
+    def open_feed(path: Path) -> Feed:
+        warn_incomplete(scan(path))
+        return bag_feed(path, open_session_scene(path, args.scene), settings, args.mapping, args.baseline, window)
+
+    print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
+    return SessionList(sessions_in(args.bag), open_feed)
+
+
+@contextmanager
+def _live_feed(args: Namespace) -> Iterator[Feed]:
+    """Of the topics."""
     from ..ros.startup import require_rclpy
 
     require_rclpy()
@@ -114,7 +131,7 @@ def _feed(args: Namespace) -> Iterator[Feed]:
             yield feed
 
 
-def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
+def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | None = None) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl
@@ -122,7 +139,7 @@ def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
 
     access = AccessControl(args.host)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access), access.token))
+        asyncio.run(_run(args, Server(feed, actions, access, sessions), access.token))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 

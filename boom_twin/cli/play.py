@@ -7,7 +7,7 @@ import select
 import sys
 import termios
 import tty
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -18,6 +18,7 @@ from ..bag.reader import scan
 from ..errors import BoomTwinError
 from ..ros.startup import require_rclpy
 from ..types import NANO
+from .arguments import not_negative, positive
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
@@ -28,7 +29,7 @@ BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The session, and how it is played."""
-    parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory or .mcap file")
+    parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory, or a file: .mcap, .db3, .bag of ROS 1, .csv")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
     parser.add_argument("--duration", type=positive, metavar="S", help="seconds of the session to play (all)")
@@ -101,25 +102,6 @@ def _check_listeners(unmatched: list[str], topics: int, wait: float) -> None:
             f"nobody listened within {wait:g} s. Start twin_node, check ROS_DOMAIN_ID, or play anyway with --wait 0."
         )
     print(f"warning: nobody listens to {', '.join(unmatched)}", file=sys.stderr)
-
-
-def positive(text: str) -> float:
-    """A number above 0."""
-    value = not_negative(text)
-    if value == 0.0:
-        raise ArgumentTypeError(f"{text}: must be > 0")
-    return value
-
-
-def not_negative(text: str) -> float:
-    """A finite number of at least 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise ArgumentTypeError(f"{text}: not a number") from None
-    if not 0.0 <= value < float("inf"):
-        raise ArgumentTypeError(f"{text}: must be >= 0 and finite")
-    return value
 
 
 class Keys:

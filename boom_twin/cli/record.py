@@ -20,8 +20,8 @@ from ..errors import BagError, BoomTwinError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
 from ..ros.startup import require_rclpy
+from .arguments import positive
 from .main import tell
-from .play import positive
 
 if TYPE_CHECKING:
     from ..ros.bag.recorder import Count

@@ -4,29 +4,32 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
+from .arguments import SESSION, add_mapping, add_window, window_of
 from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .progress import progress_of
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
     from ..offline.recording import Stretch
-    from ..offline.replay import ProgressBar, Replay
+    from ..offline.replay import Replay
     from ..report.evaluation import Evaluation
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap")
+    parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session_scene(parser)
+    add_window(parser)
     place = "folder for summary.json, bag/ and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_params(parser)
-    told = "topics and sensors; by default as the session was recorded, else topics.yaml"
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help=told)
+    add_mapping(parser)
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
@@ -51,7 +54,7 @@ def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
     from ..config.settings import load_settings
     from ..offline.replay import replay_into
-    from ..offline.sample_table import SampleTable, check_kind
+    from ..offline.sample_table import SampleTable, check_kind, table_file
     from ..report.evaluation import Evaluator
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
@@ -62,12 +65,20 @@ def run(args: Namespace) -> int:
     heights = section_heights(args.section_height, scene.scene)
     settings = load_settings(args.params)
     check_kind(args.table)
+    window = window_of(args)
+    if window.start:
+        print(
+            f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that",
+            file=sys.stderr,
+        )
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
-        options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
+        progress = partial(progress_of, unit="messages", name="replay")
+        options = settings, progress, args.mapping, not args.no_changes, not args.no_health, args.baseline, window
         evaluator = Evaluator(scene.scene, settings, args.baseline, heights, args.fatigue)
-        table = SampleTable(building.folder, args.table, len(scene.scene.joints)) if args.table else None
+        joints, name = len(scene.scene.joints), f"samples.{args.table}"
+        table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
 
         def take(stretch: Stretch) -> None:
             evaluator.add(stretch)
@@ -78,7 +89,8 @@ def run(args: Namespace) -> int:
         found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:
-            files.append(table.finish().name)
+            table.finish()
+            files.append(name)
     warn_incomplete(result.session)
     if args.json:
         print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
@@ -102,13 +114,6 @@ def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionSce
         subject = Subject(result, found, scene.scene, scene.source, known)
         files.append(write_report(subject, out))
     return files
-
-
-def _progress(total: int) -> ProgressBar:
-    from tqdm import tqdm
-
-    bar: ProgressBar = tqdm(total=total, unit="msg", desc="replay", disable=None, mininterval=0.2)
-    return bar
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:

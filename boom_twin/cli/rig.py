@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import Action, ArgumentParser, Namespace
 from pathlib import Path
+from typing import NoReturn
 
 from .. import __version__
 from ..errors import UsageError
@@ -29,6 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); @20+5..40: from 20 s on, "
         "over 5 s, until 40 s; may be repeated"
     )
+    parser.add_argument("--list-faults", action=ListFaults, nargs=0, help="print all faults with their sizes, and end")
     parser.add_argument("--fault", action="append", default=[], metavar="CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]", help=fault)
     load = (
         "a load at the tip that no twin knows of: pump:FREQUENCY:HEIGHT[:CHANGE_OVER] (Hz, N, s; pulses, upward) or "
@@ -38,6 +40,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     sensors = "what is recorded beside strokes, of angles, imu and forces, with commas between them (default angles,imu)"
     parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
     parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
+
+
+class ListFaults(Action):
+    """Prints the faults and ends, whatever else is given."""
+
+    def __call__(self, parser: ArgumentParser, *_: object) -> NoReturn:
+        """See `argparse.Action`."""
+        from ..validation.rig.faults import listing
+
+        print("\n".join(listing()))
+        parser.exit()
 
 
 def _recorded(text: str) -> set[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from argparse import ArgumentParser, Namespace
 from io import StringIO
@@ -14,11 +13,15 @@ import numpy as np
 from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_new, check_target, write_atomic
+from ..system.csv_table import read_csv
+from ..system.summary_display import numbers
 from ..types import Array
-from .main import add_scene, open_scene
+from .main import add_json, add_scene, open_scene, print_result
 
 if TYPE_CHECKING:
+    from ..analysis.energy_balance import EnergyBalance
     from ..analysis.initial_state import InitialState
+    from ..analysis.simulate import Simulation
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 
@@ -26,11 +29,12 @@ FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    told = "the posture that the first row belongs to; not needed with a file of --start"
+    told = "the posture that the first row must be in; else it may be any"
     parser.add_argument("--posture", metavar="NAME", help=told)
     parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
+    add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
     parser.add_argument("--check", action="store_true", help="print the balance of energy along the motion, stepped once more")
@@ -56,7 +60,7 @@ def run(args: Namespace) -> int:
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
-    angles = _angles(args, scene, strokes[0])
+    angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
     start = _start(args, scene, strokes[0], angles)
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
     for doubt in result.doubts:
@@ -66,29 +70,13 @@ def run(args: Namespace) -> int:
     text = StringIO(newline="")
     np.savetxt(text, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     write_atomic(Path(args.out), text.getvalue())
-    for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
-        print(f"{name}: contact lost {lost} times")
     if args.save_state:
         write_state(Path(args.save_state), result.end)
-    if args.check:
-        print(f"{energy_balance(course_of(scene, times, strokes, args.dt, angles, start=start), args.dt)}.")
+    balance = energy_balance(course_of(scene, times, strokes, args.dt, angles, start=start), args.dt) if args.check else None
+    print_result(args.json, as_json(result, args.out, balance), as_text(result, args.out, args.start, balance))
     if args.orbits:
-        from ..plots.history import Orbits
-        from ..plots.posture import orbits_picture
-
-        gaps = compile_scene(scene).tables.clearances.gap
-        orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-        orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
+        _draw_orbits(args, scene, result)
     return 0
-
-
-def _angles(args: Namespace, scene: Scene, first: Array) -> Array | None:
-    """Joint angles (rad) next to which the motion starts; None where a file says all of it."""
-    if args.posture is not None:
-        return _angles_near(scene, args.posture, first)
-    if args.start in ("rest", "undeflected"):
-        raise UsageError(f"--posture: not given, and the boom starts {args.start} in one. Name that of the first row.")
-    return None
 
 
 def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:
@@ -108,6 +96,54 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
     return undeflected(scene, first, rates, angles)
 
 
+def as_json(result: Simulation, out: str, balance: EnergyBalance | None) -> dict[str, object]:
+    """What was done, and its figures; with the balance of energy where it was asked for."""
+    x, y = result.tip[:, 0], result.tip[:, 1]
+    told: dict[str, object] = {
+        "out": out,
+        "rows": len(result.times),
+        "duration_s": float(result.times[-1] - result.times[0]),
+        "stroke_m": result.strokes[0],
+        "tip_start_m": [x[0], y[0]],
+        "tip_end_m": [x[-1], y[-1]],
+        "tip_travel_m": float(np.hypot(np.diff(x), np.diff(y)).sum()),
+        "tip_acceleration_max_m_s2": float(np.hypot(*result.tip_acceleration[:, :2].T).max()),
+        "cylinder_force_max_N": np.abs(result.cylinder_forces).max(axis=0),
+        "lost_contacts": [f"{name}: {lost}" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)],
+        "warnings": result.doubts,
+    }
+    if balance is not None:
+        names = ("work", "change", "damping", "contact", "gap", "left")
+        told |= {f"energy_{name}_J": getattr(balance, name) for name in names} | {"energy_gap_share": balance.share}
+    return told
+
+
+def as_text(result: Simulation, out: str, start: str, balance: EnergyBalance | None) -> list[str]:
+    """The same for people."""
+    told = as_json(result, out, balance)
+    (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
+    began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
+    lines = [
+        f"{began}  strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
+        f"followed          {told['rows']} rows, {told['duration_s']:g} s; the tip went {told['tip_travel_m']:.3f} m "
+        f"to x {end_x:.4f} m, y {end_y:.4f} m",
+        f"tip acceleration  {told['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
+        f"cylinder forces   {numbers(told['cylinder_force_max_N'], 1e-3)} kN at most",
+    ]
+    lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
+    return [*lines, *([] if balance is None else [f"{balance}."]), out]
+
+
+def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
+    from ..compiler.compile import compile_scene
+    from ..plots.history import Orbits
+    from ..plots.posture import orbits_picture
+
+    gaps = compile_scene(scene).tables.clearances.gap
+    orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
+    orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
+
+
 def _earlier(joints: int) -> bytes:
     """How a file of results begins, and no drive."""
     return ",".join(["t_s", *(f"stroke_{i + 1}_m" for i in range(joints)), "joint_1_rad,"]).encode()
@@ -121,29 +157,10 @@ def read_drive(path: Path, n: int) -> tuple[Array, Array]:
     UsageError
         The file cannot be read, has another header, no rows, or a value that is not a number; says where.
     """
-    wanted = ["t_s", *(f"stroke_{i + 1}_m" for i in range(n))]
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}. Give a CSV file.") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise UsageError(f"{path}: no column {', '.join(missing)} in its first line. It needs {','.join(wanted)}.")
-    if len(rows) < 2:
-        raise UsageError(f"{path}: no rows below the header. Give at least one.")
-    places = [header.index(name) for name in wanted]
-    table = np.array([[_number(path, line, row, header, place) for place in places] for line, row in enumerate(rows[1:], 2)])
-    return table[:, 0], table[:, 1:]
-
-
-def _number(path: Path, line: int, row: list[str], header: list[str], place: int) -> float:
-    try:
-        return float(row[place])
-    except (ValueError, IndexError):
-        value = row[place] if place < len(row) else ""
-        raise UsageError(f"{path}, line {line}: {header[place]} = {value!r} is not a number.") from None
+    table = read_csv(path, UsageError)
+    strokes = [f"stroke_{i + 1}_m" for i in range(n)]
+    table.require(["t_s", *strokes])
+    return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in strokes])
 
 
 def _angles_near(scene: Scene, posture: str, first: Array) -> Array:

@@ -102,6 +102,10 @@ class ViewerActions:
             "record": self._record,
         }
 
+    def of(self, feed: Feed) -> ViewerActions:
+        """The same for another feed."""
+        return ViewerActions(feed, self.permitted, self._recording)
+
     @property
     def is_recording(self) -> bool:
         """Whether a recording that was started here runs."""

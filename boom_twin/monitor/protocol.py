@@ -13,7 +13,7 @@ offset  type                   meaning
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
 ======  =====================  ==========================================================================
 
-A spectrum has one column for each column of the table that its number names; a spectrogram one for each of
+A spectrum has two columns, for the directions that the message ``lines`` before it names; a spectrogram one for each of
 `boom_twin.monitor.data.spectrum.FREQUENCIES`. All else is JSON in text messages, with a key
 ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``load``, ``answer``.
 """

@@ -9,12 +9,14 @@ from pathlib import Path
 
 from aiohttp import web
 
+from ..errors import BoomTwinError
 from .access_control import POLICY, AccessControl
 from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .viewer import Viewer
+from .data.session_list import SessionList
+from .viewer import SessionChoice, Viewer
 
 PAGE = Path(__file__).parent / "page"
 MOST_VIEWERS = 16
@@ -38,10 +40,14 @@ class Server:
     feed : Feed
     actions : ViewerActions
     access : AccessControl
+    sessions : SessionList, optional
+        What viewers may choose from; `feed` is the one that is open.
     """
 
-    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl) -> None:
+    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
         self._feed, self._actions, self._access = feed, actions, access
+        self._sessions = sessions
+        self._opening: asyncio.Task[None] | None = None
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
@@ -80,7 +86,8 @@ class Server:
             await socket.prepare(request)
             if isinstance(request.protocol, Connection):
                 request.protocol.become_viewer()
-            await Viewer(socket, self._feed, self._actions, self._analyst).serve()
+            choice = None if self._sessions is None else SessionChoice(self._sessions, self._choose)
+            await Viewer(socket, self._feed, self._actions, self._analyst, choice).serve()
         finally:
             self._viewers.discard(socket)
         return socket
@@ -106,6 +113,25 @@ class Server:
         while self._feed.end is None:
             await self._analyst.spectrum_at(self._feed.store.newest)
             await asyncio.sleep(PEAK_PERIOD)
+
+    def _choose(self, index: int) -> str:
+        """Begin to open another session, for all viewers; says so."""
+        assert self._sessions is not None
+        if self._opening is not None and not self._opening.done():
+            return "a session is being opened already"
+        self._opening = asyncio.create_task(self._open(self._sessions, index))
+        return f"opening {self._sessions.names[index]} .."
+
+    async def _open(self, sessions: SessionList, index: int) -> None:
+        """Show another session: its viewers' sockets are closed, and their pages connect again."""
+        try:
+            self._feed = await asyncio.to_thread(sessions.open, index)
+        except BoomTwinError as error:
+            self._feed.trouble = str(error)
+            return
+        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed)
+        for socket in set(self._viewers):
+            await socket.close()
 
     async def _close_viewers(self, application: web.Application) -> None:
         for socket in set(self._viewers):

@@ -9,14 +9,16 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections.abc import Callable
 from math import inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from .actions import ViewerActions
 from .data.analyst import Analyst
 from .data.feed import Feed, Playback
+from .data.session_list import SessionList
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
@@ -36,6 +38,13 @@ MOST_REQUESTS = 40
 """Requests of a page in a second."""
 
 
+class SessionChoice(NamedTuple):
+    """The sessions of a monitor, and what opens another one by its place among them; that says what is done."""
+
+    sessions: SessionList
+    choose: Callable[[int], str]
+
+
 class Viewer:
     """Serves one WebSocket until it is closed.
 
@@ -45,10 +54,19 @@ class Viewer:
         Prepared.
     feed, actions, analyst
         Common to all viewers.
+    choice : SessionChoice, optional
+        Where there are several sessions.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, feed: Feed, actions: ViewerActions, analyst: Analyst) -> None:
-        self._socket, self._feed, self._actions, self._analyst = socket, feed, actions, analyst
+    def __init__(
+        self,
+        socket: web.WebSocketResponse,
+        feed: Feed,
+        actions: ViewerActions,
+        analyst: Analyst,
+        choice: SessionChoice | None = None,
+    ) -> None:
+        self._socket, self._feed, self._actions, self._analyst, self._choice = socket, feed, actions, analyst, choice
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
@@ -75,6 +93,8 @@ class Viewer:
                 "end": feed.end,
                 "permitted": sorted(self._actions.permitted),
                 "history": HISTORY,
+                "sessions": [] if self._choice is None else self._choice.sessions.names,
+                "session": 0 if self._choice is None else self._choice.sessions.index,
             }
         )
         last = time.monotonic()
@@ -198,6 +218,8 @@ class Viewer:
         if not isinstance(request, dict):
             raise ValueError("not a request")
         play = self._playback
+        if request.get("do") == "session":
+            return self._choose(request["value"])
         if request.get("do") in ("seek", "speed", "hold"):
             if play is None:
                 raise ValueError("not a recorded session")
@@ -207,6 +229,11 @@ class Viewer:
             self._control_playback(play, request["do"], value)
             return None
         return self._actions.act(request)
+
+    def _choose(self, index: Any) -> dict[str, Any]:
+        if self._choice is None or type(index) is not int or not 0 <= index < len(self._choice.sessions.names):
+            raise ValueError("no such session")
+        return {"kind": "answer", "do": "session", "done": True, "words": self._choice.choose(index)}
 
     def _control_playback(self, play: Playback, what: str, value: float) -> None:
         if what == "seek":

@@ -60,6 +60,11 @@ class TipTruth:
         times = (stamps - first) * NANO + self.times[0]
         return float(np.sqrt(np.mean(np.sum((told - self.at(times, true)) ** 2, axis=1))))
 
+    def since(self, offset: float) -> TipTruth:
+        """What is from `offset` (s) after its beginning on."""
+        kept = self.times >= self.times[0] + offset - 0.5 * NANO
+        return TipTruth(self.times[kept], self.position[kept], self.acceleration[kept], self.load[kept])
+
     def at(self, times: Array, values: Array) -> Array:
         """One of the truth's arrays at other times, shape (k, 2)."""
         return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])

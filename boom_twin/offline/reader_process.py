@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks, scan
+from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BoomTwinError
 from ..messages.block_decoder import BlockDecoder, DecodedBlock, together
 from ..messages.message_block import MessageBlock
@@ -96,6 +97,8 @@ class SampleReader:
         The input topics to be read.
     joints : int
         Of the scene.
+    window : TimeWindow, optional
+        The part of the session that is read.
 
     Attributes
     ----------
@@ -103,9 +106,9 @@ class SampleReader:
         Of the decoder, once the iteration has ended.
     """
 
-    def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int) -> None:
+    def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
         self._pipe = Pipe(__name__)
-        self._pipe.send((path, topics, wanted, joints))
+        self._pipe.send((path, topics, wanted, joints, window))
         self._joints = joints
         self.oddities: Counter[str] = Counter()
 
@@ -140,7 +143,9 @@ class SampleReader:
         self._pipe.stop()
 
 
-def items_of(path: Path, topics: Topics, wanted: list[str], joints: int) -> Iterator[SampleBlock | Change | int | Counter[str]]:
+def items_of(
+    path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow
+) -> Iterator[SampleBlock | Change | int | Counter[str]]:
     """What goes up the pipe, as `SampleReader` is to give it; a whole number is that of the None, the last are the oddities.
 
     Raises
@@ -151,7 +156,7 @@ def items_of(path: Path, topics: Topics, wanted: list[str], joints: int) -> Iter
     heard: dict[str, list[Stream]] = topics.heard
     session = scan(path)
     changes = recorded_changes(session, topics)
-    blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted})
+    blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted}, window)
     streams = [heard[source.name] for source in blocks.sources]
     decoder = BlockDecoder(joints, topics, streams, blocks.decoded)
     yield from _batches(_in_turn(blocks, decoder, changes, [Stream.STROKES in group for group in streams]))

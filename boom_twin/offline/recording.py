@@ -57,7 +57,7 @@ class Stretch:
     first : int
         Stamp of the first prediction of the session, ns.
     samples : list of SampleBlock
-        That were read meanwhile; not kept of a session that is one stretch.
+        That were read meanwhile.
     """
 
     joints: int
@@ -195,9 +195,8 @@ class Recording:
             self._complete()
 
     def add_samples(self, samples: SampleBlock) -> None:
-        """Keep samples for the stretch, if it is to be given away."""
-        if self._take is not None:
-            self._samples.append(samples)
+        """Keep samples for the stretch."""
+        self._samples.append(samples)
 
     def close(self) -> None:
         """Complete the last stretch; to be called once, after the last `add`."""

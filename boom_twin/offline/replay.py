@@ -21,27 +21,33 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..bag.joint_names import refuse_other_names
-from ..bag.reader import Session, scan
+from ..bag.reader import Session, read, scan
 from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of
 from ..bag.session_sheet import SessionSheet
+from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
+from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
+from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .reader_process import SampleReader
 from .recording import Recording, Stretch
+from .refused_strokes import RefusedStrokes
+from .sample_table import RowsInMemory, SampleTable, columns_of
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
@@ -63,8 +69,8 @@ GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
 
-@dataclass(frozen=True)
-class Replay:
+@dataclass(frozen=True, repr=False)
+class Replay(SummaryDisplay):
     """Result of a replay: the numbers of ``summary.json``, and all that was predicted.
 
     Attributes
@@ -84,10 +90,44 @@ class Replay:
     session: Session
     truth: TipTruth | None
 
+    def columns(self) -> dict[str, Array]:
+        """A row for every stroke stamp: predicted, measured, residuals, estimate.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (k,)
+            The columns of ``boom_twin replay --table csv``, by name with unit; NaN where there is no value.
+
+        Raises
+        ------
+        ValueError
+            The stretches were given away, see `replay_into`.
+        """
+        stretch, rows = self.recording.whole, RowsInMemory()
+        table = SampleTable(rows, stretch.joints)
+        table.add(stretch)
+        table.finish()
+        return dict(zip(columns_of(stretch.joints), np.concatenate(rows.parts).T, strict=True))
+
+    def to_frame(self) -> Any:
+        """`columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
+        return data_frame(self.columns())
+
+    def summary_rows(self) -> dict[str, str]:
+        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        told = self.summary
+        return {
+            "session": str(self.session.path),
+            "lasts": f"{told['duration_s']:.1f} s, {told['samples']} samples, {told['dropped']} left out",
+            "replayed": f"{told['realtime_factor']:.1f} times as fast as real time",
+            "tip acceleration": f"{told['tip_acceleration_max_m_s2']:.3g} m/s² at most",
+            "alarms": "; ".join(map(alarm_as_text, told["alarms"])) or "none",
+        }
+
 
 def replay(
     bag: str | Path,
-    scene: Scene | SessionScene | None,
+    scene: SceneSource | SessionScene,
     out: str | Path,
     settings: Settings | None = None,
     progress: Progress | None = None,
@@ -95,15 +135,16 @@ def replay(
     changes: bool = True,
     health: bool = True,
     baseline: str | Path | None = None,
+    window: TimeWindow = WHOLE,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
     Parameters
     ----------
     bag : path
-        A rosbag2 directory, a directory of .mcap files, or one .mcap.
-    scene : Scene or SessionScene, optional
-        None: the one that the session was made with, else the package's own.
+        A rosbag2 directory, a directory of its files, or one file: ``.mcap``, ``.db3``, ``.bag`` of ROS 1, ``.csv``.
+    scene : Scene, SessionScene, path or mapping, optional
+        As for `boom_twin.statics`; None: the one that the session was made with, else the package's own.
     out : path
         New, empty, or an earlier result of a replay, which is replaced once the new one is whole.
     settings : Settings, optional
@@ -120,6 +161,9 @@ def replay(
     baseline : path, optional
         What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
         one that the session was recorded with, else the package's own.
+    window : TimeWindow, optional
+        The part of the session that is replayed. The model starts at rest where that begins, whatever the boom did then; the
+        times of the result count from there.
 
     Returns
     -------
@@ -135,19 +179,20 @@ def replay(
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
-        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline)
+        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline, window)
 
 
 def replay_into(
     building: UnfinishedResult,
     bag: str | Path,
-    scene: Scene | SessionScene | None,
+    scene: SceneSource | SessionScene,
     settings: Settings | None = None,
     progress: Progress | None = None,
     mapping: str | Path | None = None,
     changes: bool = True,
     health: bool = True,
     baseline: str | Path | None = None,
+    window: TimeWindow = WHOLE,
     take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
@@ -161,16 +206,17 @@ def replay_into(
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    truth = load_truth(session.path)
+    truth = _truth_in(window, session, topics, wanted)
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
     recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
-    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building) as (ahead, behind):
+    refused = RefusedStrokes(scene)
+    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building, window) as (ahead, behind):
         twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
         ahead.wait_ready()
         behind.wait_ready()
         samples: Iterator[SampleBlock | Change | None] = iter(ahead)
-        bar = progress(sum(topic.count for name in wanted if (topic := session.find(name)) is not None)) if progress else None
+        bar = progress(_expected(session, wanted, window)) if progress else None
         began = time.perf_counter()
         if not changes:
             samples = (sample for sample in samples if not isinstance(sample, Change))
@@ -187,6 +233,7 @@ def replay_into(
                 for part in each.all if isinstance(each, Report) else (each,):
                     behind.put(part)
             if recording.is_empty:
+                refused.take(block)
                 read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
             _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
         _refuse(session, taken, other_boom.judge())
@@ -199,7 +246,7 @@ def replay_into(
         raise BagError(
             f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
             f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
-            "and stamps."
+            f"and stamps.{refused.told}"
         )
     recording.close()
     SessionSheet(__version__, taken.text).write(out / "bag")
@@ -209,6 +256,8 @@ def replay_into(
         "baseline": None if usual is None else usual.source,
         "mapping": mapped.source,
     }
+    if window != WHOLE:
+        summary |= {"window_start_s": window.start, "window_duration_s": window.duration}
     if session.incomplete:
         summary["session_incomplete"] = session.incomplete
     if errors is not None:
@@ -231,11 +280,14 @@ class _Timed:
         self.spent += time.perf_counter() - began
 
 
-def scene_for(session: Path, scene: Scene | SessionScene | None) -> SessionScene:
+def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
     """The scene that a session is read with: as given, or if it is None as `boom_twin.bag.session_model.scene_of` finds it."""
-    if scene is None:
-        return scene_of(session)
-    return scene if isinstance(scene, SessionScene) else SessionScene(scene, anew(scene), GIVEN)
+    if scene is None or isinstance(scene, str | Path):
+        return scene_of(session, scene)
+    if isinstance(scene, SessionScene):
+        return scene
+    given = as_scene(scene)
+    return SessionScene(given, anew(given), GIVEN)
 
 
 def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
@@ -265,12 +317,41 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
     return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
 
 
+def _expected(session: Session, wanted: list[str], window: TimeWindow) -> int:
+    """About how many messages are read."""
+    count = sum(topic.count for name in wanted if (topic := session.find(name)) is not None)
+    return round(count * window.share((session.end - session.start) * NANO))
+
+
+def _truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
+    """The truth of a session from the first strokes in the window on."""
+    truth = load_truth(session.path)
+    if truth is None or window == WHOLE:
+        return truth
+    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
+    found = truth.since((begin - first) * NANO)
+    return found if len(found.times) else None
+
+
+def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
+    """Stamp of the first message of strokes in a window, ns; 0 if there is none."""
+    types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
+    messages = read(session, types, window)
+    return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)
+
+
 @contextmanager
 def _ends(
-    session: Session, topics: Topics, wanted: list[str], scene: Scene, settings: Settings, building: UnfinishedResult
+    session: Session,
+    topics: Topics,
+    wanted: list[str],
+    scene: Scene,
+    settings: Settings,
+    building: UnfinishedResult,
+    window: TimeWindow,
 ) -> Iterator[tuple[SampleReader, ReportWriter]]:
     """The processes that read and write, as they start."""
-    ahead = SampleReader(session.path, topics, wanted, len(scene.joints))
+    ahead = SampleReader(session.path, topics, wanted, len(scene.joints), window)
     behind = ReportWriter(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
     try:
         yield ahead, behind

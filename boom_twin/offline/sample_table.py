@@ -19,7 +19,6 @@ from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, Array, Stream, channels_of
 from .recording import Stretch
 
-FILE_NAME = "samples"
 DELAY = 2.0
 """s for which a row waits for residuals that become known late."""
 ESTIMATED = (
@@ -91,6 +90,25 @@ class CsvFile:
         self._file.close()
 
 
+class RowsInMemory:
+    """A table that is kept.
+
+    Attributes
+    ----------
+    parts : list of ndarray, shape (k, columns)
+    """
+
+    def __init__(self) -> None:
+        self.parts: list[Array] = []
+
+    def write(self, rows: Array) -> None:
+        """See `TableFile`."""
+        self.parts.append(rows)
+
+    def close(self) -> None:
+        """See `TableFile`."""
+
+
 class ParquetFile:
     """A Parquet file; a row group for every stretch, doubles, nothing for NaN."""
 
@@ -125,32 +143,31 @@ def check_kind(kind: str | None) -> None:
         _arrow()
 
 
-class SampleTable:
-    """Writes the table of a replay into a folder; its `add` is what `boom_twin.offline.replay.replay_into` gives stretches to.
-
-    Parameters
-    ----------
-    folder : Path
-    kind : str
-        ``csv`` or ``parquet``.
-    joints : int
-        Of the boom.
-
-    Attributes
-    ----------
-    path : Path
-        Of the file.
+def table_file(path: Path, joints: int) -> TableFile:
+    """The file of a table of a boom with so many joints, by the end of its name ``.csv`` or ``.parquet``.
 
     Raises
     ------
     UsageError
         A package that is needed is not there.
     """
+    columns = columns_of(joints)
+    return CsvFile(path, columns) if path.suffix == ".csv" else ParquetFile(path, columns)
 
-    def __init__(self, folder: Path, kind: str, joints: int) -> None:
-        self.path = folder / f"{FILE_NAME}.{kind}"
-        columns = columns_of(joints)
-        self._file: TableFile = CsvFile(self.path, columns) if kind == "csv" else ParquetFile(self.path, columns)
+
+class SampleTable:
+    """Makes the table of a replay; its `add` is what `boom_twin.offline.replay.replay_into` gives stretches to.
+
+    Parameters
+    ----------
+    file : TableFile
+        Where its rows go.
+    joints : int
+        Of the boom.
+    """
+
+    def __init__(self, file: TableFile, joints: int) -> None:
+        columns, self._file = columns_of(joints), file
         self._measured, self._residuals = (
             {CODES[stream]: columns.index(names[0]) for stream, names in found.items() if names[0] in columns}
             for found in (_channel_columns(joints, "measured"), _channel_columns(joints, "residual"))
@@ -176,11 +193,10 @@ class SampleTable:
         self._ahead = stretch.samples[-2:]  # the rows of a block may come in two stretches
         self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(DELAY / NANO))))
 
-    def finish(self) -> Path:
-        """Write the rest; returns the file."""
+    def finish(self) -> None:
+        """Write the rest, and complete the file."""
         self._write(len(self._stamps))
         self._file.close()
-        return self.path
 
     def _new_rows(self, stretch: Stretch) -> Array:
         """What was predicted and estimated; the rest is empty."""

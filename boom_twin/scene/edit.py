@@ -8,8 +8,10 @@ stroke; to change it changes the bulk modulus, and with that k by the same facto
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
@@ -17,7 +19,7 @@ from ruamel.yaml.error import YAMLError
 
 from ..config.yaml_text import whole_text, with_value, yaml_text
 from ..errors import SceneError, UsageError
-from .load import structure
+from .load import examine_text, structure
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 from .yaml_reader import Place, parse, with_end_mark, words
@@ -197,7 +199,50 @@ def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
 
 def anew(scene: Scene) -> str:
     """A scene as a file without comments."""
-    return with_end_mark(whole_text(scene.model_dump(mode="json", exclude_none=True)))
+    return text_of(scene.model_dump(mode="json", exclude_none=True))
+
+
+def text_of(document: Mapping[str, Any]) -> str:
+    """A scene file with these keys; UsageError if a value is none that YAML has."""
+    try:
+        return with_end_mark(whole_text(_plain(document)))
+    except YAMLError as error:
+        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
+
+
+def _plain(value: Any) -> Any:
+    """Values of NumPy as Python's, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
+    """The scene with other values, checked as a file is: parameters by name, ``payload``, keys at the top of a scene file.
+
+    Raises
+    ------
+    UsageError
+        There is no such key or parameter.
+    SceneError
+        The scene cannot have such values.
+    """
+    for name, value in changes.items():
+        if name in ("payload", "tip.payload"):
+            scene = cast(Scene, _with(scene, ("tip",), (scene.tip or Tip()).model_copy(update={"payload": value})))
+        elif name in Scene.model_fields:
+            scene = cast(Scene, _with(scene, (name,), value))
+        elif "." in name:
+            scene = with_parameters(scene, {name: value})
+        else:
+            known = ["payload", *Scene.model_fields, *parameter_names(scene)]
+            near = get_close_matches(name, known, n=1, cutoff=0.0)[0]
+            raise UsageError(f"{name}: a scene has no such key. The nearest is {near}.")
+    with warnings.catch_warnings(action="ignore"):  # of pydantic, on values that `examine_text` then refuses
+        text = anew(scene)
+    return examine_text(text, "changed scene")[0]
 
 
 def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:

@@ -7,12 +7,14 @@ All values are SI. ``None`` means "not named, therefore not in the model".
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..errors import UsageError
 from ..kernels.elements.pin_contact import LAWS, restitution_of
+from ..system.summary_display import SummaryDisplay, numbers
 
 LARGEST = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
@@ -201,7 +203,7 @@ class Tip(Part):
     payload: NotNegative | None = None
 
 
-class Scene(Part):
+class Scene(SummaryDisplay, Part):
     """A whole boom with its base, its gravity (m/s^2) and its named postures (deg to the base's x axis).
 
     ``modes``: bending coordinates per flexible part. ``axial``: whether flexible parts stretch. ``geometric``: whether they
@@ -221,6 +223,43 @@ class Scene(Part):
     line_fill: NotNegative | None = None
     clearance: Clearance | None = None
     postures: dict[str, tuple[Finite, ...]] = {}
+
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **named: Any) -> Scene:
+        """The scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            Parameters by name, as ``{"cylinder_2.k": 2e7}``: ``cylinder_i.k``, ``cylinder_i.d``, ``section_i.EI``,
+            ``section_i.beta``, ``section_i.mass``, SI.
+        **named
+            ``payload`` (kg), or keys at the top of a scene file: ``line_fill``, ``modes``, ``gravity``, ..; None takes one out.
+
+        Returns
+        -------
+        Scene
+            A new one; this one stays as it is.
+
+        Raises
+        ------
+        UsageError
+            There is no such key or parameter.
+        SceneError
+            The scene cannot have such values: all faults.
+        """
+        from .edit import changed
+
+        return changed(self, {**(changes or {}), **named})
+
+    def summary_rows(self) -> dict[str, str]:
+        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        return {
+            "sections": f"{len(self.sections)}, {numbers([section.length for section in self.sections])} m",
+            "joints": " + ".join(joint.kind for joint in self.joints),
+            "reach": f"{self.reach:.4g} m",
+            "payload": f"{self.tip.payload if self.tip and self.tip.payload else 0:g} kg",
+            "postures": ", ".join(self.postures) or "none",
+        }
 
     @property
     def reach(self) -> float:

@@ -20,7 +20,7 @@ from ..health.monitor import HealthMonitor
 from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
-from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
 from ..types import LIMIT, NANO, Array, Change, Mount, Report, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of
@@ -47,8 +47,8 @@ class Twin:
 
     Parameters
     ----------
-    scene : Scene
-        The boom.
+    scene : Scene, path or mapping
+        The boom; as for `boom_twin.statics`.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
     mounts : sequence of Mount or None, optional
@@ -81,13 +81,13 @@ class Twin:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: SceneSource = None,
         settings: Settings | None = None,
         mounts: Sequence[Mount | None] = (),
         baseline: Baseline | None = None,
         on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
-        self._on_block = on_block
+        self._on_block, scene = on_block, as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
@@ -106,6 +106,9 @@ class Twin:
             SensorZeros(self._state, self._channels),
             ResidualBuffer(self._state.recent, self._channels),
         )
+
+    def __repr__(self) -> str:
+        return f"Twin({self.scene!r}; {len(self.mounts)} joints; {dict(self.counts) or 'nothing odd yet'})"
 
     def _new_lines(self) -> dict[Stream, StampCheck]:
         return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}

@@ -133,7 +133,7 @@ def test_an_empty_definition_is_taken_by_its_name(bag: Path, rewritten: Callable
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("storage_identifier: mcap", "storage_identifier: sqlite3", "storage_identifier = 'sqlite3'"),
+        ("storage_identifier: mcap", "storage_identifier: rocksdb", "storage_identifier = 'rocksdb'"),
         ("compression_mode: ''", "compression_mode: FILE", "compression_mode = 'FILE'"),
         ("version: 9", "version: nine", "version: Input should be a valid integer"),
         ("rosbag2_bagfile_information:", "other:", "not rosbag2 metadata"),
@@ -151,7 +151,7 @@ def test_metadata_that_cannot_be_used_is_refused(bag: Path, old: str, new: str, 
 def test_nothing_there(tmp_path: Path, content: Content) -> None:
     assert "no such file or directory" in refusal(tmp_path / "none", content)
     (tmp_path / "notes.txt").write_text("x")
-    assert "no .mcap file and no metadata.yaml in it (there is: notes.txt)" in refusal(tmp_path, content)
+    assert "no .mcap or .db3 file and no metadata.yaml in it (there is: notes.txt)" in refusal(tmp_path, content)
     shutil.copy(tmp_path / "notes.txt", tmp_path / "notes.mcap")
     assert "not an MCAP file" in refusal(tmp_path, content)
 

@@ -244,8 +244,11 @@ def test_spectrum_and_spectrogram(page: Any) -> None:
     rows = cells(page, "#peaks")[1:]
     natural = sorted(float(row[3]) for row in rows if row[3][0].isdigit())
     assert len(natural) == 6 and natural[0] == pytest.approx(1.06, abs=0.05)
-    first = next(row for row in rows if row[2] == "1")
-    assert float(first[0]) == pytest.approx(natural[0], rel=0.2) and 0.0 < float(first[1]) < 20.0
+    peaks = [row for row in rows if row[0]]
+    assert float(peaks[0][0]) == pytest.approx(natural[0], rel=0.2) and 0.0 < float(peaks[0][1]) < 20.0
+    assert not any(character.isdigit() for row in peaks for cell in row[2:] for character in cell)  # it was moved: of no mode
+    words = page.locator("#peaks caption").inner_text()
+    assert words.startswith("measured by the IMU, last 40 s") and "THE BOOM MOVED" in words
     assert page.locator("#density canvas").count() == 1
     page.keyboard.press("3")
     page.wait_for_timeout(1500)
@@ -274,6 +277,41 @@ def test_the_shape_states_exaggeration_reach_height_and_forces(page: Any, feed: 
     assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
     strongest = max(abs(value) for name, value in values.items() if name.startswith("force_"))
     assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
+
+
+def test_labels_of_cylinders_lie_over_no_line(page: Any) -> None:
+    page.keyboard.press("4")
+    page.wait_for_timeout(500)
+    script = "() => { const s = twin.shape; s.draw(); return s.drawn }"
+    drawn = page.evaluate(script)
+    assert len(drawn["boxes"]) >= 4
+    for left, top, right, bottom in drawn["boxes"]:
+        for (x0, y0), (x1, y1) in drawn["segments"]:
+            along = np.linspace(0.0, 1.0, 500)
+            x, y = x0 + along * (x1 - x0), y0 + along * (y1 - y0)
+            assert not ((x > left) & (x < right) & (y > top) & (y < bottom)).any()
+
+
+def test_the_way_of_the_tip_is_drawn_and_told(page: Any) -> None:
+    page.keyboard.press("6")
+    page.wait_for_timeout(500)
+    assert is_drawn(page, "#way")
+    assert re.search(r"now \d\.\d{3} m forward, -?\d\.\d{3} m up", page.locator("#way-words").inner_text())
+
+
+def test_no_legend_is_cut_and_a_chart_without_data_takes_no_room(page: Any) -> None:
+    for width in (1280, 820):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(600)
+        for chart in page.locator("#charts .chart:visible").all():
+            frame, legend = chart.bounding_box(), chart.locator(".u-legend").bounding_box()
+            assert legend["y"] + legend["height"] <= frame["y"] + frame["height"] + 1
+            right = max(
+                cell.bounding_box()["x"] + cell.bounding_box()["width"] for cell in chart.locator(".u-label:visible").all()
+            )
+            assert right <= frame["x"] + frame["width"] + 1
+    empty = "const e = document.createElement('div'); e.className = 'chart'; document.getElementById('charts').append(e)"
+    assert page.evaluate(f"(() => {{ {empty}; const seen = e.offsetHeight; e.remove(); return seen }})()") == 0
 
 
 def test_every_lamp_and_alarm_is_listed_and_can_be_acknowledged(page: Any, feed: Feed) -> None:
@@ -336,7 +374,7 @@ def test_dark_and_light_by_key_kept_over_a_reload(page: Any) -> None:
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (1180, 820)])
-@pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5"])
+@pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5", "6"])
 def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: str) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.keyboard.press(tab)

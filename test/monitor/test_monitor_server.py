@@ -6,6 +6,7 @@ import asyncio
 import json
 import struct
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,13 @@ from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
 
+from boom_twin import statics
+from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl, is_loopback
 from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.session_list import SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MOST_VIEWERS, Server
 from boom_twin.scene import load_scene
@@ -321,3 +325,89 @@ def test_when_time_is_set_back_the_page_begins_anew() -> None:
 
     feed = Made()
     serve(feed, talk)
+
+
+def shaken(feed: Made, frequency: float) -> None:
+    """Let an IMU feel a sine where the prediction has none."""
+    columns = [f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz"]
+    for row in range(4000):
+        felt = np.sin(2.0 * np.pi * frequency * 0.005 * row)
+        feed.store.append("force", columns, 10**18 + row * 5_000_000, (felt, felt, 0.0, 0.0, 0.05, 0.05))
+    feed.rows(2000)
+
+
+def lines_of(feed: Made) -> dict[str, Any]:
+    found: list[dict[str, Any]] = []
+
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            found.append(await until(socket, "lines"))
+
+    serve(feed, talk)
+    return found[0]
+
+
+def test_the_spectrum_is_of_what_was_measured_where_something_was() -> None:
+    feed = Made()
+    assert lines_of(feed)["source"] == "predicted"
+    shaken(feed, 3.0)
+    lines = lines_of(feed)
+    assert lines["source"] == "measured by the IMU" and lines["axes"] == ["along the last section", "across it"]
+    assert lines["peaks"][0]["frequency"] == pytest.approx(3.0, abs=0.05) and lines["moved"] == 0.0
+
+
+def test_a_spectrum_of_a_boom_that_moved_says_so_and_names_no_mode() -> None:
+    feed, rest = Made(), statics(None, "arch")
+    shaken(feed, float(rest.frequencies[1]))
+    columns = [f"stroke_{i + 1}_m" for i in range(4)]
+    arch, moved = rest.strokes.tolist(), [*rest.strokes[:3].tolist(), float(rest.strokes[3]) + 0.03]
+    for row in range(20):
+        feed.store.append("shape", columns, 10**18 + row * 10**9, arch)
+    known = lines_of(feed)
+    assert known["moved"] == 0.0 and known["peaks"][0]["mode"] == 2 and abs(known["peaks"][0]["deviation"]) < 0.02
+    feed.store.append("shape", columns, 10**18 + 19_500_000_000, moved)
+    feed.rows(20)
+    lines = lines_of(feed)
+    assert lines["moved"] == pytest.approx(0.03, rel=1e-3)
+    assert lines["peaks"][0]["mode"] is None and lines["peaks"][0]["deviation"] is None
+
+
+def test_one_of_several_sessions_is_chosen_for_all(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.mcap").touch()
+    (tmp_path / "s.csv").touch()
+    (tmp_path / "notes").mkdir()
+    assert [path.name for path in sessions_in(tmp_path)] == ["a", "b", "c", "s.csv"]
+    assert sessions_in(tmp_path / "a") == [tmp_path / "a"] and sessions_in(tmp_path / "notes") == [tmp_path / "notes"]
+
+    def opened(path: Path) -> Feed:
+        if path.name == "c":
+            raise BagError(f"{path}: damaged")
+        feed = Made(end=10.0)
+        feed.title = path.name
+        return feed
+
+    async def run() -> None:
+        sessions = SessionList(sessions_in(tmp_path), opened)
+        server = Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
+        async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
+            url = str(served.make_url("/"))
+            async with connect(session, url) as socket:
+                hello = await until(socket, "hello")
+                assert (hello["title"], hello["sessions"], hello["session"]) == ("a", ["a", "b", "c", "s.csv"], 0)
+                await socket.send_json({"do": "session", "value": 2})
+                trouble = await until(socket, "state", lambda message: bool(message["trouble"]))
+                assert trouble["trouble"].endswith("c: damaged")
+                await socket.send_json({"do": "session", "value": 1})
+                while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                    pass  # until the server lets go
+            async with connect(session, url) as socket:
+                hello = await until(socket, "hello")
+                assert (hello["title"], hello["session"]) == ("b", 1)
+                await socket.send_json({"do": "session", "value": 7})
+                while (message := await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                    pass
+                assert message.type is WSMsgType.CLOSE and message.data == 1008
+
+    asyncio.run(asyncio.wait_for(run(), 60.0))

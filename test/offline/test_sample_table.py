@@ -15,7 +15,7 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
 from boom_twin.offline import recording
 from boom_twin.offline.recording import Recording, Stretch
-from boom_twin.offline.sample_table import SampleTable, columns_of, predicted_columns
+from boom_twin.offline.sample_table import SampleTable, columns_of, predicted_columns, table_file
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import block_of
 from boom_twin.types import Sample
@@ -46,7 +46,8 @@ def samples() -> list[Sample]:
 def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Recording]:
     """The table of `samples` in stretches of so many predictions, and a recording of the whole."""
     monkeypatch.setattr(recording, "STRETCH", stretch)
-    made, found = SampleTable(folder, "csv", 4), Recording(4)
+    path = folder / "samples.csv"
+    made, found = SampleTable(table_file(path, 4), 4), Recording(4)
     stretches: list[Stretch] = []
 
     def take(each: Stretch) -> None:
@@ -62,7 +63,8 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
             found.add(report)
     parts.close()
     assert len(stretches) > 1 or stretch > 2400
-    return made.finish(), found
+    made.finish()
+    return path, found
 
 
 def read(path: Path) -> dict[str, np.ndarray]:

@@ -16,10 +16,11 @@ from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import RECOVER, result_folder
 from ..integrity import as_bag_error
-from ..mcap_records import heads, message_of, parts
+from ..mcap_records import message_of, parts
 from ..metadata import BagMetadata, Recorded
 from ..reader import RECOVERED, scan, sources
 from ..session_sheet import sheet_path
+from ..storages import SUMMARISE
 from ..writer import BagWriter
 from .definitions import FileDefinitions, definitions_of
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
@@ -89,6 +90,10 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
 
 def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     files, metadata = sources(path)
+    for file in files:
+        if file.suffix.lower() in SUMMARISE.keys() - {".mcap"}:
+            remedy = "Try `sqlite3 FILE .recover` on a copy of a .db3, `rosbag reindex` of ROS 1 on that of a .bag."
+            raise BagError(f"{file}: only .mcap files are recovered. {remedy}")
     all_definitions = []
     for file in files:
         with as_bag_error(file):
@@ -185,7 +190,7 @@ def _count(out: Path) -> Counter[str]:
     """Messages by topic, from reading all of the new session."""
     saved: Counter[str] = Counter()
     for file in scan(out).files:
-        for channel, _, _ in heads(file.path, file.chunks):
+        for channel, _, _ in file.heads():
             saved[file.channels[channel].topic] += 1
     return saved
 

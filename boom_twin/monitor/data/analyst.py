@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from math import floor
 from typing import Any
 
@@ -53,7 +53,25 @@ class ModeList:
         return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
 
 
-TABLE = "acceleration"
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """An acceleration of the tip: what it is called, its table, its two columns there, and their directions."""
+
+    name: str
+    table: str
+    columns: tuple[int, int]
+    axes: tuple[str, str]
+
+
+PREDICTION = Signal("predicted", "acceleration", (0, 1), ("forward", "up"))
+SIGNALS = (
+    Signal("measured by the IMU", "force", (0, 1), ("along the last section", "across it")),
+    Signal("estimated from all sensors", ESTIMATE, (4, 5), ("forward", "up")),
+    PREDICTION,
+)
+"""The best first: the prediction knows nothing of what shakes the boom."""
+KNOWN = 0.9
+"""Share of the rows of a signal that must have a value."""
 MATCH = 0.2
 """Relative distance up to which a peak is taken for a mode of the model."""
 
@@ -77,21 +95,26 @@ class Analyst:
         """Text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
         async with self._turn:
             store = self._feed.store
-            table = store.tables.get(TABLE)
+            signal = self._signal(time)
+            table = store.tables.get(signal.table)
             if table is None:
                 return None
             end = table.until(time)
             key = (store.generation, end)
             if self._known is None or self._known[0] != key:
                 times, values = table.rows(table.until(time - WINDOW), end)
-                found = await asyncio.to_thread(self._work_out, times, values.astype(float), self._feed.strokes(time))
+                found = await asyncio.to_thread(
+                    self._work_out, times, values[:, signal.columns].astype(float), self._feed.strokes(time)
+                )
                 if found is None:
                     return None
                 natural, result = found
-                number = list(store.tables).index(TABLE)
+                moved = self._moved(time)
+                number = list(store.tables).index(signal.table)
                 block = pack(SPECTRUM, number, result.frequencies, result.densities.astype("f4"))
-                peaks = [self._placed(asdict(peak), natural, time) for peak in result.peaks]
-                self._known = key, ({"kind": "lines", "natural": natural, "peaks": peaks}, block)
+                peaks = [self._placed(asdict(peak), natural, time, moved > MOVED) for peak in result.peaks]
+                lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
+                self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
     async def load_at(self, time: float) -> dict[str, Any] | None:
@@ -107,20 +130,38 @@ class Analyst:
         """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
         ends = STEP * np.arange(floor(after / STEP) + 1.0, floor(until / STEP) + 1.0)
         ends = ends[ends > SEGMENT]
-        table = self._feed.store.tables.get(TABLE)
+        table = self._feed.store.tables.get(PREDICTION.table)
         if table is None or not len(ends):
             return None
         times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
         found = await asyncio.to_thread(spectrogram, times, values.astype(float), ends)
         return float(ends[-1]), pack(SPECTROGRAM, 0, ends, found)
 
+    def _signal(self, time: float) -> Signal:
+        """The best acceleration of which the last segment before `time` (s) has values."""
+        for signal in SIGNALS:
+            table = self._feed.store.tables.get(signal.table)
+            if table is not None:
+                _, values = table.rows(table.until(time - SEGMENT), table.until(time))
+                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN:
+                    return signal
+        return PREDICTION
+
+    def _moved(self, time: float) -> float:
+        """By how much a cylinder moved within the window before `time` (s), at most, m."""
+        strokes = self._feed.strokes_between(time - WINDOW, time)
+        return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
+
     def _work_out(self, times: Any, values: Any, strokes: list[float]) -> tuple[list[float], Spectrum] | None:
         found = spectrum(times, values)
         return None if found is None else (self._natural(strokes), found)
 
-    def _placed(self, peak: dict[str, Any], natural: list[float], time: float) -> dict[str, Any]:
-        """A peak with the number of its mode, its deviation from the model, and how that has drifted since the first look."""
-        mode = _mode(peak["frequency"], natural)
+    def _placed(self, peak: dict[str, Any], natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
+        """A peak with the number of its mode, its deviation from the model, and how that has drifted since the first look.
+
+        None of these where the boom has moved: its frequencies are of no one posture.
+        """
+        mode = None if has_moved else _mode(peak["frequency"], natural)
         if mode is None:
             return {**peak, "mode": None, "deviation": None, "drift": None}
         ratio = peak["frequency"] / natural[mode - 1]

@@ -12,6 +12,7 @@ from typing import Any
 from ...bag.joint_names import refuse_other_names
 from ...bag.reader import Session, read, scan
 from ...bag.session_model import SessionScene, baseline_of, mapping_of
+from ...bag.time_window import WHOLE, TimeWindow
 from ...config.settings import Settings, Thresholds
 from ...diagnostics.boom_mismatch import OtherBoom
 from ...diagnostics.levels import Status
@@ -88,6 +89,7 @@ def bag_feed(
     settings: Settings,
     mapping: Path | None = None,
     baseline: Path | None = None,
+    window: TimeWindow = WHOLE,
 ) -> BagFeed:
     """Open a session.
 
@@ -103,6 +105,8 @@ def bag_feed(
         How topics and sensors are read; as for `boom_twin.offline.replay.replay`.
     baseline : Path, optional
         What is known of this rig while all is well; likewise.
+    window : TimeWindow, optional
+        The part that is shown; a twin starts at rest where it begins.
 
     Raises
     ------
@@ -117,15 +121,16 @@ def bag_feed(
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
+    length = (session.end - session.start) * NANO
     store = Store(max(counts.values(), default=1), keeps_statuses=True)
     if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs strokes, or outputs of the twin.")
-    feed = BagFeed(_title(session, is_published), store, topics, scene, (session.end - session.start) * NANO)
+    feed = BagFeed(_title(session, is_published), store, topics, scene, length * window.share(length))
     if is_published:
-        feed.begin(_take_published(session, feed, topics, counts))
+        feed.begin(_take_published(session, feed, topics, counts, window))
     else:
         twin = _Twin(feed, topics, scene, settings, usual)
-        feed.begin(_take_predicted(session, topics, counts, len(scene.joints), twin))
+        feed.begin(_take_predicted(session, topics, counts, twin, window))
     return feed
 
 
@@ -142,18 +147,22 @@ def _title(session: Session, is_published: bool) -> str:
     return f"{session.path.name}, {kind}{state}" + (f" ({origin})" if origin else "")
 
 
-def _take_published(session: Session, feed: Feed, topics: Topics, counts: dict[str, int]) -> Generator[None]:
+def _take_published(
+    session: Session, feed: Feed, topics: Topics, counts: dict[str, int], window: TimeWindow
+) -> Generator[None]:
     """What the node said, beside the measured acceleration; one message a step."""
     known, topic_rows = _names(topics), feed.topic_rows
-    for name, _, message in read(session, {name: known[name].type for name in counts if name in topic_rows.names}):
+    for name, _, message in read(session, {name: known[name].type for name in counts if name in topic_rows.names}, window):
         topic_rows.take(name, message, feed.now())
         yield
 
 
-def _take_predicted(session: Session, topics: Topics, counts: dict[str, int], joints: int, twin: _Twin) -> Generator[None]:
+def _take_predicted(
+    session: Session, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
+) -> Generator[None]:
     """What a twin says now; one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
-    ahead = SampleReader(session.path, topics, wanted, joints)
+    ahead = SampleReader(session.path, topics, wanted, twin.twin.plan.joints, window)
     try:
         ahead.wait_ready()
         for step in drive(twin.twin, ahead.samples()):

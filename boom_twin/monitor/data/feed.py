@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...messages.topic_table import Topics
 from ...scene import load_scene
 from ...scene.load import DEFAULT_NAME
@@ -66,12 +69,21 @@ class Feed:
     def strokes(self, time: float) -> list[float]:
         """The strokes (m) at `time` (s); empty if they are not known."""
         table = self.store.tables.get("shape")
+        row = 0 if table is None else table.until(time)
+        values = self._strokes_of(row - 1, row)
+        return [float(value) for value in values[0]] if len(values) else []
+
+    def strokes_between(self, first: float, last: float) -> NDArray[np.float32]:
+        """The strokes (m) from one time to another (s), a row for each shape that is known, shape (k, n)."""
+        table = self.store.tables.get("shape")
+        return self._strokes_of(0, 0) if table is None else self._strokes_of(table.until(first), table.until(last))
+
+    def _strokes_of(self, first: int, end: int) -> NDArray[np.float32]:
+        table = self.store.tables.get("shape")
         if table is None:
-            return []
-        row = table.until(time)
-        values = table.rows(row - 1, row)[1]
+            return np.zeros((0, 0), np.float32)
         places = [place for place, name in enumerate(table.columns) if name.startswith(STROKE)]
-        return [float(values[0, place]) for place in places] if len(values) else []
+        return table.rows(first, end)[1][:, places]
 
 
 SLOWEST, FASTEST = 0.1, 10.0

@@ -4,8 +4,6 @@ import uPlot from "/page/uplot.js";
 import { lineColour, themeColour } from "./colours.js";
 import { formatNumber } from "./html_table.js";
 
-const LEGEND = 24; // px
-
 export class Chart {
   // series: [{ label, colour: number or name, dash, width, show }], bands: [[high, low, colour]] by place in series
   constructor(element, { title, series, bands = [], scales = {}, axes = [{}, {}], hooks = {}, cursor = {} }) {
@@ -27,15 +25,19 @@ export class Chart {
       legend: { live: true },
       hooks,
     }, [[0], ...series.map(() => [null])], element);
+    listenToTouch(this.plot.over);
     this.observer = new ResizeObserver(() => this.fit());
+    this.legend = element.querySelector(".u-legend");
     this.observer.observe(element);
+    this.observer.observe(this.legend); // which takes more lines where it is narrow
     this.fit();
   }
 
   fit() {
     const { clientWidth: width, clientHeight: height } = this.element;
-    const isNew = Math.abs(this.plot.width - width) > 1 || Math.abs(this.plot.height - height + LEGEND) > 1;
-    if (width > 60 && height > 60 && isNew) this.plot.setSize({ width, height: height - LEGEND });
+    const free = Math.max(height - this.legend.offsetHeight - 2, 30);
+    const isNew = Math.abs(this.plot.width - width) > 1 || Math.abs(this.plot.height - free) > 1;
+    if (width > 60 && height > 60 && isNew) this.plot.setSize({ width, height: free });
   }
 
   draw(data, from, to) {
@@ -43,4 +45,17 @@ export class Chart {
   }
 
   close() { this.observer.disconnect(); this.plot.destroy(); }
+}
+
+const AS_MOUSE = { touchstart: "mousedown", touchmove: "mousemove", touchend: "mouseup", touchcancel: "mouseup" };
+
+// One finger reads values and chooses a span as the mouse does; two are left to the browser.
+function listenToTouch(element) {
+  for (const [touch, mouse] of Object.entries(AS_MOUSE)) element.addEventListener(touch, event => {
+    const finger = event.changedTouches[0];
+    if (event.touches.length > 1 || !finger) return;
+    const { clientX, clientY, screenX, screenY } = finger, options = { clientX, clientY, screenX, screenY, bubbles: true, button: 0 };
+    if (touch === "touchstart") for (const kind of ["mouseenter", "mousemove"]) element.dispatchEvent(new MouseEvent(kind, options));
+    element.dispatchEvent(new MouseEvent(mouse, options));
+  }, { passive: true });
 }

@@ -3,6 +3,7 @@
 import { theme } from "./colours.js";
 import { Lamps } from "./lamps.js";
 import { Connection } from "./connection.js";
+import { Path } from "./path.js";
 import { Shape } from "./shape.js";
 import { HtmlTable } from "./html_table.js";
 import { SpectrumTab } from "./spectrum.js";
@@ -18,7 +19,7 @@ const get = id => document.getElementById(id);
 const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
 new Actions(connection, view);
 const spectrum = new SpectrumTab(connection, new HtmlTable("peaks"));
-const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), state: null };
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
@@ -50,6 +51,12 @@ function pause() {
 for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => selectTab(button.dataset.tab);
 get("window").onchange = event => view.set({ window: Number(event.target.value), zoom: null });
 get("pause").onclick = pause;
+get("sessions").onchange = event => connection.send({ do: "session", value: Number(event.target.value) });
+
+function showSessions({ sessions, session }) {
+  get("sessions").hidden = sessions.length < 2;
+  get("sessions").replaceChildren(...sessions.map((name, i) => new Option(name, i, i === session, i === session)));
+}
 get("all").onclick = () => view.set({ zoom: null });
 get("theme").onclick = () => setTheme(theme() === "dark" ? "light" : "dark");
 
@@ -65,6 +72,7 @@ addEventListener("keydown", event => {
 
 connection.addEventListener("hello", event => {
   get("title").textContent = event.detail.title;
+  showSessions(event.detail);
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
 });
@@ -107,4 +115,4 @@ setInterval(() => lamps.watch(timeline.isReplay), 500);
 setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 selectTab("traces");
 requestAnimationFrame(draw);
-Object.assign(window, { twin: { connection, view, timeline, delays, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious
+Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious

@@ -43,6 +43,7 @@ export class Shape {
     this.drawLine(frame, trace, { colour: lineColour(2), width: 2 });
     forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
     this.drawLoad(frame, large.at(-1));
+    this.drawn = { boxes: placeLabels(frame), segments: frame.segments };
     this.describe(bent.at(-1), straight.at(-1), bent, forces);
   }
 
@@ -67,7 +68,7 @@ export class Shape {
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
     const across = (width - unit * (right - left)) / 2, down = (height - unit * (top - bottom)) / 2;
-    return { context, at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)] };
+    return { context, width, height, segments: [], labels: [], at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)] };
   }
 
   // The load that the model does not know, as an arrow that ends at the tip.
@@ -86,18 +87,16 @@ export class Shape {
     context.fill();
   }
 
-  drawLine({ context, at }, points, { colour, width, dash = [], label }) {
+  drawLine({ context, at, segments, labels }, points, { colour, width, dash = [], label }) {
     if (points.length < 2) return;
     context.beginPath();
     points.forEach((point, i) => i ? context.lineTo(...at(point)) : context.moveTo(...at(point)));
     Object.assign(context, { strokeStyle: colour, lineWidth: width, lineJoin: "round", lineCap: "round" });
     context.setLineDash(dash);
     context.stroke();
-    if (!label) return;
-    const [a, b] = points.map(at);
-    context.font = "13px system-ui";
-    context.fillStyle = themeColour("ink");
-    context.fillText(label, (a[0] + b[0]) / 2 + 10, (a[1] + b[1]) / 2 + 14);
+    const pixels = points.map(at);
+    for (let i = 1; i < pixels.length; i++) segments.push([pixels[i - 1], pixels[i]]);
+    if (label) labels.push({ label, middle: [0, 1].map(c => (pixels[0][c] + pixels[1][c]) / 2) });
   }
 
   describe([x, z], [x0, z0], bent, forces) {
@@ -107,6 +106,49 @@ export class Shape {
     words("height", `height ${z.toFixed(3)} m`);
     words("forces", `tip ${formatNumber(1000 * (x - x0))} mm forward, ${formatNumber(1000 * (z - z0))} mm up; most loaded cylinder ${(Math.max(...forces.map(Math.abs)) / 1000).toFixed(1)} kN`);
   }
+}
+
+// Every label as near to the middle of its line as there is room, over no line and no other label; far ones with a thin pointer.
+function placeLabels({ context, segments, labels, width, height }) {
+  context.font = "13px system-ui";
+  context.setLineDash([]);
+  const taken = [];
+  for (const { label, middle } of labels) {
+    const wide = context.measureText(label).width + 6, box = [...candidates(middle, wide, width, height)]
+      .find(each => !segments.some(([a, b]) => crosses(each, a, b)) && !taken.some(other => overlap(each, other)));
+    if (!box) continue; // its force is in the table of figures too
+    taken.push(box);
+    const [left, top, right, bottom] = box, end = [Math.min(Math.max(middle[0], left), right), Math.min(Math.max(middle[1], top), bottom)];
+    if (Math.hypot(end[0] - middle[0], end[1] - middle[1]) > POINTER) {
+      Object.assign(context, { strokeStyle: themeColour("soft"), lineWidth: 1 });
+      context.beginPath(); context.moveTo(...middle); context.lineTo(...end); context.stroke();
+    }
+    context.fillStyle = themeColour("ink");
+    context.fillText(label, left + 3, bottom - 4);
+  }
+  return taken;
+}
+
+const POINTER = 30, HIGH = 18; // px
+function* candidates([x, y], wide, width, height) {
+  for (let distance = 12; distance < Math.max(width, height); distance += 8)
+    for (let turn = 0; turn < 16; turn++) {
+      const angle = turn * Math.PI / 8, left = x + distance * Math.cos(angle) - (Math.cos(angle) < 0 ? wide : 0), top = y + distance * Math.sin(angle) - HIGH / 2;
+      if (left >= 0 && top >= 0 && left + wide <= width && top + HIGH <= height) yield [left, top, left + wide, top + HIGH];
+    }
+}
+
+const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
+// Whether a box is met by the line from a to b, 5 px thick (Liang and Barsky).
+function crosses([left, top, right, bottom], a, b) {
+  let from = 0, to = 1;
+  const [dx, dy] = [b[0] - a[0], b[1] - a[1]], gap = 5;
+  for (const [p, q] of [[-dx, a[0] - left + gap], [dx, right + gap - a[0]], [-dy, a[1] - top + gap], [dy, bottom + gap - a[1]]]) {
+    if (p === 0) { if (q < 0) return false; continue; }
+    if (p < 0) from = Math.max(from, q / p); else to = Math.min(to, q / p);
+  }
+  return from <= to;
 }
 
 // Grey without force, red when pulled, blue when pushed.

@@ -4,7 +4,7 @@ import { Chart } from "./chart.js";
 import { lineColour, themeColour } from "./colours.js";
 
 const LOWEST = 0.25, HIGHEST = 50; // Hz
-const COLUMNS = 300, FEWEST = 60; // of the spectrogram
+const COLUMNS = 300; // of the spectrogram
 const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: STEP and FREQUENCIES of boom_twin/monitor/data/spectrum.py
 const RANGE = 60; // dB from dark to bright
 
@@ -12,11 +12,17 @@ export class SpectrumTab {
   constructor(connection, htmlTable) {
     this.htmlTable = htmlTable;
     this.history = [];
-    this.lines = { natural: [], peaks: [] };
-    connection.addEventListener("lines", event => { this.lines = event.detail; this.isNew = true; });
+    this.lines = { natural: [], peaks: [], source: "", moved: 0 };
+    connection.addEventListener("lines", event => this.setLines(event.detail));
     connection.addEventListener("spectrum", event => this.setSpectrum(event.detail));
     connection.addEventListener("spectrogram", event => this.addColumns(event.detail));
     connection.addEventListener("reset", () => { this.history = []; this.isNew = true; });
+  }
+
+  setLines(lines) {
+    if (lines.source !== this.lines.source) this.rebuild();
+    this.lines = lines;
+    this.isNew = true;
   }
 
   setSpectrum({ times: frequencies, values, rows }) {
@@ -37,8 +43,8 @@ export class SpectrumTab {
     this.isNew = false;
     if (tab === "spectrogram") return this.drawSpectrogram();
     this.chart ??= new Chart(document.getElementById("density"), {
-      title: "density, (m/s²)²/Hz",
-      series: [{ label: "forward", colour: 0 }, { label: "up", colour: 1 }],
+      title: `density, ${this.lines.source}, (m/s²)²/Hz`,
+      series: this.lines.axes.map((label, i) => ({ label, colour: i })),
       scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 } },
       axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: (_, ticks) => ticks.map(tick => tick === null ? null : `1e${Math.round(Math.log10(tick))}`) }],
       hooks: { draw: [plot => this.drawModes(plot)] },
@@ -74,8 +80,9 @@ export class SpectrumTab {
     const rows = peaks.map(({ frequency, damping, mode, deviation, drift }) =>
       [frequency.toFixed(3), percent(damping), mode === null ? "–" : `${mode}`, mode === null ? NaN : natural[mode - 1], percent(deviation), percent(drift)]);
     const others = natural.map((frequency, i) => [`mode ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
+    const moved = this.lines.moved > 0 ? `THE BOOM MOVED within them, a cylinder by ${(1000 * this.lines.moved).toFixed(0)} mm: the frequencies changed, "off by" means nothing; ` : "";
     const words = natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene";
-    this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `last 40 s, segments of 8 s; ${words}`);
+    this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `${this.lines.source}, last 40 s, segments of 8 s; ${moved}${words}`);
   }
 
   // One pixel for every cell, drawn large.
@@ -83,11 +90,11 @@ export class SpectrumTab {
     if (!this.history.length) return;
     const canvas = document.getElementById("waterfall"), { clientWidth: width, clientHeight: height } = canvas;
     Object.assign(canvas, { width, height });
-    const cells = this.history[0].levels.length, count = Math.max(FEWEST, this.history.length), empty = count - this.history.length;
+    const cells = this.history[0].levels.length, count = this.history.length;
     const picture = new OffscreenCanvas(count, cells), image = new ImageData(count, cells);
     const top = this.history.reduce((most, { levels }) => levels.reduce((a, b) => b > a ? b : a, most), -Infinity);
     this.history.forEach(({ levels }, i) => levels.forEach((level, c) => {
-      if (Number.isFinite(level)) image.data.set(viridis(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i + empty));
+      if (Number.isFinite(level)) image.data.set(viridis(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i));
     }));
     picture.getContext("2d").putImageData(image, 0, 0);
     const context = canvas.getContext("2d"), left = 44, right = width - 60, bottom = height - 24, highest = (cells - 1) * HEIGHT;
@@ -97,7 +104,7 @@ export class SpectrumTab {
     context.font = "13px system-ui";
     for (let f = 0; f <= highest; f += 5) context.fillText(`${f} Hz`, 2, Math.max(12, bottom * (1 - f / highest)));
     this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ mode ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
-    context.fillText(`${(this.history[0].time - WIDTH).toFixed(0)} s`, left + (right - left) * empty / count, height - 6);
+    context.fillText(`${(this.history[0].time - WIDTH).toFixed(0)} s`, left, height - 6);
     context.fillText(`${this.history.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
     document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
   }

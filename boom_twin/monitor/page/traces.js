@@ -48,7 +48,7 @@ export class Traces {
     this.add(CHARTS);
   }
 
-  // Make room for further charts below the others; all are drawn anew, for the lowest has the axis of time.
+  // Make room for further charts below the others.
   add(kinds) {
     for (const { name } of kinds) {
       const element = document.createElement("div");
@@ -57,7 +57,6 @@ export class Traces {
       document.getElementById("charts").append(element);
     }
     this.kinds = [...this.kinds, ...kinds];
-    this.rebuild();
   }
 
   rebuild() {
@@ -71,9 +70,10 @@ export class Traces {
     const further = this.connection.residualTables.filter(({ name }) => !this.kinds.some(kind => kind.table === name));
     if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, `${residuals.title}, σ`)));
     if (this.hasEstimate !== Boolean(this.estimate?.count)) { this.hasEstimate = !this.hasEstimate; this.rebuild(); }
-    for (const kind of this.kinds) {
+    const filled = this.kinds.filter(kind => this.connection.table(kind.table)?.count);
+    if (filled.at(-1) !== this.lowest) { this.lowest = filled.at(-1); this.rebuild(); } // it has the axis of time
+    for (const kind of filled) {
       const table = this.connection.table(kind.table);
-      if (!table?.count) continue;
       if (!this.charts.has(kind.name)) this.charts.set(kind.name, this.build(kind, table));
       const chart = this.charts.get(kind.name);
       const slots = Math.max(200, chart.element.clientWidth / SLOT), [times, ...values] = scaled(decimate(table, kind.columns(table), from, to, slots), kind.factor);
@@ -107,7 +107,7 @@ export class Traces {
     const options = kind.estimate && this.hasEstimate ? withEstimate(plainOptions) : plainOptions;
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
-      axes: [kind === this.kinds.at(-1) ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
+      axes: [kind === this.lowest ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
       ...options,
       scales: kind.isResidual ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },

@@ -34,6 +34,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import UsageError
+from ...scene.edit import section_mass
 from ...scene.schema import Scene
 from ...types import SECOND, Array
 from .session import RigSession
@@ -61,6 +62,22 @@ _CAUSES: dict[str, dict[str, str | None]] = {
     r"joint_angles\.delay": {"late": _MORE},
     r"(?:joint_angles|cylinder_strokes)\.dropout": {"missing": _SHARE},
 }
+_SIZES = {
+    "softer": "share of the stiffness that is lost",
+    "more tip.payload": "kg, at most the boom's mass",
+    "more line_fill": "kg/m, at most the boom's mass over its reach",
+    "play": "radial clearance of the rod pin, m",
+    "bias": "rad, m or N; at most 1 rad, the travel, 1e6 N",
+    "drift": "the same in a second",
+    "scale": "share by which it reads too much, at most 1",
+    "stuck": "none: it repeats the last reading before the onset",
+    "noisy": "factor on the noise, at most 1000",
+    "spikes": "as a bias, of one reading in fifty",
+    "dropout": "share of the readings",
+    "late": "s by which stamps come after the reading, at most 10",
+    "missing": "share of the messages",
+}
+"""What a size is, by kind, and by cause where that differs."""
 CAUSES = (
     "cylinder_i.k, section_i.EI, tip.payload, line_fill, cylinder_i.rod.clearance, joint_i.sensor, cylinder_i.sensor, "
     "cylinder_force_i.sensor, joint_angles.delay, joint_angles.dropout, cylinder_strokes.dropout"
@@ -177,6 +194,39 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
             raise UsageError(f"fault {fault}: the boom has joints, cylinders and sections 1 to {parts}. Give one of them.")
         if fault.onset >= duration:
             raise UsageError(f"fault {fault}: begins at {fault.onset:g} s, must be before the end at {duration:g} s.")
+        most = largest_size(fault, scene)
+        if abs(fault.size) > most:
+            raise UsageError(
+                f"fault {fault}: size = {fault.size:g}, must be at most {most:.4g} on this boom. Give it in SI units."
+            )
+
+
+_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}
+"""Largest sizes that are the same for all booms; a delay in s."""
+MOST_ANGLE, MOST_FORCE = 1.0, 1e6  # rad, N; bias, spikes, and drift in a second
+
+
+def largest_size(fault: RigFault, scene: Scene) -> float:
+    """How large a fault may be on a boom, in its unit: loads as heavy as the boom, readings within what a sensor can tell."""
+    if fault.kind == "more":
+        mass = sum(map(section_mass, scene.sections))
+        return mass if fault.cause == "tip.payload" else mass / scene.reach
+    if fault.kind in ("bias", "spikes", "drift"):
+        if fault.cause.startswith("joint_"):
+            return MOST_ANGLE
+        return MOST_FORCE if "force" in fault.cause else scene.joints[fault.number - 1].cylinder.max_stroke
+    return _MOST.get(fault.kind, math.inf)
+
+
+def listing() -> list[str]:
+    """All causes, kinds, and what their sizes are, a line each."""
+    lines = [f"{'cause':41} {'kind':9} size"]
+    for form, kinds in _CAUSES.items():
+        cause = form.replace(r"([1-9]\d*)", "I").replace("\\", "").replace("(?:", "(")
+        for kind, bound in kinds.items():
+            unit = _SIZES.get(kind) or _SIZES[f"{kind} {cause}"]
+            lines.append(f"{cause:41} {kind:9} {unit}{f'; {bound}' if bound else ''}")
+    return [*lines, "", f"I is 1, 2, ..; (a|b) is a or b. Write --fault {FORM}, times in s."]
 
 
 SPIKE_SHARE = 0.02  # of the readings

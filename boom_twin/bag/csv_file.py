@@ -1,0 +1,153 @@
+"""Read a session from a CSV file: a row for every stamp, a column for every sensor, in SI units.
+
+``t_s,stroke_1_m,..[,joint_1_rad,..][,imu_x_m_s2,imu_z_m_s2][,cylinder_force_1_N,..]``, an empty cell where there is no value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BagError
+from ..messages.topic_table import load_topics
+from ..messages.type_store import jazzy
+from ..system.csv_table import CsvTable, read_csv
+from ..system.received_files import open_received
+from ..types import SECOND, SENSORS, Sample, Stream, channels_of
+from .session_file import SessionFile, channel_of, schema_of
+from .session_files import samples_of, sensor_message
+
+TIME = "t_s"
+STROKE = "stroke_{}_m"
+IMU = ("imu_x_m_s2", "imu_z_m_s2")
+LARGEST = 2**26
+"""Bytes of a file that are read: it is held as a whole."""
+NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
+"""Channel of every stream."""
+
+
+@dataclass(frozen=True, slots=True)
+class CsvFile(SessionFile):
+    """What one CSV file holds; its log times are its stamps.
+
+    Attributes
+    ----------
+    samples : list of Sample
+        In the order of their stamps.
+    """
+
+    samples: list[Sample]
+
+    @property
+    def storage(self) -> str:
+        """See `SessionFile`."""
+        return "csv"
+
+    def written_by(self) -> tuple[str, str]:
+        """See `SessionFile`."""
+        return "CSV", "none"
+
+    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+        """See `SessionFile`; by log time."""
+        encode = jazzy().serialize_cdr
+        for sample in self.samples:
+            data = encode(sensor_message(sample), SENSORS[sample.stream].message)
+            yield NUMBERS[sample.stream], sample.stamp, bytes(data)
+
+
+def summarise(path: Path) -> CsvFile:
+    """Read one file.
+
+    Raises
+    ------
+    BagError
+        It is not there, or a column or value of it cannot be used: says which, in which line.
+    """
+    try:
+        open_received(path).close()
+        size = path.stat().st_size
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    if size > LARGEST:
+        raise BagError(f"{path}: {size} bytes, of which {LARGEST} are read. Split the session, or store it as a rosbag2.")
+    samples = _samples(read_csv(path, BagError))
+    topics = load_topics().inputs
+    streams = [stream for stream in Stream if any(sample.stream is stream for sample in samples)]
+    return CsvFile(
+        path=path,
+        channels={NUMBERS[stream]: channel_of(NUMBERS[stream], topics[stream].absolute) for stream in streams},
+        schemas={NUMBERS[stream]: schema_of(NUMBERS[stream], topics[stream].type) for stream in streams},
+        counts={NUMBERS[stream]: sum(sample.stream is stream for sample in samples) for stream in streams},
+        start=samples[0].stamp if samples else 0,
+        end=samples[-1].stamp if samples else 0,
+        checked=False,
+        notes={},
+        samples=samples,
+    )
+
+
+def _samples(table: CsvTable) -> list[Sample]:
+    joints = 1
+    while STROKE.format(joints + 1) in table.names:
+        joints += 1
+    table.require([TIME, *(STROKE.format(number) for number in range(1, joints + 1))])
+    columns = _columns(joints)
+    _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
+    values = {
+        stream: np.column_stack([_column(table, name) for name in names])
+        for stream, names in columns.items()
+        if any(name in table.names for name in names)
+    }
+    strokes, angles, imu, forces = (values.get(stream) for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES))
+    assert strokes is not None
+    return samples_of(np.array(_stamps(table), np.int64), strokes, angles, imu, forces=forces)
+
+
+def _columns(joints: int) -> dict[Stream, list[str]]:
+    """The names of the columns of every stream."""
+    channels = channels_of(joints)
+    return {
+        Stream.STROKES: [STROKE.format(number) for number in range(1, joints + 1)],
+        Stream.ANGLES: [f"{name}_rad" for name in channels[Stream.ANGLES]],
+        Stream.IMU: list(IMU),
+        Stream.FORCES: [f"{name}_N" for name in channels[Stream.FORCES]],
+    }
+
+
+def _refuse_unknown(table: CsvTable, known: list[str]) -> None:
+    for name in table.names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1, cutoff=0.6)
+            remedy = f"Did you mean {near[0]}?" if near else f"Known are {', '.join(known)}; take the column out."
+            raise BagError(f"{table.path}: unknown column {name!r} in its first line. {remedy}")
+        if table.names.count(name) > 1:
+            raise BagError(f"{table.path}: column {name} is there twice. Take one out.")
+
+
+def _column(table: CsvTable, name: str) -> list[float]:
+    return table.column(name, np.nan) if name in table.names else [np.nan] * len(table.rows)
+
+
+def _stamps(table: CsvTable) -> list[int]:
+    """Stamps, ns: the times, or if they begin before 1 s, these later by what makes the first one 1 s; 0 is no stamp in ROS."""
+    place = table.names.index(TIME)
+    found: list[int] = []
+    for row, line in zip(table.rows, table.lines, strict=True):
+        text = row[place].strip() if place < len(row) else ""
+        try:
+            found.append(int((Decimal(text) * SECOND).to_integral_value()))
+        except (ArithmeticError, ValueError):
+            raise BagError(f"{table.path}, line {line}: {TIME} = {text!r} is not a time in s.") from None
+        if len(found) > 1 and found[-1] <= found[-2]:
+            raise BagError(f"{table.path}, line {line}: {TIME} = {text} is not after the row before. Sort the rows by {TIME}.")
+    if found[-1] >= 2**31 * SECOND:
+        raise BagError(
+            f"{table.path}: {TIME} is beyond {2**31} s, so not in seconds. Divide it: stamps in ms or ns are no seconds."
+        )
+    shift = max(0, SECOND - found[0])
+    return [stamp + shift for stamp in found]

@@ -1,0 +1,88 @@
+"""One file of a session, however it is stored: what it holds, and its messages as CDR."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from mcap.records import Channel, Schema
+
+from ..messages.message_block import MessageBlock
+from ..messages.type_store import jazzy
+from .integrity import compare_counts
+from .mcap_records import by_topic
+
+TOGETHER = 2000
+"""Messages in one block of a file that is read message by message."""
+CDR = "cdr"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFile(ABC):
+    """What one file holds.
+
+    Attributes
+    ----------
+    path : Path
+    channels : dict of int to Channel
+    schemas : dict of int to Schema
+    counts : dict of int to int
+        Messages by channel.
+    start, end : int
+        First and last log time in nanoseconds; 0 without messages.
+    checked : bool
+        Whether its messages are under a checksum and counted. If not, a flipped bit can pass without notice.
+    notes : dict of str to str
+    """
+
+    path: Path
+    channels: dict[int, Channel]
+    schemas: dict[int, Schema]
+    counts: dict[int, int]
+    start: int
+    end: int
+    checked: bool
+    notes: dict[str, str]
+
+    def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
+        """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
+        one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
+        compare_counts(self.path, source, one, other, two)
+
+    @property
+    @abstractmethod
+    def storage(self) -> str:
+        """How it is stored: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``."""
+
+    @abstractmethod
+    def written_by(self) -> tuple[str, str]:
+        """The program that wrote the file, in its own words, and the compression of its first chunk."""
+
+    @abstractmethod
+    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+        """Channel, log time (ns) and encoded data of all messages."""
+
+    def blocks(self) -> Iterator[MessageBlock]:
+        """All messages by log time, many at a time; their sources are their channels. Here `heads` must be in that order."""
+        found = self.heads()
+        while group := list(islice(found, TOGETHER)):
+            channels, times, data = zip(*group, strict=True)
+            ends = np.cumsum([len(each) for each in data])
+            starts = np.concatenate([[0], ends[:-1]])
+            yield MessageBlock(b"".join(data), np.array(channels), np.array(times, np.uint64), starts, ends)
+
+
+def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
+    """The schema of a message type; without a definition that of Jazzy, an empty one for a type that Jazzy lacks."""
+    if not definition and type_name in jazzy().types:
+        definition, _ = jazzy().generate_msgdef(type_name, ros_version=2)
+    return Schema(id=number, name=type_name, encoding="ros2msg", data=definition.encode())
+
+
+def channel_of(number: int, topic: str, encoding: str = CDR, metadata: Mapping[str, str] | None = None) -> Channel:
+    """A channel whose schema has its own number."""
+    return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata=dict(metadata or {}))

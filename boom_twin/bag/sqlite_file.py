@@ -1,0 +1,127 @@
+"""Read a ``.db3`` file of rosbag2, the storage sqlite3. It is only read: neither locked nor written to."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from ..errors import BagError
+from ..system.received_files import holds_file, open_received
+from .mcap_records import LARGEST
+from .session_file import SessionFile, channel_of, schema_of
+
+MAGIC = b"SQLite format 3\0"
+BESIDE = ("-wal", "-journal")
+"""Ends of the names of files in which sqlite3 keeps what is not in the database yet."""
+_MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+_REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover` on a copy, or another copy of the session."
+
+
+@dataclass(frozen=True, slots=True)
+class SqliteFile(SessionFile):
+    """What one .db3 file holds; it has no checksums.
+
+    Attributes
+    ----------
+    distro : str
+        Of ROS, where the file tells it.
+    """
+
+    distro: str
+
+    @property
+    def storage(self) -> str:
+        """See `SessionFile`."""
+        return "sqlite3"
+
+    def written_by(self) -> tuple[str, str]:
+        """See `SessionFile`."""
+        return f"rosbag2_storage_sqlite3{f' ({self.distro})' if self.distro else ''}", "none"
+
+    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+        """See `SessionFile`; by log time, of equal times in the order of the file."""
+        with _database(self.path) as database:
+            for channel, time, data in database.execute(_MESSAGES):
+                if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
+                    raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
+                yield channel, time, data
+
+
+def summarise(path: Path) -> SqliteFile:
+    """Look at one file.
+
+    Raises
+    ------
+    BagError
+        It is not there, damaged, not closed by its recorder, or no storage of rosbag2.
+    """
+    with _database(path) as database:
+        tables = {str(name) for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if not {"messages", "topics"} <= tables:
+            raise BagError(f"{path}: has no tables messages and topics, but {', '.join(sorted(tables)) or 'none'}. {_REMEDY}")
+        definitions = _definitions(database) if "message_definitions" in tables else {}
+        topics = [_topic(path, row) for row in database.execute("SELECT id, name, type, serialization_format FROM topics")]
+        counts = dict(database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"))
+        if unknown := sorted(map(str, counts.keys() - {number for number, *_ in topics})):
+            raise BagError(f"{path}: messages of topics {', '.join(unknown)}, which are not in its table topics. {_REMEDY}")
+        start, end = database.execute("SELECT MIN(timestamp), MAX(timestamp) FROM messages").fetchone()
+        distro = _distro(database) if "schema" in tables else ""
+    return SqliteFile(
+        path=path,
+        channels={number: channel_of(number, topic, encoding) for number, topic, _, encoding in topics},
+        schemas={number: schema_of(number, kind, definitions.get(kind, "")) for number, _, kind, _ in topics},
+        counts=counts,
+        start=start or 0,
+        end=end or 0,
+        checked=False,
+        notes={},
+        distro=distro,
+    )
+
+
+def _topic(path: Path, row: tuple[Any, ...]) -> tuple[int, str, str, str]:
+    number, *texts = row
+    if not isinstance(number, int) or not 0 <= number < 2**31 or not all(isinstance(text, str) for text in texts):
+        raise BagError(f"{path}: {row!r} in its table topics is no topic. {_REMEDY}")
+    return number, texts[0], texts[1], texts[2]
+
+
+def _definitions(database: sqlite3.Connection) -> dict[str, str]:
+    """The definitions of messages by type, as far as they are in the language that is read."""
+    rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+    return {str(kind): str(text) for kind, encoding, text in rows if encoding == "ros2msg"}
+
+
+def _distro(database: sqlite3.Connection) -> str:
+    row = database.execute("SELECT ros_distro FROM schema").fetchone()
+    return str(row[0]) if row else ""
+
+
+@contextmanager
+def _database(path: Path) -> Iterator[sqlite3.Connection]:
+    """The database in a file; what is wrong with it becomes a BagError."""
+    try:
+        with open_received(path) as file:
+            if (start := file.read(len(MAGIC))) != MAGIC:
+                raise BagError(f"{path}: {'empty' if not start else 'not an sqlite3 file (it begins otherwise)'}. {_REMEDY}")
+        for end in BESIDE:
+            beside = path.with_name(path.name + end)
+            if holds_file(beside) and beside.stat().st_size:
+                raise BagError(
+                    f"{path}: was not closed: {beside.name} holds messages that are not in it. "
+                    f"Copy both, and close the copy by `sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'`."
+                )
+        address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"  # immutable: no lock, no file beside it
+        with closing(sqlite3.connect(address, uri=True)) as database:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+            database.execute("PRAGMA trusted_schema = OFF")
+            yield database
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    except (sqlite3.Error, UnicodeError, OverflowError) as error:
+        raise BagError(f"{path}: {error}. {_REMEDY}") from error

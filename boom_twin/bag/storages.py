@@ -1,0 +1,36 @@
+"""The kinds of files that a session may be stored in, by the ends of their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from . import csv_file, mcap_summary, ros1_file, sqlite_file
+from .metadata import STORAGES
+from .session_file import SessionFile
+
+SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
+    ".mcap": mcap_summary.summarise,
+    ".db3": sqlite_file.summarise,
+    ".bag": ros1_file.summarise,
+    ".csv": csv_file.summarise,
+}
+"""Those of rosbag2 may lie in a folder, see `STORAGES`; the others are sessions by themselves."""
+
+
+def summarise(path: Path) -> SessionFile:
+    """What one file holds; one whose name ends otherwise is taken for an .mcap.
+
+    Raises
+    ------
+    BagError
+        It is not there, of another kind, cut off or damaged.
+    """
+    return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)
+
+
+def is_session(path: Path) -> bool:
+    """Whether there is a session at `path`, by the names of its files alone."""
+    if path.is_dir():
+        return any(file.suffix in STORAGES for file in path.iterdir())
+    return path.suffix.lower() in SUMMARISE

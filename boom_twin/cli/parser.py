@@ -1,0 +1,49 @@
+"""The parser of the command line: defaults in every help, and the nearest name where one is not known."""
+
+from __future__ import annotations
+
+from argparse import SUPPRESS, Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NoReturn
+
+
+class DefaultsFormatter(RawDescriptionHelpFormatter):
+    """Adds the default of an option that has one, unless its help tells it already; keeps the lines of examples."""
+
+    def _get_help_string(self, action: Action) -> str | None:
+        told, default = action.help, action.default
+        if not told or told == SUPPRESS or not action.option_strings or default is False or default in (None, SUPPRESS, [], ()):
+            return told
+        text = " ".join(map(str, default)) if isinstance(default, list | tuple) else str(default)
+        text = f"{default:g}" if isinstance(default, float) else text
+        is_told = f"({text}" in told or f"default {text}" in told
+        return told if is_told else f"{told} ({text.replace('%', '%%')})"
+
+
+class CommandParser(ArgumentParser):
+    """A parser whose errors name the nearest option or choice."""
+
+    def __init__(self, *args: object, **options: object) -> None:
+        options.setdefault("formatter_class", DefaultsFormatter)
+        super().__init__(*args, **options)  # type: ignore[arg-type]
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Namespace | None = None
+    ) -> tuple[Namespace, list[str]]:
+        """As of `ArgumentParser`; what a command does not know ends here, where its options are known."""
+        found, extra = super().parse_known_args(args, namespace)
+        if extra:
+            self.error(f"unrecognized arguments: {' '.join(extra)}{self._near(extra[0], list(self._option_string_actions))}")
+        return found, extra
+
+    def error(self, message: str) -> NoReturn:
+        """Tell usage and message, with the nearest choice where one was wrong, and exit with 2."""
+        wrong = message.partition("invalid choice: ")[2].split("'")[1:2]
+        known = [str(choice) for action in self._actions for choice in action.choices or ()]
+        super().error(message + (self._near(wrong[0], known) if wrong else ""))
+
+    @staticmethod
+    def _near(word: str, known: list[str]) -> str:
+        near = get_close_matches(word, known, n=1, cutoff=0.5)
+        return f". Did you mean {near[0]}?" if near else ""

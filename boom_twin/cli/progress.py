@@ -1,0 +1,52 @@
+"""Progress of a long run on stderr: a bar on a terminal, elsewhere a line for every tenth."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..offline.replay import ProgressBar
+
+
+class TenthLines:
+    """A line for every tenth.
+
+    Parameters
+    ----------
+    total : int
+        Of what is to be done.
+    unit, name : str
+        What is counted, in the plural, and by which command.
+    done : int
+        Of it before the run.
+    """
+
+    def __init__(self, total: int, unit: str, name: str, done: int = 0) -> None:
+        self._total, self._unit, self._name, self._done = total, unit, name, float(done)
+        self._told = self._tenths
+
+    @property
+    def _tenths(self) -> int:
+        return min(10, int(10 * self._done / self._total)) if self._total else 0
+
+    def update(self, n: float, /) -> None:
+        """So much more was done."""
+        self._done += n
+        if self._tenths > self._told:
+            self._told = self._tenths
+            done = min(round(self._done), self._total)
+            print(f"{self._name}: {10 * self._told} %, {done} of {self._total} {self._unit}", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """All was done."""
+
+
+def progress_of(total: int, unit: str, name: str, done: int = 0) -> ProgressBar:
+    """A bar if stderr is a terminal, else lines."""
+    if not sys.stderr.isatty():
+        return TenthLines(total, unit, name, done)
+    from tqdm import tqdm
+
+    bar: ProgressBar = tqdm(total=total, initial=done, unit=unit, desc=name, mininterval=0.2)
+    return bar

@@ -1,0 +1,55 @@
+"""Tell which stroke of a session could not be used first, and which unit it is likely in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene.schema import Scene
+from ..twin.blocks import CODES, SampleBlock
+from ..types import SENSORS, Array, Stream, channels_of
+
+
+class RefusedStrokes:
+    """Looks for the first sample of strokes with a value outside the travel of its cylinder.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._names = channels_of(len(scene.joints))[Stream.STROKES]
+        self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+        self._first: Array | None = None
+
+    def take(self, block: SampleBlock) -> None:
+        """Look at samples."""
+        if self._first is not None:
+            return
+        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
+        outside = np.flatnonzero(((strokes < 0.0) | (strokes > self._travel)).any(axis=1))
+        if len(outside):
+            self._first = strokes[outside[0]]
+
+    @property
+    def told(self) -> str:
+        """A sentence with the value, its bound and the likely unit; empty if there was none."""
+        if self._first is None:
+            return ""
+        i = int(np.flatnonzero((self._first < 0.0) | (self._first > self._travel))[0])
+        said = f" The first refused value: {self._names[i]} = {self._first[i]:.6g} m, its travel is 0 to {self._travel[i]:g} m."
+        unit = next((unit for unit, factor in self._by_size() if self._fits(factor)), None)
+        if unit is None:
+            return said
+        return f"{said} In {unit} it would fit: give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
+
+    @staticmethod
+    def _by_size() -> list[tuple[str, float]]:
+        """Units of strokes below 1 m, the largest first."""
+        units = SENSORS[Stream.STROKES].units.items()
+        return sorted(((unit, factor) for unit, factor in units if factor < 1.0), key=lambda pair: -pair[1])
+
+    def _fits(self, factor: float) -> bool:
+        assert self._first is not None
+        known = np.isfinite(self._first)
+        return bool(((self._first >= 0.0) & (factor * self._first <= self._travel))[known].all())

@@ -1,0 +1,43 @@
+"""A scene from whatever names one: a scene, a file, a mapping as in a file, or nothing for the default."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneWarning, UsageError
+from .edit import text_of
+from .load import examine_text, load_scene
+from .schema import Scene
+
+SceneSource = Scene | Mapping[str, Any] | str | Path | None
+"""What functions take for a boom; a mapping has the keys of a scene file."""
+
+
+def as_scene(source: SceneSource) -> Scene:
+    """The scene that `source` is, names or describes; the package's default scene for None.
+
+    Returns
+    -------
+    Scene
+        Frozen, complete and checked; SI units.
+
+    Raises
+    ------
+    SceneError
+        The file or the mapping cannot be used: all faults.
+    UsageError
+        It is none of them.
+    """
+    if isinstance(source, Scene):
+        return source
+    if isinstance(source, Mapping):
+        scene, oddities = examine_text(text_of(source), "mapping")
+        for oddity in oddities:
+            warnings.warn(str(oddity), SceneWarning, stacklevel=2)
+        return scene
+    if source is None or isinstance(source, str | Path):
+        return load_scene(source)
+    raise UsageError(f"scene = {source!r}: give a Scene, the path of a scene file, a dict with its keys, or None.")

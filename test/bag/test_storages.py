@@ -1,0 +1,224 @@
+"""Sessions as sqlite3, ROS 1 bag and CSV: the same samples as from MCAP, the same replay, clear refusals; nothing written."""
+
+from __future__ import annotations
+
+import csv
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from boom_twin import load_scene, replay
+from boom_twin.bag.reader import Session, read_both, scan
+from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_files import write_session
+from boom_twin.bag.time_window import TimeWindow
+from boom_twin.batch.sources import sessions_of
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.offline.replay import replay_into
+from boom_twin.offline.sample_table import SampleTable, table_file
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.system.result_folder import REPLAY, result_folder
+
+Content = Callable[[Session], list[tuple[Any, ...]]]
+JAZZY, NOETIC = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
+KINDS = ("db3", "db3 file", "ros1", "ros1 bz2", "ros1 lz4")
+COLUMN = {"/cylinder_strokes": "stroke_{}_m", "/joint_angles": "joint_{}_rad"}
+
+
+def messages(session: Session) -> list[tuple[str, int, bytes, Any]]:
+    return list(read_both(session, {topic.name: topic.type for topic in session.topics}))
+
+
+def stored(source: Path, kind: str, out: Path) -> Path:
+    """The session at `source` in another storage, written by rosbags."""
+    session = scan(source)
+    types = {topic.name: topic.type for topic in session.topics}
+    if kind.startswith("db3"):
+        with Ros2Writer(out / "two", version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+            two = {name: bag.add_connection(name, kind, typestore=JAZZY) for name, kind in types.items()}
+            for name, time, data, _ in messages(session):
+                bag.write(two[name], time, data)
+        return out / "two" / "two.db3" if kind == "db3 file" else out / "two"
+    writer = Ros1Writer(out / "one.bag")
+    if kind != "ros1":
+        writer.set_compression(Ros1Writer.CompressionFormat[kind.split()[1].upper()])
+    with writer as old:
+        one = {name: old.add_connection(name, kind, typestore=NOETIC) for name, kind in types.items()}
+        for name, time, data, _ in messages(session):
+            old.write(one[name], time, JAZZY.cdr_to_ros1(data, types[name]))
+    return out / "one.bag"
+
+
+def as_csv(source: Path, out: Path, since: int = 0) -> Path:
+    """The session as CSV, times since a stamp (ns)."""
+    rows: dict[int, dict[str, str]] = {}
+    for name, _, _, message in messages(scan(source)):
+        row = rows.setdefault(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec, {})
+        if name in COLUMN:
+            pairs = zip(message.name, message.position, strict=True)
+            row.update({COLUMN[name].format(channel.split("_")[1]): repr(float(value)) for channel, value in pairs})
+        else:
+            row.update({f"imu_{axis}_m_s2": repr(float(getattr(message.linear_acceleration, axis))) for axis in "xz"})
+    columns = ["t_s", *dict.fromkeys(name for row in rows.values() for name in row)]
+    with out.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        for stamp, row in sorted(rows.items()):
+            writer.writerow({"t_s": f"{(stamp - since) // 10**9}.{(stamp - since) % 10**9:09d}", **row})
+    return out
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_message_is_read_as_from_mcap(bag: Path, tmp_path: Path, content: Content, kind: str) -> None:
+    other = stored(bag, kind, tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    session = scan(other)
+    assert content(session) == content(scan(bag))
+    assert [(topic.name, topic.type, topic.count) for topic in session.topics] == [
+        (topic.name, topic.type, topic.count) for topic in scan(bag).topics
+    ]
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_csv_is_read_as_the_samples_that_it_holds(bag: Path, tmp_path: Path, content: Content) -> None:
+    assert content(scan(as_csv(bag, tmp_path / "s.csv"))) == content(scan(bag))
+
+
+def moving(folder: Path) -> Path:
+    """Two seconds of the default boom, its first cylinder extending."""
+    scene, random, rows = load_scene(), np.random.default_rng(3), 400
+    strokes = strokes_of_posture(scene, "arch") + np.outer(np.linspace(0.0, 0.02, rows), (1, 0, 0, 0))
+    stamps = 1_700_000_000_000_000_000 + np.arange(rows) * 5_000_000
+    imu = random.normal((0.0, 9.81), 0.05, (rows, 2))
+    write_session(folder, stamps, strokes + random.normal(0.0, 2e-5, (rows, 4)), None, imu, {"origin": "synthetic, a test"})
+    return folder
+
+
+def table_of(session: Path, out: Path) -> bytes:
+    with result_folder(out, REPLAY, [session]) as building:
+        table = SampleTable(table_file(building.folder / "samples.csv", 4), 4)
+        replay_into(building, session, load_scene(), health=False, take=table.add)
+        table.finish()
+    return (out / "samples.csv").read_bytes()
+
+
+def test_replays_of_one_session_from_four_storages_give_the_same_table(tmp_path: Path) -> None:
+    source = moving(tmp_path / "mcap")
+    others = [stored(source, "db3", tmp_path), stored(source, "ros1", tmp_path)]
+    others.append(as_csv(source, tmp_path / "s.csv", since=1_700_000_000_000_000_000))  # its times begin with 0
+    expected = table_of(source, tmp_path / "a")
+    assert expected.count(b"\n") == 401
+    assert [table_of(other, tmp_path / f"out_{number}") == expected for number, other in enumerate(others)] == [True] * 3
+
+
+CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no column t_s"),
+        ("t_s,stroke_1_m\n", "no rows below the header"),
+        (CSV.replace("stroke_1_m", "stroke_1_mm"), "no column stroke_1_m"),
+        (CSV.replace("joint_1_rad", "joint1_rad"), "unknown column 'joint1_rad' in its first line. Did you mean joint_1_rad?"),
+        (CSV.replace("joint_1_rad", "stroke_2_m"), "column stroke_2_m is there twice"),
+        (CSV.replace("0.1,0.1", "0.1,x"), "line 3: stroke_1_m = 'x' is not a number"),
+        (CSV.replace("\n0.1,", "\n0,"), "line 3: t_s = 0 is not after the row before"),
+        (CSV.replace("\n0.1,", "\n1700000000000,"), "not in seconds"),
+        (CSV.replace(",", ";"), "no column t_s, stroke_1_m"),
+        (CSV.replace("\n0.1,", "\nnan,"), "line 3: t_s = 'nan' is not a time"),
+    ],
+)
+def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "s.csv"
+    file.write_text(text)
+    with pytest.raises(BagError, match=r"s\.csv") as error:
+        scan(file)
+    assert words in str(error.value) and file.read_text() == text
+
+
+@pytest.mark.parametrize("kind", ["db3 file", "ros1"])
+@pytest.mark.parametrize("damage", ["empty", "cut", "noise"])
+def test_damage_is_one_error_that_names_the_file(bag: Path, tmp_path: Path, content: Content, kind: str, damage: str) -> None:
+    file = stored(bag, kind, tmp_path)
+    data = bytearray(file.read_bytes())
+    if damage == "noise":
+        data[5000:9000] = np.random.default_rng(1).bytes(4000)
+    file.write_bytes({"empty": b"", "cut": data[: len(data) * 2 // 3], "noise": bytes(data)}[damage])
+    with pytest.raises(BagError, match=file.name):
+        content(scan(file))
+
+
+def test_a_database_with_a_log_beside_it_is_refused(bag: Path, tmp_path: Path) -> None:
+    file = stored(bag, "db3 file", tmp_path)
+    open_one = sqlite3.connect(file)
+    open_one.execute("PRAGMA journal_mode = WAL")
+    open_one.execute("DELETE FROM messages WHERE id = 1")
+    open_one.commit()
+    with pytest.raises(BagError, match=r"was not closed: two\.db3-wal"):
+        scan(file)
+    open_one.close()
+
+
+def test_no_link_is_followed_and_no_other_database_is_taken(bag: Path, tmp_path: Path) -> None:
+    folder = stored(bag, "db3", tmp_path)
+    (folder / "two.db3").rename(tmp_path / "elsewhere.db3")
+    (folder / "two.db3").symlink_to(tmp_path / "elsewhere.db3")
+    with pytest.raises(BagError, match="symbolic link"):
+        scan(folder)
+    other = sqlite3.connect(tmp_path / "other.db3")
+    other.execute("CREATE TABLE accounts (id INTEGER)")
+    other.commit()
+    other.close()
+    with pytest.raises(BagError, match="no tables messages and topics, but accounts"):
+        scan(tmp_path / "other.db3")
+
+
+def test_recover_says_what_it_reads_and_batch_finds_all(bag: Path, tmp_path: Path) -> None:
+    file = stored(bag, "db3 file", tmp_path)
+    with pytest.raises(BagError, match=r"only \.mcap files are recovered"):
+        recover(file, tmp_path / "saved")
+    assert not (tmp_path / "saved").exists()
+    (tmp_path / "s.csv").write_text(CSV)
+    stored(bag, "ros1", tmp_path)
+    assert [path.name for path in sessions_of([f"{tmp_path}/*"])] == ["bag", "one.bag", "s.csv", "two"]
+
+
+def test_info_tells_how_a_session_is_stored(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(stored(bag, "ros1", tmp_path))]) == 0
+    assert "stored     ros1, 1 file" in capsys.readouterr().out
+
+
+def test_a_window_is_a_part_of_the_session_and_starts_at_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = moving(tmp_path / "mcap")
+    arguments = ["replay", str(source), "--no-pictures", "--no-health", "--out", str(tmp_path / "out"), "--table", "csv"]
+    assert main([*arguments, "--start", "1", "--duration", "0.5"]) == 0
+    assert "at 1 s the model starts at rest" in capsys.readouterr().err
+    rows = np.genfromtxt(tmp_path / "out" / "samples.csv", delimiter=",", names=True)
+    assert len(rows) == 100 and rows["t_s"][0] == 0.0
+    whole = [message.position[0] for name, _, _, message in messages(scan(source)) if name == "/cylinder_strokes"]
+    assert np.allclose(rows["measured_cylinder_1_m"], whole[200:300], rtol=1e-8)
+    assert rows["tip_ax_m_s2"][0] == pytest.approx(0.0, abs=0.05)
+    assert main([*arguments, "--start", "5"]) == 1
+    assert "no message from 5 s on; the session lasts 2.0 s" in capsys.readouterr().err
+    assert main(["info", str(source), "--json", "--start", "1", "--duration", "0.5"]) == 0
+    assert '"counts": [100, 100]' in capsys.readouterr().out
+
+
+def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
+    session = Path(__file__).parents[2] / "bags" / "arch_session"
+    part = replay(session, None, tmp_path / "part", health=False, window=TimeWindow(20.0, 5.0))
+    assert part.summary["window_start_s"] == 20.0 and part.summary["samples"] == 1000
+    columns = part.columns()
+    assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 57
+    assert np.isfinite([columns["measured_cylinder_1_m"], columns["estimate_tip_x_m"]]).all()
+    assert part.summary["tip_error_rms_m"] < 0.03  # the boom was moving, the model begins at rest; by another time decimetres

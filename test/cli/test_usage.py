@@ -1,0 +1,132 @@
+"""The command line as its user meets it: nearest names, one option for the scene, help, quiet, completion, progress."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from boom_twin.cli.examples import EXAMPLES
+from boom_twin.cli.main import main
+from boom_twin.cli.progress import TenthLines
+from boom_twin.scene.load import default_text
+
+STROKES = "0.63,0.165,0.235,0.187"
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "near"),
+    [
+        (["replya", "bag"], "replay"),
+        (["statics", "--posture", "arch", "--jsn"], "--json"),
+        (["replay", "bag", "--out", "x", "--tabel", "csv"], "--table"),
+        (["replay", "bag", "--out", "x", "--table", "cvs"], "csv"),
+        (["study", "stabilty", "--out", "x"], "stability"),
+    ],
+)
+def test_a_wrong_word_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str], arguments: list[str], near: str) -> None:
+    assert refused(capsys, *arguments).strip().endswith(f"Did you mean {near}?")
+
+
+def test_what_is_like_nothing_gets_no_proposal(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "Did you mean" not in refused(capsys, "statics", "--posture", "arch", "--qqqqqq")
+
+
+def test_the_scene_is_one_option_and_a_positional_argument(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "heavy.yaml"
+    scene.write_text(default_text().replace("postures:", "tip: {payload: 100.0}\npostures:", 1))
+    told = []
+    for arguments in (["--scene", str(scene)], [str(scene)], []):
+        assert main(["statics", *arguments, f"--strokes={STROKES}", "--json"]) == 0
+        told.append(json.loads(capsys.readouterr().out)["tip_m"])
+    assert told[0] == told[1] != told[2]
+    assert "not allowed with argument" in refused(capsys, "statics", "--scene", "a", "b", f"--strokes={STROKES}")
+
+
+@pytest.mark.parametrize("command", EXAMPLES)
+def test_every_help_ends_with_examples(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    assert "--quiet" in text and text.rstrip().endswith(f"boom_twin {EXAMPLES[command][-1]}")
+
+
+def test_defaults_are_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["rig", "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "--seed SEED of random moves and of the sensors' noise (0)" in text
+    assert text.count("angles,imu)") == 1
+
+
+def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "exit codes: 0 done, 1 the input or the run failed" in " ".join(capsys.readouterr().out.split())
+
+
+def test_as_a_module_and_quiet(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "boom_twin"]
+    session = str(Path(__file__).parents[2] / "bags" / "arch_session")
+    loud, quiet = (
+        subprocess.run([*command, "info", session, *more], capture_output=True, text=True, timeout=300, check=True)
+        for more in ([], ["--quiet"])
+    )
+    assert loud.stdout == quiet.stdout and loud.stderr.startswith("scene: ") and quiet.stderr == ""
+    failed = subprocess.run([*command, "info", str(tmp_path), "--quiet"], capture_output=True, text=True, timeout=300)
+    assert failed.returncode == 1 and failed.stderr.startswith("boom_twin info: ")
+
+
+def test_the_shell_is_told_what_may_follow(tmp_path: Path) -> None:
+    pytest.importorskip("argcomplete", reason="pip install .[test]")
+    answer, line = tmp_path / "answer", "boom_twin replay bag --no-"
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line, "COMP_POINT": str(len(line))}
+    command = [sys.executable, "-m", "boom_twin"]
+    environment = {**os.environ, **asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer)}
+    subprocess.run(command, env=environment, capture_output=True, timeout=300)
+    assert {word.strip() for word in answer.read_text().split("\n")} >= {"--no-pictures", "--no-health", "--no-changes"}
+
+
+def test_progress_without_a_terminal_is_a_line_for_every_tenth(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = TenthLines(70, "messages", "replay")
+    for _ in range(70):
+        lines.update(1)
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 10 and told[0] == "replay: 10 %, 7 of 70 messages" and told[-1] == "replay: 100 %, 70 of 70 messages"
+
+
+def drive(path: Path, *rows: str) -> str:
+    path.write_text("\n".join(["t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m", *rows]) + "\n")
+    return str(path)
+
+
+def test_simulate_starts_from_its_first_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [f"{t},{0.6 + 0.02 * t},0.16,0.22,0.18" for t in (0.0, 0.5, 1.0)]
+    arguments = ["simulate", "--drive", drive(tmp_path / "in.csv", *rows), "--out", str(tmp_path / "out.csv")]
+    assert main([*arguments, "--no-error-estimate"]) == 0
+    assert "started at rest   strokes 0.6, 0.16, 0.22, 0.18 m" in capsys.readouterr().out
+    assert main([*arguments, "--no-error-estimate", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["rows"] == 3 and told["stroke_m"] == [0.6, 0.16, 0.22, 0.18] and told["tip_travel_m"] > 0.01
+    assert main([*arguments, "--posture", "arch"]) == 1
+    assert "posture arch has" in capsys.readouterr().err
+
+
+def test_a_refused_stroke_is_told_with_its_likely_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = drive(tmp_path / "in.csv", *(f"{0.01 * row:.2f},630,165,235,187" for row in range(30)))
+    assert main(["replay", session, "--out", str(tmp_path / "out"), "--no-pictures"]) == 1
+    told = capsys.readouterr().err
+    assert "first refused value: cylinder_1 = 630 m, its travel is 0 to 0.79 m. In mm it would fit" in told
+    assert "replay: 100 %, 30 of 30 messages" in told
