@@ -5,6 +5,7 @@ The stable API, imported when first used::
     load_scene(path=None) -> Scene                      the boom; without a path, the default scene
     statics(scene, strokes=None, posture=None)          equilibrium, forces, natural frequencies
     simulate(scene, times, strokes, dt=1e-3)            the boom's answer to given strokes
+    frequency_response(scene, frequencies, posture=..)  the boom's answer to a harmonic force or stroke
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session through the twin
 """
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.equilibrium import statics
+    from .analysis.frequency_response import frequency_response
     from .analysis.simulate import simulate
     from .config.settings import Settings, load_settings
     from .offline.replay import replay
@@ -32,6 +34,7 @@ _HOMES = {
     "Settings": "config.settings",
     "Stream": "types",
     "Twin": "twin.twin",
+    "frequency_response": "analysis.frequency_response",
     "load_scene": "scene",
     "load_settings": "config.settings",
     "replay": "offline.replay",
@@ -46,6 +49,7 @@ __all__ = [
     "Settings",
     "Stream",
     "Twin",
+    "frequency_response",
     "load_scene",
     "load_settings",
     "replay",

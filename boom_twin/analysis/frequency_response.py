@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
-from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Motion, Z_SECTION, complex_scratch
+from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Motion, complex_scratch
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
@@ -117,21 +117,22 @@ class LinearisedBoom:
             The equations are singular at a frequency.
         """
         count = len(frequencies)
-        every = np.ascontiguousarray(np.broadcast_to(LARGE * np.asarray(loads, complex), (count, TIP_FORCE + self.plan.joints)))
-        increments, tip = np.zeros((count, len(self.plan.names)), complex), np.zeros((count, 3), complex)
+        every = np.ascontiguousarray(np.broadcast_to(LARGE * np.asarray(loads, complex), (count, self.load().size)))
+        increments = np.zeros((count, len(self.plan.names)), complex)
+        tip = np.zeros((count, 3), complex)
         rates = 2j * math.pi * np.asarray(frequencies, float)
-        status, row = harmonic_response(
-            self.plan.tables, self._state, self._work, self._drive, rates, every, increments, tip
-        )  # fmt: skip
+        tables, state, work = self.plan.tables, self._state, self._work
+        status, row = harmonic_response(tables, state, work, self._drive, rates, every, increments, tip)
         if status != OK:
             raise SolverError(f"the response at {frequencies[row]:g} Hz cannot be computed: {SENTENCES[int(status)]}.")
-        increments, tip = increments / LARGE, tip / LARGE
+        increments /= LARGE
+        tip /= LARGE
         return FrequencyResponse(
             frequencies=np.asarray(frequencies, float),
             tip=tip[:, :2],
-            joints=increments @ self._joints.T,
+            joints=np.asarray(increments @ self._joints.T, complex),
             cylinder_forces=increments[:, self.plan.tables.cylinders.z],
-            moments=increments @ self._moments.T,
+            moments=np.asarray(increments @ self._moments.T, complex),
             stations=self.stations,
         )
 

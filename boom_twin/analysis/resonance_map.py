@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -124,7 +125,7 @@ def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Arra
     """Joint angles (rad) along the way from posture to posture, in `steps` even steps of all joints from each to the next."""
     corners = [posture_angles(scene, name) for name in names]
     found = {names[0]: corners[0]}
-    for k, (before, after) in enumerate(zip(corners, corners[1:], strict=False)):
+    for k, (before, after) in enumerate(pairwise(corners)):
         for step in range(1, steps):
             share = step / steps
             found[f"{names[k]} to {names[k + 1]} {100.0 * share:.0f} %"] = before + share * (after - before)

@@ -18,7 +18,7 @@ from ..types import Array, ComplexArray
 from .frequency_response import LinearisedBoom, linearised_boom
 
 SAMPLES = 2048
-NEGLIGIBLE = 1e-7
+NEGLIGIBLE = 1e-6
 
 
 @dataclass(frozen=True)

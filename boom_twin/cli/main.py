@@ -39,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "urdf": "print a scene as a URDF, for robot_state_publisher",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "simulate": "the boom's answer to a stroke history",
+    "response": "frequency response, steady state under a periodic load, pump rates to avoid",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",
     "batch": "many recorded sessions through the twin, one table (extra batch)",

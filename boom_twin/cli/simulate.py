@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from argparse import ArgumentParser, Namespace
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_new, check_target, write_atomic
 from ..types import Array
+from .csv_columns import columns_text, read_columns
 from .main import add_scene, open_scene
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
@@ -48,11 +47,7 @@ def run(args: Namespace) -> int:
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate)
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
-    columns = result.columns()
-    table = np.column_stack(list(columns.values()))
-    text = StringIO(newline="")
-    np.savetxt(text, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
-    write_atomic(Path(args.out), text.getvalue())
+    write_atomic(Path(args.out), columns_text(result.columns()))
     for name, lost in zip(result.pin_names, result.lost_contacts, strict=True):
         print(f"{name}: contact lost {lost} times")
     if args.orbits:
@@ -79,28 +74,8 @@ def read_drive(path: Path, n: int) -> tuple[Array, Array]:
         The file cannot be read, has another header, no rows, or a value that is not a number; says where.
     """
     wanted = ["t_s", *(f"stroke_{i + 1}_m" for i in range(n))]
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}. Give a CSV file.") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise UsageError(f"{path}: no column {', '.join(missing)} in its first line. It needs {','.join(wanted)}.")
-    if len(rows) < 2:
-        raise UsageError(f"{path}: no rows below the header. Give at least one.")
-    places = [header.index(name) for name in wanted]
-    table = np.array([[_number(path, line, row, header, place) for place in places] for line, row in enumerate(rows[1:], 2)])
+    table = read_columns(path, wanted)
     return table[:, 0], table[:, 1:]
-
-
-def _number(path: Path, line: int, row: list[str], header: list[str], place: int) -> float:
-    try:
-        return float(row[place])
-    except (ValueError, IndexError):
-        value = row[place] if place < len(row) else ""
-        raise UsageError(f"{path}, line {line}: {header[place]} = {value!r} is not a number.") from None
 
 
 def _angles_near(scene: Scene, posture: str, first: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Dense frequency response: all unknowns at once by one complex solve, of the finite-segment boom and of the model's own equations."""
+"""Dense frequency response, all unknowns in one complex solve: of the finite-segment boom, and of the model's own equations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def of_segments(scene, fineness, drive_lengths, angles, frequencies, force=None,
     The load is a `force` (2,) at the tip in N, or 1 m of the drive of `cylinder` (0-based).
     """
     model = segments.Segments(scene, fineness)
-    _, boom, multipliers, stiffness = segments.equilibrium(model, drive_lengths, angles)
+    _, boom, _, stiffness = segments.equilibrium(model, drive_lengths, angles)
     n = len(stiffness)
     closures = np.array([c.g for c in boom.closures]).reshape(-1, n)
     rigid = [i for i, joint in enumerate(scene.joints) if joint.cylinder.k is None]
