@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:
-    """Amplitude and phase of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
+    """Amplitudes of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
 
     natural : (modes,) natural frequencies, Hz, drawn as lines.
     """
