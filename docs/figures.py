@@ -6,12 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from dimensions import angle, dimension, frame, leader, mass_centre, name, span
 
 from boom_twin.analysis.equilibrium import statics
+from boom_twin.cli.main import main as command
 from boom_twin.plots.boom import (
     boom_picture,
     draw_base,
@@ -199,6 +201,18 @@ def _rod_pin(axes: Any, joint: JointPins) -> None:
         leader(axes, middle, "R[1], left of Q→E (here −)", (-70, 92))
 
 
+def response_figures(out: Path) -> None:
+    """Frequency response, steady state and resonance map of the default scene, by the command itself."""
+    for given, made, name in (
+        (["--posture", "arch"], "response.png", "response.png"),
+        (["--posture", "arch", "--pump", "0.35:130"], "steady_state.png", "response_steady_state.png"),
+        (["--map", "all", "--pump", "0.4:130"], "resonance_map.png", "response_map.png"),
+    ):
+        with TemporaryDirectory() as folder:
+            assert command(["response", *given, "--out", f"{folder}/out"]) == 0
+            (out / name).write_bytes((Path(folder) / "out" / made).read_bytes())
+
+
 def main() -> None:
     """Write every picture into the folder that is given, by default beside this script."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else __file__)
@@ -211,6 +225,7 @@ def main() -> None:
     for i, degrees in ((1, -42.0), (2, -42.0), (3, -42.0)):
         assert np.isfinite(stroke_curve(scene, i, np.radians([degrees]))).all()
         six_bar_figure(scene, i, float(np.radians(degrees)), out / f"symbols_b{i}.png")
+    response_figures(out)
 
 
 if __name__ == "__main__":
