@@ -205,7 +205,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
 
 
 def _map(scene: Scene, args: Namespace) -> Answer:
-    from ..analysis.resonance_map import named_postures, postures_along, resonance_map
+    from ..analysis.resonance_map import postures_along, resonance_map
     from ..analysis.steady_state import pump_load
     from ..plots.frequency_response import resonance_picture
 
@@ -214,7 +214,9 @@ def _map(scene: Scene, args: Namespace) -> Answer:
     if not 1 <= args.steps <= 1000:
         raise UsageError(f"--steps {args.steps}: must be 1 to 1000 from each posture to the next.")
     names = list(scene.postures) if args.map == "all" else args.map.split(",")
-    postures = named_postures(scene) if args.map == "all" and args.steps == 1 else postures_along(scene, names, args.steps)
+    if not names:
+        raise UsageError("--map all: the scene names no posture. Add `postures` to it.")
+    postures = postures_along(scene, names, args.steps)
     found = resonance_map(scene, postures, np.linspace(*args.rates), lambda rate: pump_load(scene, rate, *args.pump[1:]))
     title = f"Resonance map: pump pulses of {args.pump[1]:g} N"
     bands = found.to_avoid()
