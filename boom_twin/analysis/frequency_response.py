@@ -15,12 +15,11 @@ import numpy as np
 
 from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
-from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Motion, complex_scratch
-from ..kernels.transfer.clearance_pins import load_pins
+from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, complex_scratch
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
-from ..scene.schema import Scene
+from ..scene.schema import Scene, refuse_clearance
 from ..types import Array, ComplexArray
 from .bending_moments import Station, moments_by_unknowns, stations
 from .equilibrium import checked_strokes, rest_at
@@ -78,8 +77,6 @@ class FrequencyResponse:
 class LinearisedBoom:
     """A boom at rest, for harmonic loads small enough that it answers in proportion.
 
-    Pins with clearance stay pressed where the weight holds them: contact is its spring at that force, without damping.
-
     Parameters
     ----------
     scene : Scene
@@ -88,15 +85,17 @@ class LinearisedBoom:
 
     Raises
     ------
+    UsageError
+        The scene has pins with clearance, which do not answer in proportion.
     SolverError
         No equilibrium there.
     """
 
     def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:
+        refuse_clearance(scene, "a frequency response")
         self.plan, self._state, work = rest_at(scene, strokes, angles)
         self.stations = stations(scene)
         place(self.plan.tables, self._state, work)
-        load_pins(self.plan.tables, self._state, work, Motion(0.0, 0.0, work.position, np.zeros_like(work.position)))
         self._drive = drive_at_rest(self.plan, self._state, work)
         self._work = complex_scratch(work)
         self._joints, self._moments = joint_angles_by_unknowns(self.plan), moments_by_unknowns(self.plan)
@@ -197,7 +196,8 @@ def frequency_response(
     Raises
     ------
     UsageError
-        As `statics` does; frequencies that are negative or not finite; a force and a drive; a cylinder that is not there.
+        As `statics` does; frequencies that are negative or not finite; a force and a drive; a cylinder that is not there; pins
+        with clearance.
     SolverError
         No stable equilibrium was found.
 

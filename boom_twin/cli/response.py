@@ -144,7 +144,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
         [title, "", *_resonances(found, static, natural)],
         columns,
         lambda path: response_picture(path, title, unit, found, natural),
-        (*rest.doubts, *_worn(scene)),
+        rest.doubts,
     )
 
 
@@ -200,7 +200,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
         f"tip acceleration    {acceleration:.3f} m/s2 at most",
         "cylinder forces     " + ", ".join(f"{force:.0f}" for force in forces) + " N peak to peak",
     ]
-    doubts = (*_worn(scene), *_large(scene, found.swing))
+    doubts = _large(scene, found.swing)
     return Answer("steady_state", values, lines, found.columns(), lambda path: steady_state_picture(path, title, found), doubts)
 
 
@@ -243,15 +243,8 @@ def _map(scene: Scene, args: Namespace) -> Answer:
         ]
     columns = {"rate_Hz": found.rates}
     columns |= {f"swing_m_{name.replace(',', ' ')}": row for name, row in zip(found.postures, found.swing, strict=True)}
-    doubts = (*_worn(scene), *_large(scene, float(found.swing.max())))
+    doubts = _large(scene, float(found.swing.max()))
     return Answer("resonance_map", values, lines, columns, lambda path: resonance_picture(path, title, found), doubts)
-
-
-def _worn(scene: Scene) -> tuple[str, ...]:
-    """What a linear answer leaves out of pins with clearance."""
-    if scene.clearance is None:
-        return ()
-    return ("pins with clearance are taken as pressed where the weight holds them; loads that lift a journal need `simulate`",)
 
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:

@@ -70,13 +70,18 @@ def test_map_on_a_way(capsys: Capture, tmp_path: Path) -> None:
     assert "harmonic" in capsys.readouterr().out
 
 
-def test_a_swing_out_of_proportion_and_worn_pins_are_told(capsys: Capture, tmp_path: Path) -> None:
+def test_a_swing_out_of_proportion_is_told(capsys: Capture) -> None:
+    assert main(["response", "--posture", "horizontal", "--pump", "0.99:500"]) == 0
+    assert "no boom answers in proportion" in capsys.readouterr().err
+
+
+def test_worn_pins_are_refused(capsys: Capture, tmp_path: Path) -> None:
     assert main(["scene", "--clearance"]) == 0
     scene = tmp_path / "worn.yaml"
     scene.write_text(capsys.readouterr().out)
-    assert main(["response", str(scene), "--posture", "horizontal", "--pump", "0.99:500"]) == 0
-    told = capsys.readouterr().err
-    assert "no boom answers in proportion" in told and "pins with clearance" in told
+    for given in (["--posture", "arch"], ["--posture", "arch", "--pump", "0.4:130"], ["--map", "all", "--pump", "0.4:130"]):
+        assert main(["response", str(scene), *given]) == 1
+        assert "clearance" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -32,10 +32,11 @@ def harmonic_response(t, state, work, drive, rates, loads, increments, tip):
     Parameters
     ----------
     t : Tables
+        Of a boom without clearance: a sweep of forces alone is for ideal pins.
     state : State
         In equilibrium, and placed in `work`.
     work : Work
-        As `kernels.tables.complex_scratch` makes it; `hold` has the forces and tangents of pins with clearance.
+        As `kernels.tables.complex_scratch` makes it.
     drive : ndarray, shape (n,)
         Drive lengths of the state, m.
     rates : ndarray of complex, shape (k,)
