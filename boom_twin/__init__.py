@@ -6,6 +6,7 @@ The stable API, imported when first used::
     statics(scene, "arch")                              equilibrium, forces, natural frequencies; or at strokes
     simulate(scene, times, strokes, dt=1e-3)            the boom's answer to given strokes
     undeflected(scene, strokes, joint_rates=None)       a state that a simulation may start from
+    frequency_response(scene, frequencies, posture=..)  the boom's answer to a harmonic force or stroke
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session through the twin
     TimeWindow(start, duration)                         a part of a session, for replay
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.equilibrium import statics
+    from .analysis.frequency_response import frequency_response
     from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
     from .bag.time_window import TimeWindow
@@ -39,6 +41,7 @@ _HOMES = {
     "Stream": "types",
     "TimeWindow": "bag.time_window",
     "Twin": "twin.twin",
+    "frequency_response": "analysis.frequency_response",
     "load_scene": "scene",
     "load_settings": "config.settings",
     "replay": "offline.replay",
@@ -55,6 +58,7 @@ __all__ = [
     "Stream",
     "TimeWindow",
     "Twin",
+    "frequency_response",
     "load_scene",
     "load_settings",
     "replay",

@@ -13,8 +13,10 @@ if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    ComplexArray = NDArray[np.complex128]
 else:
     Array = Any
+    ComplexArray = Any
 
 
 NANO = 1e-9

@@ -6,12 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from dimensions import angle, dimension, frame, leader, mass_centre, name, span
 
 from boom_twin.analysis.equilibrium import statics
+from boom_twin.cli.main import main as command
 from boom_twin.plots.boom import (
     boom_picture,
     draw_base,
@@ -229,6 +231,18 @@ def _side(axes: Any, joint: JointPins, told: str, up: float) -> None:
     name(axes, joint.pivot + np.array([-0.45, -up * 0.35]), told, (0, 0), ORANGE)
 
 
+def response_figures(out: Path) -> None:
+    """Frequency response, steady state and resonance map of the default scene, by the command itself."""
+    for given, made, name in (
+        (["--posture", "arch"], "response.png", "response.png"),
+        (["--posture", "arch", "--pump", "0.35:130"], "steady_state.png", "response_steady_state.png"),
+        (["--map", "all", "--pump", "0.4:130"], "resonance_map.png", "response_map.png"),
+    ):
+        with TemporaryDirectory() as folder:
+            assert command(["response", *given, "--out", f"{folder}/out"]) == 0
+            (out / name).write_bytes((Path(folder) / "out" / made).read_bytes())
+
+
 def main() -> None:
     """Write every picture into the folder that is given, by default beside this script."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else __file__)
@@ -245,6 +259,7 @@ def main() -> None:
     example, _ = examine_text(example_text("five_section_z_fold"), "example")
     title = "Five-section Z-fold boom, posture arch: at rest under gravity"
     boom_picture(example, statics(example, posture="arch"), out / "z_fold_arch.png", title, "synthetic parameters")
+    response_figures(out)
 
 
 if __name__ == "__main__":

@@ -76,7 +76,7 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     """Negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
     place(plan.tables, state, work)
     position, still = work.position.copy(), np.zeros_like(work.position)
-    drive = _drive(plan, state, work)
+    drive = drive_at_rest(plan, state, work)
     for _ in range(TRIES):
         status, negative, condensed = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
         if status == OK:
@@ -94,7 +94,7 @@ def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array
     return int(status), int(negative), work.condensed
 
 
-def _drive(plan: Plan, state: State, work: Work) -> Array:
+def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
     """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
     cylinders = plan.tables.cylinders
     return np.asarray(work.position[cylinders.history] - plan.compliances(state.drives[0]) * state.z[cylinders.z])
@@ -173,7 +173,7 @@ def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -
     """
     place(plan.tables, state, work)
     position, still = work.position.copy(), np.zeros_like(work.position)
-    drive, sides = _drive(plan, state, work), []
+    drive, sides = drive_at_rest(plan, state, work), []
     for size in (LOAD, -LOAD):
         motion = Motion(-omega * omega, 0.0, position + size * load, still)
         _, _, condensed = _condense(plan, state, work, motion, drive)

@@ -13,6 +13,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "mapping": ("mapping",),
     "urdf": ("urdf my_boom.yaml",),
     "statics": ("statics my_boom.yaml --posture arch", "statics --strokes=0.63,0.165,0.235,0.187 --json"),
+    "response": ("response my_boom.yaml --posture arch", "response --posture arch --pump 0.4:130"),
+    "envelope": ("envelope my_boom.yaml --out out/envelope",),
+    "init": ("init --example-table > boom_table.yaml", "init --table boom_table.yaml --out my_boom.yaml"),
     "simulate": ("simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",),
     "replay": (
         "replay bags/arch_session --out out/replay --report",

@@ -46,6 +46,7 @@ COMMANDS: dict[str, str] = {
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "envelope": "sag, forces, frequencies, stresses over the whole range",
     "simulate": "the boom's answer to a stroke history",
+    "response": "frequency response, steady state under a periodic load, pump rates to avoid",
     "replay": "a recorded session through the twin",
     "calibrate": "parameters of a scene from healthy sessions",
     "batch": "many recorded sessions through the twin, one table (extra batch)",

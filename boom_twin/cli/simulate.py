@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_new, check_target, write_atomic
-from ..system.csv_table import read_csv
+from ..system.csv_table import columns_text, read_csv
 from ..system.summary_display import numbers
 from ..types import Array
 from .main import add_json, add_scene, open_scene, print_result
@@ -65,11 +64,7 @@ def run(args: Namespace) -> int:
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
-    columns = result.columns()
-    table = np.column_stack(list(columns.values()))
-    text = StringIO(newline="")
-    np.savetxt(text, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
-    write_atomic(Path(args.out), text.getvalue())
+    write_atomic(Path(args.out), columns_text(result.columns()))
     if args.save_state:
         write_state(Path(args.save_state), result.end)
     balance = energy_balance(course_of(scene, times, strokes, args.dt, angles, start=start), args.dt) if args.check else None

@@ -81,7 +81,7 @@ def condense(s, p, coupling, block, force, m, n):
         pivot = block[k, k]
         if not abs(pivot) > SMALLEST_PIVOT:
             return -1
-        if pivot < 0.0:
+        if pivot.real < 0.0:
             negative += 1
         inverse = 1.0 / pivot
         for j in range(k):

@@ -205,6 +205,22 @@ class Work(NamedTuple):
     cut: Array  # (SLOTS,)
 
 
+OF_FORCES = (
+    "offset", "s", "p", "g", "h", "own_g", "own_h", "right", "hold", "apart", "local", "drive", "drive_rate", "dz", "cut",
+)  # fmt: skip
+"""Fields of `Work` that hold forces, tangents, increments and drives; positions and shapes are the others."""
+
+
+def complex_scratch(work: Work) -> Work:
+    """`work` with complex arrays for forces, tangents, increments and drives; positions and shapes are the same arrays.
+
+    For the sweeps with complex weights, see `kernels.transfer.frequency_response`.
+    """
+    own = {name: getattr(work, name).astype(complex) for name in OF_FORCES}
+    condensed = Condensed(*(each.astype(complex) if each.dtype == float else each for each in work.condensed))
+    return work._replace(**own, condensed=condensed)
+
+
 OK, NOT_CONVERGED, SINGULAR, NOT_FINITE, DIGITS_LOST = range(5)
 
 SENTENCES = {

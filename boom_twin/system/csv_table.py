@@ -1,13 +1,17 @@
-"""Read tables of numbers from CSV files, with errors that name the line and the column."""
+"""Read and write tables of numbers as CSV files; errors name the line and the column."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import BoomTwinError
+from ..types import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,3 +73,10 @@ def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     if header and not rows:
         raise error(f"{path}: no rows below the header. Give at least one.")
     return table
+
+
+def columns_text(columns: Mapping[str, Array]) -> str:
+    """A CSV file of `columns`, each (rows,), with their names as its header."""
+    text = StringIO(newline="")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
+    return text.getvalue()

@@ -185,8 +185,9 @@ def _turn_back(g, h, force):
     dgamma = n.(dR - dC)/l, so the gradient by R is M/l n, and by C its opposite. The axis is read from the row of the
     cylinder's law: its derivative by R is e over a positive number, which the norm takes out. Its tangent is left out.
     """
-    share = force / math.hypot(h[AXIAL, END_R], h[AXIAL, END_R + 1])
-    ex, ey = share * h[AXIAL, END_R], share * h[AXIAL, END_R + 1]
+    along_x, along_y = h[AXIAL, END_R].real, h[AXIAL, END_R + 1].real  # real by itself also in a frequency response
+    share = force / math.hypot(along_x, along_y)
+    ex, ey = share * along_x, share * along_y
     g[END_C] += ey
     g[END_C + 1] -= ex
     g[END_R] -= ey

@@ -21,10 +21,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ...errors import UsageError
+from ...scene.pump_pulses import CHANGE_OVER, ease, pump_pulses, upward
 from ...scene.schema import Scene
 from ...types import Array
 from .exudyn.solve import TipLoad
-from .motion import ease
 
 FORM = "pump:FREQUENCY:HEIGHT[:CHANGE_OVER][@ONSET] or wind:DEVIATION[:TIME_SCALE][@ONSET]"
 COARSE = 0.02  # s between points of the wind, splined; it has no part above 25 Hz
@@ -59,7 +59,7 @@ class PumpLoad:
 
     frequency: float
     height: float
-    change_over: float = 0.1
+    change_over: float = CHANGE_OVER
     onset: float = 0.0
 
     def __post_init__(self) -> None:
@@ -72,12 +72,11 @@ class PumpLoad:
 
     def force(self, times: Array, _duration: float, _seed: Sequence[int]) -> Array:
         """Force (m,) in N, upward, at `times` (m,) in s."""
-        into = np.maximum(times - self.onset, 0.0) % (1.0 / self.frequency)
-        return self.height * (ease(into / self.change_over) - ease((into - 0.5 / self.frequency) / self.change_over))
+        return self.height * pump_pulses(times - self.onset, self.frequency, self.change_over)
 
     def direction(self, inclination: float) -> Array:
         """Unit vector (2,) in the axes of a base that is inclined so (rad): vertical, up."""
-        return np.array([math.sin(inclination), math.cos(inclination)])
+        return upward(inclination)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,15 +10,10 @@ import numpy as np
 from ...errors import UsageError
 from ...scene.kinematics import stroke_range, strokes_of_posture
 from ...scene.load import load_scene
+from ...scene.pump_pulses import ease
 from ...scene.schema import Scene
 from ...types import Array
 from .exudyn.system import section_frames
-
-
-def ease(x: Array) -> Array:
-    """Quintic from 0 to 1 over x in [0, 1] with zero rate and acceleration at both ends."""
-    x = np.clip(x, 0.0, 1.0)
-    return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
 
 
 def ease_rate(x: Array) -> Array:

@@ -1,0 +1,241 @@
+"""Frequency response about the deflected equilibrium: from a force at the tip or a cylinder's drive to tip, joints, forces.
+
+The boom linearised at rest is solved at every frequency by the complex sweeps of `kernels.transfer.frequency_response`; no
+natural mode is left out. What is left out is what the model leaves out at all frequencies: a flexible part bends in as many
+shapes as the scene's `modes` says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiler.plan import Plan
+from ..errors import SolverError, UsageError
+from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, complex_scratch
+from ..kernels.transfer.forward_kinematics import place
+from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
+from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
+from ..scene.schema import Scene, refuse_clearance
+from ..types import Array, ComplexArray
+from .bending_moments import Station, moments_by_unknowns, stations
+from .equilibrium import checked_strokes, rest_at
+from .modal import drive_at_rest
+
+LARGE = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
+UPWARD = (0.0, 1.0)  # N
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Complex amplitudes at k frequencies: a quantity moves by the real part of its amplitude times e^(2 pi i f t).
+
+    n sections, m stations.
+
+    Attributes
+    ----------
+    frequencies : ndarray, shape (k,)
+        Hz.
+    tip : ndarray of complex, shape (k, 2)
+        Displacement of the tip from its place at rest, x and y, m.
+    joints : ndarray of complex, shape (k, n)
+        Change of the joint angles, rad.
+    cylinder_forces : ndarray of complex, shape (k, n)
+        Their change, N, positive in tension.
+    moments : ndarray of complex, shape (k, m)
+        Change of the bending moments, N m, positive where the outboard end is bent up; without material damping.
+    stations : tuple of Station
+        Where: section and place.
+    """
+
+    frequencies: Array
+    tip: ComplexArray
+    joints: ComplexArray
+    cylinder_forces: ComplexArray
+    moments: ComplexArray
+    stations: tuple[Station, ...]
+
+    @property
+    def tip_acceleration(self) -> ComplexArray:
+        """Of the tip, m/s^2, shape (k, 2)."""
+        return np.asarray(-((2.0 * math.pi * self.frequencies[:, None]) ** 2) * self.tip)
+
+    def channels(self) -> dict[str, ComplexArray]:
+        """All quantities by name and unit, each of shape (k,)."""
+        found = {"tip_x_m": self.tip[:, 0], "tip_y_m": self.tip[:, 1]}
+        found |= {f"tip_a{axis}_m_s2": column for axis, column in zip("xy", self.tip_acceleration.T, strict=True)}
+        found |= {f"joint_{i + 1}_rad": column for i, column in enumerate(self.joints.T)}
+        found |= {f"cylinder_force_{i + 1}_N": column for i, column in enumerate(self.cylinder_forces.T)}
+        for station, column in zip(self.stations, self.moments.T, strict=True):
+            found[f"moment_section_{station.section + 1}_at_{station.place:.2f}_Nm"] = column
+        return found
+
+
+class LinearisedBoom:
+    """A boom at rest, for harmonic loads small enough that it answers in proportion.
+
+    Parameters
+    ----------
+    scene : Scene
+    strokes, angles : ndarray, shape (n,)
+        Absolute strokes (m), and the joint angles (rad) of the undeformed boom next to which the equilibrium is looked for.
+
+    Raises
+    ------
+    UsageError
+        The scene has pins with clearance, which do not answer in proportion.
+    SolverError
+        No equilibrium there.
+    """
+
+    def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:
+        refuse_clearance(scene, "a frequency response")
+        self.plan, self._state, work = rest_at(scene, strokes, angles)
+        self.stations = stations(scene)
+        place(self.plan.tables, self._state, work)
+        self._drive = drive_at_rest(self.plan, self._state, work)
+        self._work = complex_scratch(work)
+        self._joints, self._moments = joint_angles_by_unknowns(self.plan), moments_by_unknowns(self.plan)
+
+    def respond(self, frequencies: Array, loads: ComplexArray) -> FrequencyResponse:
+        """The answer at `frequencies` (k,), in Hz, to a load at each of them.
+
+        Parameters
+        ----------
+        frequencies : ndarray, shape (k,)
+            Hz; 0 is the static limit.
+        loads : ndarray of complex, shape (k, 2 + n) or (2 + n,)
+            Force at the tip in x and y (N), then the drive of every cylinder (m).
+
+        Raises
+        ------
+        SolverError
+            The equations are singular at a frequency.
+        """
+        count = len(frequencies)
+        every = np.ascontiguousarray(np.broadcast_to(LARGE * np.asarray(loads, complex), (count, self.load().size)))
+        increments = np.zeros((count, len(self.plan.names)), complex)
+        tip = np.zeros((count, 3), complex)
+        rates = 2j * math.pi * np.asarray(frequencies, float)
+        tables, state, work = self.plan.tables, self._state, self._work
+        status, row = harmonic_response(tables, state, work, self._drive, rates, every, increments, tip)
+        if status != OK:
+            raise SolverError(f"the response at {frequencies[row]:g} Hz cannot be computed: {SENTENCES[int(status)]}.")
+        increments /= LARGE
+        tip /= LARGE
+        return FrequencyResponse(
+            frequencies=np.asarray(frequencies, float),
+            tip=tip[:, :2],
+            joints=np.asarray(increments @ self._joints.T, complex),
+            cylinder_forces=increments[:, self.plan.tables.cylinders.z],
+            moments=np.asarray(increments @ self._moments.T, complex),
+            stations=self.stations,
+        )
+
+    def load(self, tip_force: Sequence[float] = (0.0, 0.0), drive: int | None = None) -> ComplexArray:
+        """A load for `respond`, shape (2 + n,): force at the tip (N), and 1 m of the drive of a cylinder, counted from 0."""
+        found = np.zeros(TIP_FORCE + self.plan.joints, complex)
+        found[:TIP_FORCE] = tip_force
+        if drive is not None:
+            found[TIP_FORCE + drive] = 1.0
+        return found
+
+
+def linearised_boom(scene: Scene, strokes: Array | None = None, posture: str | None = None) -> LinearisedBoom:
+    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture of the scene.
+
+    Raises
+    ------
+    UsageError
+        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
+    SolverError
+        No stable equilibrium was found.
+    """
+    if (strokes is None) == (posture is None):
+        raise UsageError("give either strokes or a posture, not both and not neither.")
+    if posture is not None:
+        return LinearisedBoom(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
+    assert strokes is not None
+    strokes = checked_strokes(scene, strokes)
+    return LinearisedBoom(scene, strokes, joint_angles_of_strokes(scene, strokes))
+
+
+def frequency_response(
+    scene: Scene,
+    frequencies: Array,
+    strokes: Array | None = None,
+    posture: str | None = None,
+    tip_force: Sequence[float] | None = None,
+    drive: int | None = None,
+) -> FrequencyResponse:
+    """Answer to a harmonic force at the tip, or to a harmonic stroke of one cylinder, about the equilibrium under gravity.
+
+    Parameters
+    ----------
+    scene : Scene
+        The boom, of n sections.
+    frequencies : ndarray, shape (k,)
+        Hz, at least 0; 0 gives the static limit.
+    strokes : ndarray, shape (n,), optional
+        Absolute strokes at rest, m.
+    posture : str, optional
+        A posture of the scene; just one of strokes and posture is given.
+    tip_force : sequence of two numbers, optional
+        Amplitude of the force at the tip in x and y, N; by default 1 N in y.
+    drive : int, optional
+        Instead of a force: the cylinder, counted from 1, whose drive moves with an amplitude of 1 m (the answer is linear).
+
+    Returns
+    -------
+    FrequencyResponse
+        Complex amplitudes of tip, joint angles, cylinder forces and bending moments.
+
+    Raises
+    ------
+    UsageError
+        As `statics` does; frequencies that are negative or not finite; a force and a drive; a cylinder that is not there; pins
+        with clearance.
+    SolverError
+        No stable equilibrium was found.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from boom_twin import frequency_response, load_scene
+    >>> found = frequency_response(load_scene(), np.linspace(0.05, 30.0, 300), posture="arch")
+    >>> gain = abs(found.tip[:, 1])  # m of the tip's height per N
+    """
+    frequencies = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies >= 0.0)):
+        raise UsageError(f"frequencies = {frequencies}: must be finite and at least 0 Hz, in one row.")
+    if tip_force is not None and drive is not None:
+        raise UsageError("tip_force and drive: give one of them, the answers add up.")
+    n = len(scene.joints)
+    if drive is not None and not 1 <= drive <= n:
+        raise UsageError(f"drive = {drive}: the scene has cylinders 1 to {n}. Name one of them.")
+    if tip_force is not None and not (len(tip_force) == 2 and np.all(np.isfinite(tip_force))):
+        raise UsageError(f"tip_force = {tip_force}: give two numbers, the force in x and y (N).")
+    boom = linearised_boom(scene, strokes, posture)
+    force = tip_force if tip_force is not None else UPWARD
+    return boom.respond(frequencies, boom.load(force) if drive is None else boom.load(drive=drive - 1))
+
+
+def joint_angles_by_unknowns(plan: Plan) -> Array:
+    """Derivatives of the joint angles by the unknowns, shape (n, unknowns): a section's root against the head before it."""
+    t, found = plan.tables, np.zeros((plan.joints, len(plan.names)))
+    head, joint = np.zeros(len(plan.names)), 0
+    for operation in t.operations:
+        row = operation.row
+        if operation.kind in (JOINT_A, JOINT_B):
+            root = np.zeros_like(head)
+            root[t.joints[row].z + Z_SECTION] = 1.0
+            found[joint] = root - head
+            head, joint = root, joint + 1
+        elif operation.kind == BEAM:
+            beam = t.beams[row]
+            head = head.copy()
+            head[beam.z : beam.z + beam.bending] += t.psi[row, beam.points, : beam.bending]
+    return found

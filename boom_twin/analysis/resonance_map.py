@@ -1,0 +1,141 @@
+"""Resonance map: how far pump pulses swing the tip, over postures and pump rates; which rates to avoid where.
+
+A pulse has many harmonics, so a boom swings most where one of them meets a natural frequency, not only at that frequency
+itself: with a first mode at 1.06 Hz already at 0.35 Hz, by the third harmonic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import UsageError
+from ..scene.kinematics import posture_angles, stroke_curve
+from ..scene.schema import Scene
+from ..types import Array
+from .equilibrium import checked_strokes
+from .frequency_response import LinearisedBoom
+from .steady_state import PeriodicLoad, steady_state_of
+
+TOO_MUCH = 1.5  # times the median swing of a posture: such rates are to be avoided
+
+
+@dataclass(frozen=True)
+class RateToAvoid:
+    """A band of rates at which one posture swings too much.
+
+    Attributes
+    ----------
+    posture : str
+    low, high : float
+        Hz, of the rates in the map at which the swing is above `TOO_MUCH` times the posture's median.
+    rate, swing : float
+        Where it is largest, Hz, and how large, m.
+    harmonic : int
+        Of the load, that moves the tip most there.
+    """
+
+    posture: str
+    low: float
+    high: float
+    rate: float
+    swing: float
+    harmonic: int
+
+
+@dataclass(frozen=True)
+class ResonanceMap:
+    """Swing of the tip, peak to peak, over p postures and r rates.
+
+    Attributes
+    ----------
+    postures : tuple of str
+    rates : ndarray, shape (r,)
+        Of the load, Hz.
+    swing : ndarray, shape (p, r)
+        m.
+    harmonics : ndarray of int, shape (p, r)
+        Which harmonic of the load moves the tip most.
+    """
+
+    postures: tuple[str, ...]
+    rates: Array
+    swing: Array
+    harmonics: np.ndarray
+
+    def to_avoid(self) -> tuple[RateToAvoid, ...]:
+        """The bands to avoid, posture by posture, ascending in rate."""
+        found = []
+        for name, swing, harmonics in zip(self.postures, self.swing, self.harmonics, strict=True):
+            above = np.concatenate([[False], swing > TOO_MUCH * np.median(swing), [False]])
+            starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
+            for start, stop in zip(starts, stops, strict=True):
+                peak = start + int(np.argmax(swing[start:stop]))
+                found.append(
+                    RateToAvoid(
+                        name, float(self.rates[start]), float(self.rates[stop - 1]), float(self.rates[peak]),
+                        float(swing[peak]), int(harmonics[peak]),
+                    )
+                )  # fmt: skip
+        return tuple(found)
+
+
+def resonance_map(
+    scene: Scene, postures: Mapping[str, Array], rates: Array, load_at: Callable[[float], PeriodicLoad]
+) -> ResonanceMap:
+    """Swing of the tip in the steady state of every posture under the load at every rate.
+
+    Parameters
+    ----------
+    scene : Scene
+        The boom, of n sections.
+    postures : mapping
+        Joint angles (rad), shape (n,), of the undeformed boom, by name; see `named_postures`, `postures_along`.
+    rates : ndarray, shape (r,)
+        Hz.
+    load_at : callable
+        The load at a rate, see `boom_twin.analysis.steady_state.pump_load`.
+
+    Raises
+    ------
+    UsageError
+        A posture is out of the cylinders' travel.
+    SolverError
+        One has no stable equilibrium.
+    """
+    loads = [load_at(float(rate)) for rate in rates]
+    swing, harmonics = np.zeros((len(postures), len(rates))), np.zeros((len(postures), len(rates)), np.int64)
+    for i, (name, angles) in enumerate(postures.items()):
+        boom = LinearisedBoom(scene, _strokes(scene, name, angles), angles)
+        for j, load in enumerate(loads):
+            found = steady_state_of(boom, load)
+            swing[i, j], harmonics[i, j] = found.swing, 1 + int(np.argmax(found.harmonics))
+    return ResonanceMap(tuple(postures), np.asarray(rates, float), swing, harmonics)
+
+
+def named_postures(scene: Scene) -> dict[str, Array]:
+    """Joint angles (rad) of all postures of the scene."""
+    return {name: posture_angles(scene, name) for name in scene.postures}
+
+
+def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Array]:
+    """Joint angles (rad) along the way from posture to posture, in `steps` even steps of all joints from each to the next."""
+    corners = [posture_angles(scene, name) for name in names]
+    found = {names[0]: corners[0]}
+    for k, (before, after) in enumerate(pairwise(corners)):
+        for step in range(1, steps):
+            share = step / steps
+            found[f"{names[k]} to {names[k + 1]} {100.0 * share:.0f} %"] = before + share * (after - before)
+        found[names[k + 1]] = after
+    return found
+
+
+def _strokes(scene: Scene, name: str, angles: Array) -> Array:
+    strokes = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(len(scene.joints))])
+    try:
+        return checked_strokes(scene, strokes)
+    except UsageError as error:
+        raise UsageError(f"posture {name}: {error} Leave it out, or go another way.") from None

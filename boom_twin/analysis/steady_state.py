@@ -1,0 +1,195 @@
+"""Steady state under a periodic load at the tip: its Fourier series through the frequency response.
+
+The load is sampled at `SAMPLES` even instants of a period; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest
+is answered by the boom linearised at rest, its mean by the static limit, and the answers are added up in time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import UsageError
+from ..scene.pump_pulses import CHANGE_OVER, pump_pulses, upward
+from ..scene.schema import Scene
+from ..types import Array, ComplexArray
+from .frequency_response import LinearisedBoom, linearised_boom
+
+SAMPLES = 2048
+NEGLIGIBLE = 1e-6
+
+
+@dataclass(frozen=True)
+class PeriodicLoad:
+    """A force at the tip that repeats.
+
+    Attributes
+    ----------
+    period : float
+        s.
+    forces : ndarray, shape (m, 2)
+        In x and y, N, at m even instants of a period, the first at its start.
+    """
+
+    period: float
+    forces: Array
+
+    @property
+    def times(self) -> Array:
+        """Of the forces, s, shape (m,)."""
+        return self.period * np.arange(len(self.forces)) / len(self.forces)
+
+
+def pump_load(scene: Scene, frequency: float, height: float, change_over: float = CHANGE_OVER) -> PeriodicLoad:
+    """Vertical pump pulses of `frequency` (Hz) and `height` (N): on for half of a period, flanks of `change_over` (s).
+
+    Raises
+    ------
+    UsageError
+        A number is not positive, or flanks take longer than half a period.
+    """
+    for name, value, unit in (("rate", frequency, "Hz"), ("height", height, "N"), ("change-over", change_over, "s")):
+        if not 0.0 < value < math.inf:
+            raise UsageError(f"pump {name} = {value:g} {unit}: must be positive. Give three numbers like 0.4, 130 and 0.1.")
+    if change_over > 0.5 / frequency:
+        raise UsageError(
+            f"pump change-over = {change_over:g} s: at {frequency:g} Hz it must be at most half a period, "
+            f"{0.5 / frequency:g} s. Give less."
+        )
+    times = np.arange(SAMPLES) / (SAMPLES * frequency)
+    pulses = height * pump_pulses(times, frequency, change_over)
+    return PeriodicLoad(1.0 / frequency, pulses[:, None] * upward(scene.base.inclination))
+
+
+def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
+    """A load that goes straight from row to row; the last row ends the period with the force of the first.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+        s, increasing; the period is from the first to the last.
+    forces : ndarray, shape (m, 2)
+        In x and y, N.
+
+    Raises
+    ------
+    UsageError
+        Fewer than three rows, a value that is not finite, times that do not increase, ends that differ.
+    """
+    if len(times) < 3 or not (np.isfinite(times).all() and np.isfinite(forces).all()):
+        raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
+    if np.any(np.diff(times) <= 0.0):
+        row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
+        raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the load: not after row {row + 1}. Sort the rows.")
+    if not np.allclose(forces[0], forces[-1], rtol=1e-9, atol=1e-9 * float(np.abs(forces).max())):
+        raise UsageError(
+            f"load: begins with ({forces[0, 0]:g}, {forces[0, 1]:g}) N and ends with ({forces[-1, 0]:g}, {forces[-1, 1]:g}) N. "
+            "The last row ends the period: give it the force of the first."
+        )
+    period = float(times[-1] - times[0])
+    at = times[0] + period * np.arange(SAMPLES) / SAMPLES
+    return PeriodicLoad(period, np.stack([np.interp(at, times, column) for column in forces.T], axis=1))
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """One period of a boom's motion under a periodic load, about its equilibrium without it; n sections.
+
+    Attributes
+    ----------
+    load : PeriodicLoad
+    times : ndarray, shape (m,)
+        s.
+    tip, tip_acceleration : ndarray, shape (m, 2)
+        Displacement from the place at rest, m; m/s^2.
+    joints, cylinder_forces : ndarray, shape (m, n)
+        Changes, rad, N.
+    harmonics : ndarray, shape (k,)
+        Amplitude of the tip's displacement at 1, 2, .. times the rate of the load, m (0 where it has no such part).
+    """
+
+    load: PeriodicLoad
+    times: Array
+    tip: Array
+    tip_acceleration: Array
+    joints: Array
+    cylinder_forces: Array
+    harmonics: Array
+
+    @property
+    def swing(self) -> float:
+        """Peak to peak: the largest distance between two places of the tip in a period, m."""
+        return swing_of(self.tip)
+
+    def columns(self) -> dict[str, Array]:
+        """All quantities by name and unit, each of shape (m,)."""
+        found = {"t_s": self.times, "fx_N": self.load.forces[:, 0], "fy_N": self.load.forces[:, 1]}
+        found |= {"tip_x_m": self.tip[:, 0], "tip_y_m": self.tip[:, 1]}
+        found |= {f"tip_a{axis}_m_s2": column for axis, column in zip("xy", self.tip_acceleration.T, strict=True)}
+        found |= {f"joint_{i + 1}_rad": column for i, column in enumerate(self.joints.T)}
+        return found | {f"cylinder_force_{i + 1}_N": column for i, column in enumerate(self.cylinder_forces.T)}
+
+
+def swing_of(path: Array) -> float:
+    """Largest distance between two points of a `path` (m, 2): between those that lie farthest out in some direction."""
+    directions = np.linspace(0.0, math.pi, 181)
+    along = path @ np.stack([np.cos(directions), np.sin(directions)])
+    return float(np.max(along.max(axis=0) - along.min(axis=0)))
+
+
+def steady_state(scene: Scene, load: PeriodicLoad, strokes: Array | None = None, posture: str | None = None) -> SteadyState:
+    """Motion under a periodic load at the tip, when all that began with it has died away.
+
+    Parameters
+    ----------
+    scene : Scene
+        The boom, of n sections.
+    load : PeriodicLoad
+        See `pump_load`, `load_of_rows`.
+    strokes : ndarray, shape (n,), optional
+        Absolute strokes, m.
+    posture : str, optional
+        A posture of the scene; just one of strokes and posture is given.
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    UsageError
+        As `statics` does.
+    SolverError
+        No stable equilibrium was found.
+    """
+    return steady_state_of(linearised_boom(scene, strokes, posture), load)
+
+
+def steady_state_of(boom: LinearisedBoom, load: PeriodicLoad) -> SteadyState:
+    """`steady_state` of a boom that is linearised already."""
+    count = len(load.forces)
+    series = np.fft.rfft(load.forces, axis=0)
+    sizes = np.abs(series).max(axis=1)
+    kept = np.flatnonzero(sizes > NEGLIGIBLE * sizes.max(initial=0.0))
+    loads = np.zeros((len(kept), 2 + boom.plan.joints), complex)
+    loads[:, :2] = series[kept]
+    found = boom.respond(kept / load.period, loads)
+
+    def in_time(amplitudes: ComplexArray) -> Array:
+        whole = np.zeros((len(series), amplitudes.shape[1]), complex)
+        whole[kept] = amplitudes
+        return np.fft.irfft(whole, count, axis=0)
+
+    harmonics = np.zeros(len(series))
+    harmonics[kept] = 2.0 / count * np.linalg.norm(found.tip, axis=1)
+    return SteadyState(
+        load=load,
+        times=load.times,
+        tip=in_time(found.tip),
+        tip_acceleration=in_time(found.tip_acceleration),
+        joints=in_time(found.joints),
+        cylinder_forces=in_time(found.cylinder_forces),
+        harmonics=harmonics[1:],
+    )

@@ -1,0 +1,257 @@
+"""``boom_twin response``: frequency response, steady state under a periodic load, resonance map of postures and pump rates."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..scene import Scene
+from ..system.csv_table import columns_text, read_csv
+from ..types import Array
+from .main import add_json, add_scene, open_scene, print_result
+from .statics import numbers
+
+if TYPE_CHECKING:
+    from ..analysis.frequency_response import FrequencyResponse
+
+FAR = 0.05  # of the reach: swings beyond are not in proportion to the load
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one run of the command found: keys of the JSON, lines for people, columns of the CSV, how to draw it, doubts."""
+
+    name: str
+    values: dict[str, Any]
+    lines: list[str]
+    columns: dict[str, Array]
+    draw: Callable[[Path], None]
+    doubts: tuple[str, ...] = ()
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_scene(parser)
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
+    told = "resonance map over these postures, or `all` of the scene's; needs --pump, whose rate it varies"
+    where.add_argument("--map", metavar="P1,P2,..", help=told)
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument("--tip", type=numbers, metavar="FX,FY", help="harmonic force at the tip, N (default 0,1)")
+    load.add_argument("--drive", type=int, metavar="CYLINDER", help="harmonic drive of this cylinder, from 1, amplitude 1 m")
+    pump = "steady state under pump pulses: rate (Hz), height (N), change-over (s, default 0.1); vertical, up"
+    load.add_argument("--pump", type=_pump, metavar="RATE:HEIGHT[:S]", help=pump)
+    load.add_argument("--load", metavar="CSV", help="steady state under this force at the tip: t_s,fx_N,fy_N, one period")
+    parser.add_argument("--from", dest="low", type=float, default=0.05, metavar="F", help="lowest frequency, Hz (default 0.05)")
+    parser.add_argument("--to", dest="high", type=float, default=30.0, metavar="F", help="highest frequency, Hz (default 30)")
+    parser.add_argument("--points", type=int, default=300, metavar="N", help="frequencies, evenly in their logarithm (300)")
+    parser.add_argument("--rates", type=_rates, default=(0.2, 1.2, 201), metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
+    parser.add_argument("--steps", type=int, default=1, metavar="N", help="of a map, from each posture to the next (default 1)")
+    out = "folder for table and picture: new, empty, or of an earlier response"
+    parser.add_argument("--out", metavar="DIR", help=out)
+    add_json(parser)
+
+
+def _pump(text: str) -> tuple[float, ...]:
+    """Two or three numbers between colons."""
+    try:
+        found = tuple(float(part) for part in text.split(":"))
+    except ValueError:
+        found = ()
+    if len(found) not in (2, 3):
+        raise ArgumentTypeError(f"{text!r} is not RATE:HEIGHT or RATE:HEIGHT:CHANGE_OVER, like 0.4:130")
+    return found
+
+
+def _rates(text: str) -> tuple[float, float, int]:
+    """Lowest, highest, count."""
+    try:
+        low, high, count = text.split(":")
+        found = float(low), float(high), int(count)
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is not LOWEST:HIGHEST:COUNT, like 0.2:1.2:201") from None
+    if not 0.0 < found[0] < found[1] < float("inf") or not 2 <= found[2] <= 10_000:
+        raise ArgumentTypeError(f"{text!r}: give two ascending rates above 0 Hz, and 2 to 10000 of them")
+    return found
+
+
+def run(args: Namespace) -> int:
+    """Compute, print, and write what was asked for."""
+    from ..system.atomic_files import write_atomic
+    from ..system.result_folder import RESPONSE, result_folder
+
+    scene = open_scene(args.scene)
+    if args.map is not None:
+        answer = _map(scene, args)
+    elif args.pump or args.load:
+        answer = _steady(scene, args)
+    else:
+        answer = _response(scene, args)
+    for doubt in answer.doubts:
+        print(f"boom_twin response: warning: {doubt}.", file=sys.stderr)
+    if args.out:
+        sources = [Path(path) for path in (args.scene, args.load) if path]
+        with result_folder(Path(args.out), RESPONSE, sources) as building:
+            write_atomic(building.folder / f"{answer.name}.csv", columns_text(answer.columns))
+            answer.draw(building.folder / f"{answer.name}.png")
+        answer.lines.append(f"Written: {args.out}")
+    print_result(args.json, answer.values | {"warnings": answer.doubts}, answer.lines)
+    return 0
+
+
+def _place(args: Namespace) -> str:
+    return f"posture {args.posture}" if args.posture else "strokes " + ", ".join(f"{s:g}" for s in args.strokes) + " m"
+
+
+def _response(scene: Scene, args: Namespace) -> Answer:
+    """Frequency response over even points of the logarithm, and at the natural frequencies among them."""
+    from ..analysis.equilibrium import statics
+    from ..analysis.frequency_response import UPWARD, frequency_response
+    from ..plots.frequency_response import response_picture
+
+    if not (0.0 < args.low < args.high < float("inf") and 2 <= args.points <= 1_000_000):
+        raise UsageError(
+            f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
+            "2 to 1000000 points. Give such."
+        )
+    rest = statics(scene, strokes=args.strokes, posture=args.posture, modes=MODES)
+    natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
+    frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural]))
+    force = None if args.drive is not None else tuple(args.tip or UPWARD)
+    found = frequency_response(scene, frequencies, args.strokes, args.posture, force, args.drive)
+    static = frequency_response(scene, np.zeros(1), args.strokes, args.posture, force, args.drive)
+    if force is None:
+        load, unit = f"drive of cylinder {args.drive}, 1 m", "m of stroke"
+    else:
+        load, unit = f"force at the tip ({force[0]:g}, {force[1]:g}) N", f"load of ({force[0]:g}, {force[1]:g}) N"
+    title = f"Frequency response: {load}, {_place(args)}"
+    channels = found.channels()
+    values: dict[str, Any] = {"load": load, "frequency_Hz": frequencies, "natural_frequencies_Hz": natural}
+    columns = {"frequency_Hz": frequencies}
+    for name, column in channels.items():
+        columns |= {f"{name}_amplitude": np.abs(column), f"{name}_phase_rad": np.angle(column)}
+    return Answer(
+        "response",
+        values | {name: column for name, column in columns.items() if name != "frequency_Hz"},
+        [title, "", *_resonances(found, static, natural)],
+        columns,
+        lambda path: response_picture(path, title, unit, found, natural),
+        rest.doubts,
+    )
+
+
+MODES = 40  # natural frequencies that are looked for within the band
+
+
+def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Array) -> list[str]:
+    """A line for the static limit and every natural frequency."""
+    lines = ["frequency Hz   tip x m     tip y m     acceleration m/s2   largest cylinder force N   largest moment N m"]
+    rows = [(0.0, static, 0)] + [(f, found, int(np.searchsorted(found.frequencies, f))) for f in natural]
+    for frequency, response, k in rows:
+        tip, acceleration = np.abs(response.tip[k]), np.linalg.norm(response.tip_acceleration[k])
+        forces, moments = np.abs(response.cylinder_forces[k]), np.abs(response.moments[k])
+        cylinder, station = int(np.argmax(forces)), int(np.argmax(moments)) if len(moments) else None
+        moment = "none" if station is None else f"{moments[station]:.4g}, {response.stations[station].name}"
+        lines.append(
+            f"{frequency:12.4f}   {tip[0]:.4e}  {tip[1]:.4e}  {acceleration:17.4e}   {forces[cylinder]:12.4g}, cylinder "
+            f"{cylinder + 1}   {moment}"
+        )
+    return lines
+
+
+def _steady(scene: Scene, args: Namespace) -> Answer:
+    from ..analysis.steady_state import load_of_rows, pump_load, steady_state
+    from ..plots.frequency_response import steady_state_picture
+
+    if args.pump:
+        load, told = pump_load(scene, *args.pump), f"pump pulses of {args.pump[1]:g} N at {args.pump[0]:g} Hz"
+    else:
+        table, wanted = read_csv(Path(args.load), UsageError), ["t_s", "fx_N", "fy_N"]
+        table.require(wanted)
+        times, *components = (np.array(table.column(name)) for name in wanted)
+        load = load_of_rows(times, np.column_stack(components))
+        told = f"{Path(args.load).name}, {1.0 / load.period:.4g} Hz"
+    found = steady_state(scene, load, args.strokes, args.posture)
+    title = f"Steady state: {told}, {_place(args)}"
+    acceleration = float(np.linalg.norm(found.tip_acceleration, axis=1).max())
+    forces = np.ptp(found.cylinder_forces, axis=0)
+    values = {
+        "load": told,
+        "rate_Hz": 1.0 / load.period,
+        "tip_peak_to_peak_m": np.ptp(found.tip, axis=0),
+        "tip_swing_m": found.swing,
+        "tip_mean_m": found.tip.mean(axis=0),
+        "tip_acceleration_max_m_s2": acceleration,
+        "cylinder_force_peak_to_peak_N": forces,
+        "harmonics_m": found.harmonics[:25],
+    }
+    (x, y), (mean_x, mean_y) = 1e3 * np.ptp(found.tip, axis=0), 1e3 * found.tip.mean(axis=0)
+    lines = [
+        title,
+        "",
+        f"tip peak to peak    x {x:.1f} mm, y {y:.1f} mm, {1e3 * found.swing:.1f} mm in the direction in which it is largest",
+        f"tip mean            x {mean_x:+.1f} mm, y {mean_y:+.1f} mm from its place at rest",
+        f"tip acceleration    {acceleration:.3f} m/s2 at most",
+        "cylinder forces     " + ", ".join(f"{force:.0f}" for force in forces) + " N peak to peak",
+    ]
+    doubts = _large(scene, found.swing)
+    return Answer("steady_state", values, lines, found.columns(), lambda path: steady_state_picture(path, title, found), doubts)
+
+
+def _map(scene: Scene, args: Namespace) -> Answer:
+    from ..analysis.resonance_map import postures_along, resonance_map
+    from ..analysis.steady_state import pump_load
+    from ..plots.frequency_response import resonance_picture
+
+    if not args.pump:
+        raise UsageError("--map needs --pump RATE:HEIGHT, the pulses whose rate it varies. Add --pump 0.4:130.")
+    if not 1 <= args.steps <= 1000:
+        raise UsageError(f"--steps {args.steps}: must be 1 to 1000 from each posture to the next.")
+    names = list(scene.postures) if args.map == "all" else args.map.split(",")
+    if not names:
+        raise UsageError("--map all: the scene names no posture. Add `postures` to it.")
+    postures = postures_along(scene, names, args.steps)
+    found = resonance_map(scene, postures, np.linspace(*args.rates), lambda rate: pump_load(scene, rate, *args.pump[1:]))
+    title = f"Resonance map: pump pulses of {args.pump[1]:g} N"
+    bands = found.to_avoid()
+    values = {
+        "postures": found.postures,
+        "rates_Hz": found.rates,
+        "swing_m": found.swing,
+        "avoid_posture": [band.posture for band in bands],
+        "avoid_from_Hz": [band.low for band in bands],
+        "avoid_to_Hz": [band.high for band in bands],
+        "avoid_worst_Hz": [band.rate for band in bands],
+        "avoid_swing_m": [band.swing for band in bands],
+        "avoid_harmonic": [band.harmonic for band in bands],
+    }
+    width = max(len(name) for name in found.postures)
+    lines = [title, "", f"{'posture':{width}}   median mm   avoid Hz      worst Hz   swing mm   by harmonic"]
+    for name, swing in zip(found.postures, found.swing, strict=True):
+        own = [band for band in bands if band.posture == name]
+        lines.append(f"{name:{width}} {1e3 * np.median(swing):11.1f}" + ("" if own else "   none"))
+        lines += [
+            f"{'':{width}} {'':11}   {band.low:.2f}-{band.high:.2f} {band.rate:13.3f} {1e3 * band.swing:10.0f}   "
+            f"{band.harmonic}, at {band.harmonic * band.rate:.2f} Hz"
+            for band in own
+        ]
+    columns = {"rate_Hz": found.rates}
+    columns |= {f"swing_m_{name.replace(',', ' ')}": row for name, row in zip(found.postures, found.swing, strict=True)}
+    doubts = _large(scene, float(found.swing.max()))
+    return Answer("resonance_map", values, lines, columns, lambda path: resonance_picture(path, title, found), doubts)
+
+
+def _large(scene: Scene, swing: float) -> tuple[str, ...]:
+    """A swing at which the boom does not answer in proportion."""
+    if swing <= FAR * scene.reach:
+        return ()
+    told = f"the largest swing, {swing:.2g} m, is more than {FAR:g} of the reach, beyond which no boom answers in proportion"
+    return (told,)

@@ -1,0 +1,109 @@
+"""Pictures of the frequency response, of a steady state under a periodic load, and of the resonance map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..types import Array, ComplexArray
+from .style import BLUE, GREY, INK, ORANGE, TONES, legend_above, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..analysis.frequency_response import FrequencyResponse
+    from ..analysis.resonance_map import ResonanceMap
+    from ..analysis.steady_state import SteadyState
+
+
+def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:
+    """Amplitudes of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
+
+    natural : (modes,) natural frequencies, Hz, drawn as lines.
+    """
+    per = f"per {unit}"
+    panels: list[tuple[str, ComplexArray, list[str]]] = [
+        (f"tip, m {per}", response.tip, ["x", "y"]),
+        (f"tip acceleration, m/s² {per}", response.tip_acceleration, ["x", "y"]),
+        (f"joint angles, rad {per}", response.joints, _numbered(response.joints)),
+        (f"cylinder forces, N {per}", response.cylinder_forces, _numbered(response.cylinder_forces)),
+    ]
+    with picture(path, title, "dotted: natural frequencies without damping") as figure:
+        grid = figure.subplots(2, 2, sharex=True)
+        for axes, (name, values, labels) in zip(grid.flat, panels, strict=True):
+            _amplitudes(axes, response.frequencies, values, labels)
+            axes.set_title(name)
+            for frequency in natural:
+                axes.axvline(frequency, color=GREY, linewidth=0.9, linestyle=":")
+            legend_above(axes, len(labels))
+        for axes in grid[1]:
+            axes.set_xlabel("frequency, Hz")
+
+
+def _numbered(values: ComplexArray) -> list[str]:
+    return [str(i + 1) for i in range(values.shape[1])]
+
+
+def _amplitudes(axes: Axes, frequencies: Array, values: ComplexArray, labels: list[str]) -> None:
+    from matplotlib.ticker import StrMethodFormatter
+
+    for i, (label, column) in enumerate(zip(labels, np.abs(values).T, strict=True)):
+        if np.any(column > 0.0):
+            axes.plot(frequencies, column, color=TONES[i % len(TONES)][0], label=label)
+    axes.set_xscale("log")
+    if np.any(np.abs(values) > 0.0):
+        axes.set_yscale("log")
+    axes.set_xlim(frequencies[0], frequencies[-1])
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def steady_state_picture(path: Path, title: str, found: SteadyState) -> None:
+    """One period: the load, the tip's displacement and acceleration; and the harmonics of the displacement."""
+    with picture(path, title) as figure:
+        grid = figure.subplots(2, 2)
+        rows = [
+            (grid[0, 0], "load at the tip, N", found.load.forces),
+            (grid[1, 0], "tip from its place at rest, mm", 1e3 * found.tip),
+            (grid[0, 1], "tip acceleration, m/s²", found.tip_acceleration),
+        ]
+        for axes, name, values in rows:
+            for column, colour, label in zip(values.T, (BLUE, ORANGE), "xy", strict=True):
+                axes.plot(found.times, column, color=colour, label=label)
+            axes.set_title(name)
+            axes.set_xlim(0.0, found.load.period)
+            axes.set_xlabel("time in the period, s")
+            legend_above(axes, 2)
+        bars, count = grid[1, 1], min(25, len(found.harmonics))
+        bars.bar(np.arange(1, count + 1) / found.load.period, 1e3 * found.harmonics[:count], 0.6 / found.load.period, color=INK)
+        bars.set_title("harmonics of the tip's displacement, mm")
+        bars.set_xlabel("frequency, Hz")
+
+
+def resonance_picture(path: Path, title: str, found: ResonanceMap) -> None:
+    """Swing of the tip over postures (rows) and rates; rates to avoid are framed."""
+    from matplotlib.colors import LogNorm
+
+    rows, edges = len(found.postures), _edges(found.rates)
+    with picture(path, title, "framed: rates to avoid", (16.0, 2.6 + max(3.0, 0.42 * rows))) as figure:
+        axes = figure.subplots()
+        swing = np.maximum(1e3 * found.swing, 1e-3)
+        mesh = axes.pcolormesh(edges, np.arange(rows + 1) - 0.5, swing, norm=LogNorm(), cmap="cividis")
+        for band in found.to_avoid():
+            row = found.postures.index(band.posture)
+            low, high = edges[np.searchsorted(found.rates, band.low)], edges[np.searchsorted(found.rates, band.high) + 1]
+            axes.plot([low, high, high, low, low], row + 0.46 * np.array([-1, -1, 1, 1, -1]), color=ORANGE, linewidth=2.2)
+        axes.set_yticks(range(rows), found.postures)
+        axes.set_ylim(rows - 0.5, -0.5)
+        axes.set_xlabel("pump rate, Hz")
+        axes.grid(False)
+        figure.colorbar(mesh, ax=axes, label="swing of the tip, peak to peak, mm")
+
+
+def _edges(rates: Array) -> Array:
+    """Borders (r + 1,) between ascending `rates` (r,), and outside of the first and last."""
+    if len(rates) == 1:
+        return np.array([0.95, 1.05]) * rates
+    middle = 0.5 * (rates[1:] + rates[:-1])
+    return np.concatenate([[2.0 * rates[0] - middle[0]], middle, [2.0 * rates[-1] - middle[-1]]])

@@ -1,0 +1,134 @@
+"""Steady states under periodic loads at the tip, and the resonance map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analysis.tip_force_steps import tip_under
+from oracle import booms
+
+from boom_twin import frequency_response, load_scene
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.resonance_map import ResonanceMap, named_postures, postures_along, resonance_map
+from boom_twin.analysis.steady_state import SAMPLES, PeriodicLoad, load_of_rows, pump_load, steady_state, swing_of
+from boom_twin.errors import UsageError
+from boom_twin.scene.pump_pulses import upward
+
+SCENE = load_scene()
+
+
+def well_damped():
+    """The default scene with eight times the damping in its cylinders: what begins with a load dies away in half a minute."""
+    spec = booms.document()
+    for joint in spec["joints"]:
+        joint["cylinder"]["d"] *= 8.0
+    return booms.scene_of(spec)
+
+
+@pytest.mark.parametrize("rate", [0.43, 0.36])
+def test_pump_pulses_against_the_last_periods_of_a_long_motion(rate):
+    """Away from resonance, and with the third harmonic on the first mode: displacement within 0.5 %."""
+    scene, periods, height = well_damped(), 16, 20.0
+    found = steady_state(scene, pump_load(scene, rate, height), posture="arch")
+    per_period = 600
+    step = 1.0 / (rate * per_period)
+    load = found.load.forces[:, 1]
+    times = step * np.arange(1, periods * per_period + 1)
+    force = np.interp(times, np.append(found.times, found.load.period), np.append(load, load[0]), period=found.load.period)
+    moved = tip_under(scene, "arch", step, np.outer(force, [0.0, 1.0]))
+    last = moved[-per_period:]
+    expected = np.stack([np.interp(times[-per_period:], found.times, column, period=1.0 / rate) for column in found.tip.T], 1)
+    assert np.linalg.norm(last - expected) < 5e-3 * np.linalg.norm(expected)
+    assert np.ptp(last, axis=0) == pytest.approx(np.ptp(found.tip, axis=0), rel=5e-3)
+
+
+def test_a_sine_is_the_frequency_response():
+    times = np.arange(SAMPLES) / (SAMPLES * 0.9)
+    load = PeriodicLoad(1.0 / 0.9, np.outer(np.sin(2.0 * np.pi * 0.9 * times), [3.0, 4.0]))
+    found = steady_state(SCENE, load, posture="low")
+    response = frequency_response(SCENE, np.array([0.9]), posture="low", tip_force=(3.0, 4.0))
+    turning = np.exp(2j * np.pi * 0.9 * times)[:, None]
+    assert found.tip == pytest.approx((turning * response.tip).imag, abs=1e-12)
+    assert found.cylinder_forces == pytest.approx((turning * response.cylinder_forces).imag, abs=1e-5)
+    assert found.tip_acceleration == pytest.approx((turning * response.tip_acceleration).imag, abs=1e-9)
+    assert found.harmonics[0] == pytest.approx(np.linalg.norm(response.tip)) and np.all(found.harmonics[1:] == 0.0)
+
+
+def test_a_constant_load_is_the_static_limit():
+    load = PeriodicLoad(2.0, np.tile([0.0, -50.0], (64, 1)))
+    still = steady_state(SCENE, load, posture="arch")
+    expected = frequency_response(SCENE, np.zeros(1), posture="arch", tip_force=(0.0, -50.0)).tip.real
+    assert still.tip == pytest.approx(np.tile(expected, (64, 1)), rel=1e-12) and still.swing < 1e-15
+
+
+def test_rows_of_a_pump_are_the_pump():
+    load = pump_load(SCENE, 0.4, 130.0)
+    times = np.append(load.times, load.period)
+    again = load_of_rows(10.0 + times, np.append(load.forces, load.forces[:1], axis=0))
+    assert again.period == pytest.approx(2.5) and again.forces == pytest.approx(load.forces, abs=1e-9)
+    assert load.forces[:, 1].max() == 130.0 and np.all(load.forces[:, 0] == 0.0)
+
+
+def test_pumps_push_up_on_an_inclined_base():
+    inclined = SCENE.model_copy(update={"base": SCENE.base.model_copy(update={"inclination": 0.3})})
+    peak = pump_load(inclined, 0.4, 130.0).forces.max(axis=0)
+    assert peak == pytest.approx(130.0 * upward(0.3)) and peak[0] > 30.0
+
+
+@pytest.mark.parametrize(
+    "times, forces, told",
+    [
+        ([0.0, 1.0], [[0, 0], [0, 0]], "three rows"),
+        ([0.0, 1.0, 1.0], [[0, 0], [0, 5], [0, 0]], "row 3"),
+        ([0.0, 1.0, 2.0], [[0, 0], [0, 5], [0, 5]], "ends the period"),
+        ([0.0, np.nan, 2.0], [[0, 0], [0, 5], [0, 0]], "finite"),
+    ],
+)
+def test_rows_refused(times, forces, told):
+    with pytest.raises(UsageError, match=told):
+        load_of_rows(np.array(times), np.array(forces, dtype=float))
+
+
+@pytest.mark.parametrize("given, told", [((0.0, 130.0), "rate = 0"), ((0.4, -1.0), "height"), ((2.0, 130.0, 0.4), "0.25 s")])
+def test_pumps_refused(given, told):
+    with pytest.raises(UsageError, match=told):
+        pump_load(SCENE, *given)
+
+
+def test_swing_is_the_longest_way_across():
+    around = np.linspace(0.0, 2.0 * np.pi, 400)
+    ellipse = np.stack([3.0 * np.cos(around), np.sin(around)], axis=1) @ np.array([[0.8, 0.6], [-0.6, 0.8]])
+    assert swing_of(ellipse) == pytest.approx(6.0, rel=1e-3)
+
+
+def test_map_names_the_rates_whose_harmonics_meet_the_first_mode():
+    rates = np.linspace(0.28, 0.46, 37)
+    found = resonance_map(SCENE, named_postures(SCENE), rates, lambda rate: pump_load(SCENE, rate, 130.0))
+    assert found.postures == tuple(SCENE.postures) and found.swing.shape == (len(SCENE.postures), 37)
+    for name in SCENE.postures:
+        first = statics(SCENE, posture=name).frequencies[0]
+        (band,) = [band for band in found.to_avoid() if band.posture == name]
+        assert band.harmonic == 3 and band.low <= first / 3.0 <= band.high
+        assert band.rate == pytest.approx(first / 3.0, abs=5e-3)
+    at = steady_state(SCENE, pump_load(SCENE, float(rates[5]), 130.0), posture="arch")
+    assert found.swing[found.postures.index("arch"), 5] == pytest.approx(at.swing)
+
+
+def test_bands_are_those_above_the_median():
+    found = ResonanceMap(
+        ("a",), np.arange(1.0, 8.0), np.array([[2.0, 1.0, 1.0, 3.0, 4.0, 1.0, 1.0]]), np.ones((1, 7), np.int64)
+    )
+    assert [(band.low, band.high, band.rate, band.swing) for band in found.to_avoid()] == [(1, 1, 1, 2), (4, 5, 5, 4)]
+
+
+def test_way_between_postures():
+    way = postures_along(SCENE, ["horizontal", "arch"], 4)
+    corners = named_postures(SCENE)
+    assert list(way) == ["horizontal", *(f"horizontal to arch {share} %" for share in (25, 50, 75)), "arch"]
+    assert way["horizontal to arch 50 %"] == pytest.approx(0.5 * (corners["horizontal"] + corners["arch"]))
+
+
+def test_a_way_out_of_travel_is_refused():
+    far = {"far": np.array([1.4, 1.4, 1.4, 1.4])}
+    with pytest.raises(UsageError, match="posture far"):
+        resonance_map(SCENE, far, np.array([0.4]), lambda rate: pump_load(SCENE, rate, 130.0))

@@ -1,0 +1,113 @@
+"""``boom_twin response``: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import frequency_response, load_scene
+from boom_twin.cli.main import main
+
+Capture = pytest.CaptureFixture[str]
+
+
+def answer(capsys: Capture, *given: str) -> dict[str, object]:
+    assert main(["response", *given, "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def table(path: Path) -> dict[str, np.ndarray]:
+    header, *rows = path.read_text().splitlines()
+    return dict(zip(header.split(","), np.array([row.split(",") for row in rows], dtype=float).T, strict=True))
+
+
+def test_response_is_that_of_the_function_and_has_the_natural_frequencies(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    found = answer(capsys, "--posture", "arch", "--tip", "3,4", "--points", "20", "--out", str(out))
+    frequencies = np.array(found["frequency_Hz"])
+    assert len(frequencies) == 24 and np.all(np.diff(frequencies) > 0.0)
+    expected = frequency_response(load_scene(), frequencies, posture="arch", tip_force=(3.0, 4.0)).channels()
+    columns = table(out / "response.csv")
+    for name, values in expected.items():
+        told = np.array(found[f"{name}_amplitude"]) * np.exp(1j * np.array(found[f"{name}_phase_rad"]))
+        assert told == pytest.approx(values, rel=1e-9, abs=1e-18)
+        assert columns[f"{name}_amplitude"] == pytest.approx(np.abs(values), rel=1e-9, abs=1e-18)
+    assert (out / "response.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_drive_in_words(capsys: Capture) -> None:
+    assert main(["response", "--posture", "arch", "--drive", "2", "--points", "5", "--to", "3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Frequency response: drive of cylinder 2, 1 m, posture arch"
+    assert [line.split()[0] for line in lines[3:]] == ["0.0000", "1.0618", "2.3006"]
+
+
+def test_steady_state_of_pump_and_of_its_rows(capsys: Capture, tmp_path: Path) -> None:
+    out, rows = tmp_path / "out", tmp_path / "load.csv"
+    found = answer(capsys, "--posture", "arch", "--pump", "0.43:130", "--out", str(out))
+    columns = table(out / "steady_state.csv")
+    assert np.ptp(columns["tip_y_m"]) == pytest.approx(found["tip_peak_to_peak_m"][1])  # type: ignore[index]
+    assert (out / "steady_state.png").is_file()
+    force = np.column_stack([columns[name] for name in ("t_s", "fx_N", "fy_N")])
+    force = np.vstack([force, [1.0 / 0.43, *force[0, 1:]]])
+    np.savetxt(rows, force, delimiter=",", header="t_s,fx_N,fy_N", comments="")
+    again = answer(capsys, "--posture", "arch", "--load", str(rows))
+    assert again["tip_swing_m"] == pytest.approx(found["tip_swing_m"], rel=1e-6)
+
+
+def test_map_on_a_way(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    given = ["--map", "horizontal,arch", "--steps", "2", "--pump", "0.4:50", "--rates", "0.28:0.42:15", "--out", str(out)]
+    found = answer(capsys, *given)
+    assert found["postures"] == ["horizontal", "horizontal to arch 50 %", "arch"]
+    assert np.array(found["swing_m"]).shape == (3, 15)
+    assert set(found["avoid_posture"]) == set(found["postures"]) and set(found["avoid_harmonic"]) == {3}  # type: ignore[call-overload]
+    assert list(table(out / "resonance_map.csv")) == ["rate_Hz", *(f"swing_m_{name}" for name in found["postures"])]  # type: ignore[attr-defined]
+    assert main(["response", *given]) == 0  # an earlier response is replaced
+    assert "harmonic" in capsys.readouterr().out
+
+
+def test_a_swing_out_of_proportion_is_told(capsys: Capture) -> None:
+    assert main(["response", "--posture", "horizontal", "--pump", "0.99:500"]) == 0
+    assert "no boom answers in proportion" in capsys.readouterr().err
+
+
+def test_worn_pins_are_refused(capsys: Capture, tmp_path: Path) -> None:
+    assert main(["scene", "--clearance"]) == 0
+    scene = tmp_path / "worn.yaml"
+    scene.write_text(capsys.readouterr().out)
+    for given in (["--posture", "arch"], ["--posture", "arch", "--pump", "0.4:130"], ["--map", "all", "--pump", "0.4:130"]):
+        assert main(["response", str(scene), *given]) == 1
+        assert "clearance" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "given, told",
+    [
+        (["--posture", "nowhere"], "posture = 'nowhere'"),
+        (["--posture", "arch", "--from", "0"], "above 0 Hz"),
+        (["--posture", "arch", "--from", "5", "--to", "2"], "ascend"),
+        (["--posture", "arch", "--points", "1"], "2 to 1000000"),
+        (["--posture", "arch", "--drive", "9"], "cylinders 1 to 4"),
+        (["--posture", "arch", "--tip", "1,2,3"], "two numbers"),
+        (["--posture", "arch", "--pump", "0:130"], "rate = 0"),
+        (["--posture", "arch", "--load", "nowhere.csv"], "nowhere.csv"),
+        (["--map", "all"], "needs --pump"),
+        (["--map", "all", "--pump", "0.4:130", "--steps", "0"], "--steps 0"),
+        (["--map", "arch,nowhere", "--pump", "0.4:130"], "posture = 'nowhere'"),
+    ],
+)
+def test_refused(capsys: Capture, given: list[str], told: str) -> None:
+    assert main(["response", *given]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line
+
+
+@pytest.mark.parametrize("given", [[], ["--posture", "arch", "--map", "all"], ["--posture", "arch", "--pump", "fast"]])
+def test_usage(capsys: Capture, given: list[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["response", *given])
+    assert stopped.value.code == 2
