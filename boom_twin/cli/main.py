@@ -11,7 +11,7 @@ import gc
 import json
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import REMAINDER, ArgumentParser, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
@@ -37,6 +37,7 @@ COMMANDS: dict[str, str] = {
     "recover": "save what is whole of a damaged session",
     "scene": "print the default scene file",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
+    "views": "what RViz, Foxglove and PlotJuggler show, for a boom in a namespace",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "simulate": "the boom's answer to a stroke history",
     "replay": "a recorded session through the twin",
@@ -148,6 +149,24 @@ def add_params(parser: ArgumentParser) -> None:
 def add_json(parser: ArgumentParser) -> None:
     """``--json``: stdout holds exactly one flat JSON object."""
     parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
+
+
+def add_ros_args(parser: ArgumentParser) -> None:
+    """``--namespace`` and ``--ros-args``, for `ros_arguments`."""
+    add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
+    told = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=told)
+
+
+def add_namespace(parser: ArgumentParser, told: str) -> None:
+    """``--namespace``."""
+    parser.add_argument("--namespace", metavar="NAME", default="", help=told)
+
+
+def ros_arguments(args: Namespace) -> list[str]:
+    """What rclpy is to be started with, or a further process of this package."""
+    namespace = args.namespace.strip("/")
+    return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
 
 
 def open_scene(source: str | None) -> Scene:

@@ -18,6 +18,7 @@ from ..bag.reader import scan
 from ..errors import BoomTwinError
 from ..ros.startup import require_rclpy
 from ..types import NANO
+from .main import add_ros_args, ros_arguments
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
@@ -45,6 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
     )
+    add_ros_args(parser)
 
 
 def run(args: Namespace) -> int:
@@ -54,7 +56,7 @@ def run(args: Namespace) -> int:
     from ..ros.runtime import ros
 
     session = scan(args.bag)
-    with ros([]):
+    with ros(ros_arguments(args)):
         player = Player(session, args.topics, args.clock)
         length = player.length(args.start, args.duration)
         unmatched = player.wait(args.wait)
@@ -87,7 +89,7 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         if keys.are_read:
             print("space: pause and go on; Ctrl-C: end", file=sys.stderr)
         while True:
-            with tqdm(total=length, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
+            with tqdm(total=length, disable=None, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):
                     bar.update(elapsed * NANO - bar.n)
             if not args.loop:

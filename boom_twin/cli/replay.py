@@ -8,7 +8,7 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_namespace, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -26,6 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_params(parser)
     told = "topics and sensors; by default as the session was recorded, else topics.yaml"
     parser.add_argument("--mapping", metavar="FILE", type=Path, help=told)
+    add_namespace(parser, "ROS namespace of the node in the session, where its mapping does not tell that")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
@@ -58,7 +59,7 @@ def run(args: Namespace) -> int:
     print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
-        options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline
+        options = settings, _progress, args.mapping, not args.no_changes, not args.no_health, args.baseline, args.namespace
         evaluator = Evaluator(scene.scene, settings, args.baseline)
         table = SampleTable(building.folder, args.table, len(scene.scene.joints)) if args.table else None
 

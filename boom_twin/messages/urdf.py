@@ -47,7 +47,8 @@ Joints                 published in ~/joint_states
 
 A URDF is a tree, so rod pins and pins Q are not joints here. The published positions of the swivels close these loops, for
 rigid sections; mimic joints could not, because they are linear. Sections are drawn straight, and only tip and imu_link are
-where the deflected boom has them: see ~/shape for how it bends. A scene tells no limits of effort and velocity; the zeros stand for that. No inertia: see `boom_twin check`.
+where the deflected boom has them: see ~/shape for how it bends. A scene tells no limits of effort and velocity; the zeros
+stand for that. No inertia: see `boom_twin check`.
 """
 
 

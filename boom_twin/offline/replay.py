@@ -95,6 +95,7 @@ def replay(
     changes: bool = True,
     health: bool = True,
     baseline: str | Path | None = None,
+    namespace: str = "",
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -120,6 +121,8 @@ def replay(
     baseline : path, optional
         What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
         one that the session was recorded with, else the package's own.
+    namespace : str
+        ROS namespace of the node in the session, where the mapping does not tell that.
 
     Returns
     -------
@@ -135,7 +138,7 @@ def replay(
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
-        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline)
+        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline, namespace)
 
 
 def replay_into(
@@ -148,6 +151,7 @@ def replay_into(
     changes: bool = True,
     health: bool = True,
     baseline: str | Path | None = None,
+    namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
@@ -157,7 +161,7 @@ def replay_into(
     session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
     taken = scene_for(session.path, scene)
     scene, joints = taken.scene, len(taken.scene.joints)
-    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints)
+    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None

@@ -202,7 +202,7 @@ def test_joint_states_drive_every_joint() -> None:
 
 @pytest.mark.parametrize("name", ["default", "one", "shuffled"])
 def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
-    """Position and pitch of the frame ``tip`` by the rules of URDF, while the boom moves; far from that of straight sections."""
+    """Position and pitch of the frame ``tip`` by the rules of URDF, while the boom moves; apart from that of straight ones."""
     scene = booms()[name]
     twin, encoder, robot = Twin(scene), ReportEncoder(scene, Settings()), ElementTree.fromstring(urdf(scene))
     middle = np.radians([sum(joint.range_deg) / 2 for joint in scene.joints])

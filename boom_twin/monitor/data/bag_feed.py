@@ -88,6 +88,7 @@ def bag_feed(
     settings: Settings,
     mapping: Path | None = None,
     baseline: Path | None = None,
+    namespace: str = "",
 ) -> BagFeed:
     """Open a session.
 
@@ -103,6 +104,8 @@ def bag_feed(
         How topics and sensors are read; as for `boom_twin.offline.replay.replay`.
     baseline : Path, optional
         What is known of this rig while all is well; likewise.
+    namespace : str
+        Likewise.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def bag_feed(
     """
     session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
     scene = taken.scene
-    topics = mapping_of(path, mapping, len(scene.joints)).topics
+    topics = mapping_of(path, mapping, len(scene.joints), namespace).topics
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts

@@ -38,11 +38,14 @@ class DiagnosticsPublisher:
     node : Node
     topic : Topic
         Where they are published.
+    hardware_id : str
+        What is diagnosed; empty: the node's name.
     """
 
-    def __init__(self, node: Node, topic: Topic) -> None:
+    def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
         self._node, self._logger = node, Log(node)
         self._name = node.get_fully_qualified_name().lstrip("/")
+        self._hardware_id = hardware_id or self._name
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
 
@@ -74,6 +77,7 @@ class DiagnosticsPublisher:
             name=f"{self._name}: {status.name}",
             level=bytes([status.level]),
             message=_text(status.message),
+            hardware_id=self._hardware_id,
             values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
         )
 
@@ -161,7 +165,8 @@ class Diagnostics:
         self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
+        hardware_id = node.get_parameter("hardware_id").value
+        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS], hardware_id)
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._due, self._active = time.monotonic() + PERIOD, False

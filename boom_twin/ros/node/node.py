@@ -25,7 +25,7 @@ from ..log import Log
 from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
-from .parameters import baseline_of, baseline_text, current, declare, guard, path_of
+from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of
 from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
@@ -148,7 +148,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         self._twin, self._decoder = twin, SampleDecoder(joints, topics)
-        self._encoder = ReportEncoder(scene, settings)
+        self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
