@@ -55,6 +55,7 @@ class TwinWatch:
         for stream in self._streams.values():
             stream.begin(now)
         self._model.begin(now)
+        self._looked = now
         self._residuals: list[Residuals] = []
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
@@ -167,7 +168,8 @@ class TwinWatch:
             those = [each for each in taken if each.names == names]
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
-                self._judges.setdefault(name, ResidualJudge(name)).take(column, at.now)
+                self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
+        self._looked = at.now
         return [judge.status(self._alarm_of(name), at) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:

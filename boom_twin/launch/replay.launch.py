@@ -48,7 +48,7 @@ KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments above, the twin on simulated time, and the player; all ends with the session."""
-    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), player()])
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), OpaqueFunction(function=player)])
 
 
 def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
@@ -74,8 +74,12 @@ def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
     return {name: f"{folder.name}/{name}.yaml" for name in texts}
 
 
-def player() -> ExecuteProcess:
-    """The session's inputs and its clock, once the node listens."""
-    options = [part for name in ("rate", "start", "wait", "namespace") for part in (f"--{name}", LaunchConfiguration(name))]
-    command = [*python_command("boom_twin.cli.main", "play"), LaunchConfiguration("bag"), "--clock", *options]
-    return ExecuteProcess(cmd=command, name="play", output="screen", on_exit=Shutdown(reason="the session has been played"))
+def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """The session's inputs and its clock, once the node listens, and the recorder if there is one."""
+    bag, record = (LaunchConfiguration(name).perform(context) for name in ("bag", "record"))
+    names = ("rate", "start", "wait", "namespace")
+    options = [part for name in names for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
+    command = python_command("boom_twin.cli.main", "play", bag, "--clock", *options)
+    command += ["--listeners", "2" if record else "1"]
+    over = Shutdown(reason="the session has been played")
+    return [ExecuteProcess(cmd=command, name="play", output="screen", on_exit=over)]

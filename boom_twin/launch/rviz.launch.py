@@ -12,7 +12,6 @@ from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
 from boom_twin.messages.view_files import RVIZ, view_text
 
@@ -47,6 +46,6 @@ def rviz(context: LaunchContext) -> list[LaunchDescriptionEntity]:
         executable="rviz2",
         namespace=given["namespace"],
         arguments=["-d", str(config)],
-        parameters=[{"use_sim_time": ParameterValue(given["use_sim_time"], value_type=bool)}],
+        parameters=[{"use_sim_time": given["use_sim_time"] == "true"}],
     )
     return [node]

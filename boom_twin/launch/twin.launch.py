@@ -95,15 +95,10 @@ def is_set(given: Given, name: str) -> bool:
     return given[name] == "true"
 
 
-def flag(given: Given, name: str) -> ParameterValue:
-    """A flag as a parameter."""
-    return ParameterValue(given[name], value_type=bool)
-
-
 def twin(given: Given) -> Node:
     """The node; it configures and activates itself. Without it nothing else goes on."""
     own = {name: ParameterValue(given[name], value_type=str) for name in ("scene", "mapping", "frame_prefix")}
-    own |= {name: flag(given, name) for name in ("monitor", "use_sim_time")}
+    own |= {name: is_set(given, name) for name in ("monitor", "use_sim_time")}
     return Node(
         package="boom_twin",
         executable="twin_node",
@@ -117,9 +112,9 @@ def twin(given: Given) -> Node:
 
 def state_publisher(given: Given, scene: Scene) -> Node:
     """TF up to the deflected tip, driven by the twin's joint states."""
-    own = {name: ParameterValue(given[name], value_type=str) for name in ("frame_prefix",)}
-    own["robot_description"] = ParameterValue(urdf(scene), value_type=str)
-    own |= {name: flag(given, name) for name in ("ignore_timestamp", "use_sim_time")}
+    texts = {"frame_prefix": given["frame_prefix"], "robot_description": urdf(scene)}
+    own = {name: ParameterValue(text, value_type=str) for name, text in texts.items()}
+    own |= {name: is_set(given, name) for name in ("ignore_timestamp", "use_sim_time")}
     return Node(
         package="robot_state_publisher",
         executable="robot_state_publisher",

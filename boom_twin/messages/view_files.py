@@ -37,6 +37,6 @@ def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:
     names = {one.absolute: other.absolute for one, other in pairs}
     names[DESCRIPTION] = f"/{space}{DESCRIPTION}" if space else DESCRIPTION
     longest_first = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    text = re.sub(rf'(?<=")({longest_first})(?=[/."\[])', lambda found: names[found[0]], text)
+    text = re.sub(rf'(?<=[";])({longest_first})(?=[/.";\[])', lambda found: names[found[0]], text)
     text = re.sub(rf"(?<![\w/]){FRAME}\b", f"{frame_prefix}{FRAME}", text)
     return re.sub(rf'{TF_PREFIX} ""', f'{TF_PREFIX} "{frame_prefix}"', text)

@@ -49,7 +49,8 @@ exec sleep 1000
 
 def own_environment() -> dict[str, str]:
     """That of another Python than this one."""
-    return {name: value for name, value in os.environ.items() if name not in ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")}
+    left_out = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+    return {name: value for name, value in os.environ.items() if name not in left_out}
 
 
 def has_launch() -> bool:
@@ -143,7 +144,7 @@ def start(isolation: Any, tmp_path: Path) -> Iterator[Start]:
 def test_without_a_screen_and_without_cpp(start: Start, tmp_path: Path) -> None:
     """Node and recorder in a namespace; the recording knows what the launch was given."""
     scene, mapping = tmp_path / "boom.yaml", tmp_path / "mapping.yaml"
-    scene.write_text(default_text() + "# of this rig\n")
+    scene.write_text("# of this rig\n" + default_text())
     mapping.write_text("inputs: {tip_imu: {delay: 0.01}}\n")
     out = tmp_path / "session"
     given = {"namespace": "front", "frame_prefix": "front/", "state_publisher": "false", "record": out}
@@ -156,10 +157,10 @@ def test_without_a_screen_and_without_cpp(start: Start, tmp_path: Path) -> None:
     launched.end(signal.SIGINT)
     assert launched.is_gone() and "Traceback" not in launched.said()
     kept = mapping_of(out).topics
-    assert kept.inputs == {stream: topic for stream, topic in kept.in_namespace("front").inputs.items()}
+    assert {topic.name.split("/")[1] for topic in kept.inputs.values()} == {"front"}
     assert kept.outputs[Output.SHAPE].absolute == "/front/boom_twin/shape"
     assert (kept.frame, [topic.delay for topic in kept.inputs.values()]) == ("front/base_link", [0.0, 0.0, 0.01, 0.0])
-    assert scene_of(out).text.endswith("# of this rig\n")
+    assert scene_of(out).text.startswith("# of this rig\n")
 
 
 def test_robot_state_publisher_is_told_everything(start: Start) -> None:
@@ -204,8 +205,8 @@ def test_a_session_is_played_into_the_twin_and_all_ends_with_it(start: Start, ba
     assert launched.end() == 0, launched.said()
     assert launched.is_gone() and "sent in" in launched.said() and "\r" not in launched.said()
     found = scan(out)
-    counts = {name: topic.count for name in ("cylinder_strokes", "boom_twin/tip/position") if (topic := found.find(f"/front/{name}"))}
-    assert len(counts) == 2 and min(counts.values()) > 0.9 * found.find("/front/cylinder_strokes").count  # type: ignore[union-attr]
+    strokes, positions = (found.find(f"/front/{name}") for name in ("cylinder_strokes", "boom_twin/tip/position"))
+    assert strokes is not None and positions is not None and positions.count > 0.9 * strokes.count > 0
 
 
 def test_a_session_that_cannot_be_played_starts_nothing(start: Start, tmp_path: Path) -> None:

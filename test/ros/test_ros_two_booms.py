@@ -1,0 +1,109 @@
+"""Two booms on one computer, each with a namespace, a frame prefix, a page and a recording of its own, at the same time."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
+
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("aiohttp")
+
+from boom_twin.bag.reader import read, read_both, scan
+from boom_twin.bag.session_model import mapping_of
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import TYPES, Output, Topics
+from boom_twin.messages.type_store import jazzy
+from boom_twin.offline.replay import replay
+from boom_twin.types import Stream
+
+BOOMS = {"front": "0.0", "rear": "1.0"}
+"""Their namespaces, and from when on the session is played to each, s."""
+COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)]
+PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
+
+
+@pytest.fixture(scope="module")
+def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> dict[str, Any]:
+    """By boom its recording and the address of its page."""
+    folder = tmp_path_factory.mktemp("booms")
+    nodes = {name: spawn_node("-r", f"__ns:=/{name}", "-p", f"frame_prefix:={name}/", "-p", "monitor:=true") for name in BOOMS}
+    for name, node in nodes.items():
+        node.wait_for(f"listening to /{name}/cylinder_strokes")
+    command = "boom_twin.cli.main"
+    recorders = {name: spawn(command, "record", "--out", str(folder / name), "--namespace", name) for name in BOOMS}
+    for recorder in recorders.values():
+        recorder.wait_for("recording")
+    patience = ("--listeners", "2", "--wait", "120")
+    options = {name: ("--namespace", name, "--start", start, *patience) for name, start in BOOMS.items()}
+    players = [spawn(command, "play", str(bag), *options[name]) for name in BOOMS]
+    assert [player.end() for player in players] == [0, 0], [player.said() for player in players]
+    found: dict[str, Any] = {}
+    for name, node in nodes.items():
+        node.wait_for("open http://")
+        found[name] = (folder / name, PAGE.search(node.said())[1])  # type: ignore[index]
+        with urlopen(found[name][1], timeout=60.0) as page:
+            assert page.status == 200
+    time.sleep(1.0)
+    for process in (*recorders.values(), *nodes.values()):
+        assert process.stop(signal.SIGINT) == 0, process.said()
+    return found
+
+
+def published(path: Path, topics: Topics, key: Output) -> list[tuple[int, bytes]]:
+    """Stamp and CDR of every message of one output; encoded anew, because rclpy does not clear the bytes between values."""
+    found = [msg for _, _, msg in read(scan(path), {topics.outputs[key].absolute: TYPES[key]})]
+    holders = [msg.markers[0] if key is Output.SHAPE else msg for msg in found]
+    return [(stamp_of(each), bytes(jazzy().serialize_cdr(msg, TYPES[key]))) for each, msg in zip(holders, found, strict=True)]
+
+
+@pytest.mark.parametrize("name", BOOMS)
+def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, Any], name: str, tmp_path: Path) -> None:
+    """Bit for bit, of the strokes that the node answered."""
+    path = recorded[name][0]
+    topics = mapping_of(path).topics
+    answered = {stamp for stamp, _ in published(path, topics, Output.TIP_POSITION)}
+    inputs = {topic.absolute: stream for stream, topic in topics.inputs.items() if stream is not Stream.FORCES}  # none is sent
+    session = scan(path)
+    with SessionWriter(tmp_path / "bag", {stream.value: topic for stream, topic in topics.inputs.items()}) as writer:
+        for topic, log, data, msg in read_both(session, {each: TYPES[stream] for each, stream in inputs.items()}):
+            if inputs[topic] is not Stream.STROKES or stamp_of(msg) in answered:
+                writer.write_encoded(inputs[topic].value, log, data)
+    (tmp_path / "bag" / "session.yaml").write_text((path / "session.yaml").read_text())
+    replay(tmp_path / "bag", None, tmp_path / "out")
+    for key in COMPARED:
+        live = published(path, topics, key)
+        assert len(live) > (0 if key in (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY) else 20)
+        assert live == published(tmp_path / "out" / "bag", topics, key), key
+
+
+@pytest.mark.parametrize("name", BOOMS)
+def test_names_and_frames_are_its_own(recorded: dict[str, Any], name: str) -> None:
+    session, topics = scan(recorded[name][0]), mapping_of(recorded[name][0]).topics
+    names = {topic.name for topic in session.topics if topic.count}
+    assert {each.split("/")[1] for each in names} == {name, "diagnostics"} and f"/{name}/boom_twin/shape" in names
+    assert topics.frame == f"{name}/base_link"
+    for key in (Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.HEALTH, Output.CHANGES):
+        found = read(session, {topics.outputs[key].absolute: TYPES[key]})
+        assert {msg.header.frame_id for _, _, msg in found} == {topics.frame}
+    shapes = read(session, {topics.outputs[Output.SHAPE].absolute: TYPES[Output.SHAPE]})
+    assert {marker.header.frame_id for _, _, msg in shapes for marker in msg.markers} == {topics.frame}
+
+
+def test_the_two_are_told_apart(recorded: dict[str, Any]) -> None:
+    """Different pages, different motions, and in every status which boom it is of."""
+    (front, one), (rear, other) = recorded["front"], recorded["rear"]
+    assert one != other
+    tips = [dict(published(path, mapping_of(path).topics, Output.TIP_POSITION)) for path in (front, rear)]
+    shared = tips[0].keys() & tips[1].keys()
+    assert shared and len(tips[0]) > len(tips[1])
+    told = [status for _, _, msg in read(scan(front), {"/diagnostics": TYPES[Output.DIAGNOSTICS]}) for status in msg.status]
+    assert {status.hardware_id for status in told} >= {"front/boom_twin", "rear/boom_twin"}
+    assert all(status.name.startswith(f"{status.hardware_id}: ") for status in told)
