@@ -31,10 +31,9 @@ def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:
         As the parameter of twin and robot_state_publisher: ``front/``.
     """
     usual, there = load_topics(), load_topics().in_namespace(namespace)
-    pairs = [(usual.inputs[key], there.inputs[key]) for key in usual.inputs]
-    pairs += [(usual.outputs[key], there.outputs[key]) for key in usual.outputs]
     space = namespace.strip("/")
-    names = {one.absolute: other.absolute for one, other in pairs}
+    names = {topic.absolute: there.inputs[key].absolute for key, topic in usual.inputs.items()}
+    names |= {topic.absolute: there.outputs[key].absolute for key, topic in usual.outputs.items()}
     names[DESCRIPTION] = f"/{space}{DESCRIPTION}" if space else DESCRIPTION
     longest_first = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     text = re.sub(rf'(?<=[";])({longest_first})(?=[/.";\[])', lambda found: names[found[0]], text)

@@ -41,6 +41,10 @@ class Process:
     def pid(self) -> int:
         return self._child.pid
 
+    @property
+    def is_running(self) -> bool:
+        return self._child.poll() is None
+
     def said(self) -> str:
         return self._log.read_text()
 

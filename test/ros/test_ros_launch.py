@@ -151,7 +151,7 @@ def test_without_a_screen_and_without_cpp(start: Start, tmp_path: Path) -> None:
     launched = start("twin", **given, scene=scene, mapping=mapping)
     launched.wait_for("active; listening to /front/cylinder_strokes", "recording")
     end = time.monotonic() + PATIENCE
-    while "frame: front/base_link" not in (out / "session.yaml").read_text():
+    while '"front/base_link"' not in (out / "session.yaml").read_text():
         assert time.monotonic() < end
         time.sleep(0.1)
     launched.end(signal.SIGINT)

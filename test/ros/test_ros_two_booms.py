@@ -9,15 +9,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import pytest
 
 pytest.importorskip("rclpy")
 pytest.importorskip("aiohttp")
 
+import rclpy
+from rclpy.node import NodeNameNonExistentError
+from ruamel.yaml import YAML
+
+import boom_twin
 from boom_twin.bag.reader import read, read_both, scan
 from boom_twin.bag.session_model import mapping_of
 from boom_twin.bag.writer import SessionWriter
+from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, Topics
 from boom_twin.messages.type_store import jazzy
@@ -27,6 +35,12 @@ from boom_twin.types import Stream
 BOOMS = {"front": "0.0", "rear": "1.0"}
 """Their namespaces, and from when on the session is played to each, s."""
 COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)]
+RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.SHAPE)
+CONFIG = Path(boom_twin.__file__).parent / "msg_config"
+OPTIONAL = {"/front/cylinder_forces", "/clock", "/front/boom_twin/baseline"}
+"""What there is with forces in the session, with --clock, with a baseline of one's own."""
+MAPPING = "inputs:\n" + "".join(f"  {stream.value}: {{qos: {{reliability: reliable}}}}\n" for stream in Stream)
+"""So that a busy machine loses nothing on the way to node or recorder."""
 PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
 
 
@@ -34,18 +48,41 @@ PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
 def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> dict[str, Any]:
     """By boom its recording and the address of its page."""
     folder = tmp_path_factory.mktemp("booms")
-    nodes = {name: spawn_node("-r", f"__ns:=/{name}", "-p", f"frame_prefix:={name}/", "-p", "monitor:=true") for name in BOOMS}
+    mapping, played = folder / "mapping.yaml", folder / "played"
+    mapping.write_text(MAPPING)
+    inputs = {topic.absolute: topic for topic in load_mapping(mapping).inputs.values()}
+    with SessionWriter(played, inputs) as writer:
+        types = {name: topic.type for name, topic in inputs.items() if scan(bag).find(name) is not None}
+        for name, log, data, _ in read_both(scan(bag), types):
+            writer.write_encoded(name, log, data)
+    nodes = {
+        name: spawn_node(
+            "-r", f"__ns:=/{name}", "-p", f"frame_prefix:={name}/", "-p", "monitor:=true", "-p", f"mapping:={mapping}"
+        )
+        for name in BOOMS
+    }
     for name, node in nodes.items():
         node.wait_for(f"listening to /{name}/cylinder_strokes")
     command = "boom_twin.cli.main"
-    recorders = {name: spawn(command, "record", "--out", str(folder / name), "--namespace", name) for name in BOOMS}
+    recorders = {
+        name: spawn(command, "record", "--out", str(folder / name), "--mapping", str(mapping), "--namespace", name)
+        for name in BOOMS
+    }
     for recorder in recorders.values():
         recorder.wait_for("recording")
     patience = ("--listeners", "2", "--wait", "120")
     options = {name: ("--namespace", name, "--start", start, *patience) for name, start in BOOMS.items()}
-    players = [spawn(command, "play", str(bag), *options[name]) for name in BOOMS]
+    players = [spawn(command, "play", str(played), *options[name]) for name in BOOMS]
+    graph = rclpy.create_node("graph")
+    seen: dict[str, Access] = {"boom_twin_player": {}}
+    while all(player.is_running for player in players):
+        seen["boom_twin_player"] |= access(graph, "boom_twin_player")
+        time.sleep(0.2)
     assert [player.end() for player in players] == [0, 0], [player.said() for player in players]
-    found: dict[str, Any] = {}
+    assert all("\r" not in player.said() and "playing" not in player.said() for player in players)  # a bar is for terminals
+    seen |= {name: access(graph, name) for name in ("boom_twin", "boom_twin_recorder", "boom_twin_monitor")}
+    graph.destroy_node()
+    found: dict[str, Any] = {"access": seen}
     for name, node in nodes.items():
         node.wait_for("open http://")
         found[name] = (folder / name, PAGE.search(node.said())[1])  # type: ignore[index]
@@ -55,6 +92,53 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
     for process in (*recorders.values(), *nodes.values()):
         assert process.stop(signal.SIGINT) == 0, process.said()
     return found
+
+
+Access = dict[str, set[str]]
+
+
+def access(graph: Any, name: str) -> Access:
+    """What a node in /front publishes, hears, answers and asks, by the words of a policy; {} if it is not there."""
+    queries = {
+        "topics publish": graph.get_publisher_names_and_types_by_node,
+        "topics subscribe": graph.get_subscriber_names_and_types_by_node,
+        "services reply": graph.get_service_names_and_types_by_node,
+        "services request": graph.get_client_names_and_types_by_node,
+    }
+    try:
+        return {verb: {each for each, _ in query(name, "/front")} for verb, query in queries.items()}
+    except NodeNameNonExistentError:
+        return {}
+
+
+def allowed(profile: Element) -> Access:
+    """The same by the policy, for a node in /front."""
+    own = f"/front/{profile.attrib['node']}"
+    shared = {"rosout", "parameter_events", "diagnostics", "clock"}
+
+    def full(name: str) -> str:
+        return f"{own}/{name[2:]}" if name.startswith("~/") else f"/{name}" if name in shared else f"/front/{name}"
+
+    verbs = ("topics publish", "topics subscribe", "services reply", "services request")
+    return {
+        verb: {
+            full(str(each.text))
+            for group in profile.findall(f"{verb.split()[0]}[@{verb.split()[1]}='ALLOW']")
+            for each in group
+        }
+        for verb in verbs
+    }
+
+
+def test_the_policy_allows_what_the_processes_do_and_no_more(recorded: dict[str, Any]) -> None:
+    profiles = {each.attrib["node"]: each for each in ElementTree.parse(CONFIG / "sros2_policy.xml").getroot().iter("profile")}
+    assert profiles.keys() == recorded["access"].keys()
+    for node, done in recorded["access"].items():
+        permitted = allowed(profiles[node])
+        assert done, node
+        for verb, names in done.items():
+            assert names <= permitted[verb], (node, verb, sorted(names - permitted[verb]))
+            assert permitted[verb] - names <= OPTIONAL, (node, verb, sorted(permitted[verb] - names))
 
 
 def published(path: Path, topics: Topics, key: Output) -> list[tuple[int, bytes]]:
@@ -80,7 +164,7 @@ def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, An
     replay(tmp_path / "bag", None, tmp_path / "out")
     for key in COMPARED:
         live = published(path, topics, key)
-        assert len(live) > (0 if key in (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY) else 20)
+        assert len(live) > (0 if key in RARE else 100)
         assert live == published(tmp_path / "out" / "bag", topics, key), key
 
 
@@ -107,3 +191,8 @@ def test_the_two_are_told_apart(recorded: dict[str, Any]) -> None:
     told = [status for _, _, msg in read(scan(front), {"/diagnostics": TYPES[Output.DIAGNOSTICS]}) for status in msg.status]
     assert {status.hardware_id for status in told} >= {"front/boom_twin", "rear/boom_twin"}
     assert all(status.name.startswith(f"{status.hardware_id}: ") for status in told)
+    analyzers = YAML(typ="safe").load((CONFIG / "analyzers.yaml").read_text())["analyzers"]["ros__parameters"]
+    words = {name: each["contains"] for name, each in analyzers.items() if isinstance(each, dict)}
+    for status in told:  # as diagnostic_aggregator's GenericAnalyzer matches
+        found = [name for name, parts in words.items() if any(part in status.name for part in parts)]
+        assert len(found) == 1, (status.name, found)

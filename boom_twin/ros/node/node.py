@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -147,6 +148,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
+        import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
         self._twin, self._decoder = twin, SampleDecoder(joints, topics)
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
         texts = {"scene": found.text} | baseline_text(self)
