@@ -107,6 +107,7 @@ class TwinWatch:
         clock: float,
         reception: Mapping[str, Reception] | None = None,
         other_booms: Mapping[Stream, str] | None = None,
+        left_out: Mapping[str, int] | None = None,
     ) -> list[Status]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
@@ -126,6 +127,8 @@ class TwinWatch:
             By name of the topic; None where nothing is received live, and so nobody publishes.
         other_booms : dict of Stream to str, optional
             Of inputs whose messages are of another boom: that in words.
+        left_out : dict of str to int, optional
+            What was left out for lack of time since the node was configured, by what it is.
         """
         at, others = Evaluation(self.thresholds, self._monotonic(), clock), other_booms or {}
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
@@ -137,7 +140,7 @@ class TwinWatch:
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
             found.insert(0, self._publishers.status(publishers, followed, at))
-            found.append(self._reception.status(reception, at))
+            found.append(self._reception.status(reception, left_out or {}, at))
         found.append(self._outputs.status(subscribers, at))
         if self.health is not None:
             found.append(self.health.status(at))

@@ -18,6 +18,7 @@ pytest.importorskip("rclpy")
 pytest.importorskip("aiohttp")
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import NodeNameNonExistentError
 from ruamel.yaml import YAML
 
@@ -30,6 +31,8 @@ from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, Topics
 from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.replay import replay
+from boom_twin.ros.bag.recorder import COMPLETE
+from boom_twin.ros.runtime import message_class
 from boom_twin.types import Stream
 
 BOOMS = {"front": "0.0", "rear": "1.0"}
@@ -68,18 +71,28 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
         name: spawn(command, "record", "--out", str(folder / name), "--mapping", str(mapping), "--namespace", name)
         for name in BOOMS
     }
-    for recorder in recorders.values():
-        recorder.wait_for("recording")
+    graph = rclpy.create_node("graph")
+    silent = [
+        graph.create_publisher(message_class(topic.type), f"/{name}{topic.absolute}", 10)
+        for name in BOOMS
+        for topic in inputs.values()
+    ]
+    for recorder in recorders.values():  # it hears all of the node, which it may have found late
+        recorder.wait_for(COMPLETE)
+    for publisher in silent:
+        graph.destroy_publisher(publisher)
     patience = ("--listeners", "2", "--wait", "120")
     options = {name: ("--namespace", name, "--start", start, *patience) for name, start in BOOMS.items()}
     players = [spawn(command, "play", str(played), *options[name]) for name in BOOMS]
-    graph = rclpy.create_node("graph")
     seen: dict[str, Access] = {"boom_twin_player": {}}
     while all(player.is_running for player in players):
         seen["boom_twin_player"] |= access(graph, "boom_twin_player")
         time.sleep(0.2)
     assert [player.end() for player in players] == [0, 0], [player.said() for player in players]
     assert all("\r" not in player.said() and "playing" not in player.said() for player in players)  # a bar is for terminals
+    for name, player in zip(BOOMS, players, strict=True):
+        sent = re.search(r"cylinder_strokes (\d+)", player.said())[1]  # type: ignore[index]
+        wait_for_all(graph, name, sent)
     seen |= {name: access(graph, name) for name in ("boom_twin", "boom_twin_recorder", "boom_twin_monitor")}
     graph.destroy_node()
     found: dict[str, Any] = {"access": seen}
@@ -88,10 +101,29 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
         found[name] = (folder / name, PAGE.search(node.said())[1])  # type: ignore[index]
         with urlopen(found[name][1], timeout=60.0) as page:
             assert page.status == 200
-    time.sleep(1.0)
     for process in (*recorders.values(), *nodes.values()):
         assert process.stop(signal.SIGINT) == 0, process.said()
     return found
+
+
+def wait_for_all(graph: Any, name: str, sent: str) -> None:
+    """Until a recorder has all strokes, and all that the node has made of them, by its own words."""
+    received: dict[str, str] = {}
+
+    def hear(msg: DiagnosticArray) -> None:
+        for status in msg.status:
+            if status.name == f"{name}/boom_twin_recorder: recording":
+                received.update({pair.key: pair.value for pair in status.values})
+
+    subscription = graph.create_subscription(DiagnosticArray, "/diagnostics", hear, 100)
+    wanted = {
+        f"received /{name}/{each}" for each in ("cylinder_strokes", "boom_twin/tip/position", "boom_twin/estimate/tip/load")
+    }
+    end = time.monotonic() + 120.0
+    while {received.get(key) for key in wanted} != {sent}:
+        assert time.monotonic() < end, (sent, received)
+        rclpy.spin_once(graph, timeout_sec=0.1)
+    graph.destroy_subscription(subscription)
 
 
 Access = dict[str, set[str]]

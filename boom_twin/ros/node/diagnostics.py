@@ -23,6 +23,7 @@ from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
+from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Report, Sample, Stream
 from ..log import Log
@@ -172,6 +173,7 @@ class Diagnostics:
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
+        self._shedding: LoadShedding | None = None
         self._scene, self._joints = "", 0
         self._other_boom_names: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
@@ -180,7 +182,7 @@ class Diagnostics:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds)
-        self._counts = {"samples": twin.counts, "messages": decoder.oddities}
+        self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
         self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()
 
@@ -229,7 +231,9 @@ class Diagnostics:
         peers = self._peers
         others, received = self._other_booms(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others))
+        shed = self._shedding
+        left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
+        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others, left_out))
         self._tell_oddities()
         self._tell_clock(clock)
 
