@@ -6,13 +6,12 @@ noticed, and no longer believed by the estimate, only afterwards.
 
 from __future__ import annotations
 
-SHAPES_AFTER, HEALTH_AFTER = 0.5, 0.8
-"""Time (s) that a sample has waited above which shapes, and the judgement of health too, are left out: below the second after
-which, at 1 kHz and the usual depth of a topic, samples give way to newer ones."""
+SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
+"""Share of the queue of samples that is filled, above which shapes and then health too are left out; at 1 samples are lost."""
 
 
 class LoadShedding:
-    """Decides by how long the newest sample has waited. A replay, whose samples do not wait, leaves out nothing.
+    """Decides by how full the queue is that samples are taken from. A replay has none, and leaves out nothing.
 
     Attributes
     ----------
@@ -22,20 +21,20 @@ class LoadShedding:
 
     def __init__(self) -> None:
         self.shapes = self.health = 0
-        self._wait = 0.0
+        self._share = 0.0
 
-    def waited(self, wait: float) -> None:
-        """The sample that is taken next has waited for so many seconds."""
-        self._wait = wait
+    def filled(self, share: float) -> None:
+        """The queue is so full, 0 to 1, when the next sample is taken."""
+        self._share = share
 
     def leaves_out_shape(self) -> bool:
         """Whether the shape that is due is left out; counts it."""
-        is_late = self._wait > SHAPES_AFTER
-        self.shapes += is_late
-        return is_late
+        is_due = self._share > SHAPES_ABOVE
+        self.shapes += is_due
+        return is_due
 
     def leaves_out_health(self) -> bool:
         """Whether the look at the rig's health that is due is left out; counts it."""
-        is_late = self._wait > HEALTH_AFTER
-        self.health += is_late
-        return is_late
+        is_due = self._share > HEALTH_ABOVE
+        self.health += is_due
+        return is_due

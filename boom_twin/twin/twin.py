@@ -70,7 +70,7 @@ class Twin:
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
     shedding : LoadShedding
-        Is told by a live user how long samples wait; decides what is then left out.
+        Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
     steps : StepChoice

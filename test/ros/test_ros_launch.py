@@ -207,7 +207,7 @@ def test_a_session_is_played_into_the_twin_and_all_ends_with_it(start: Start, ba
     assert launched.is_gone() and "sent in" in launched.said() and "\r" not in launched.said()
     found = scan(out)
     strokes, positions = (found.find(f"/front/{name}") for name in ("cylinder_strokes", "boom_twin/tip/position"))
-    assert strokes is not None and positions is not None and min(strokes.count, positions.count) > 100  # all, on an idle machine
+    assert strokes is not None and positions is not None and min(strokes.count, positions.count) > 100
 
 
 def test_a_session_that_cannot_be_played_starts_nothing(start: Start, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What is left out while samples wait: shapes, then looks at health, and never a bit of what is predicted."""
+"""What is left out while samples queue up: shapes, then looks at health, and never a bit of what is predicted."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.twin.load_shedding import HEALTH_AFTER, SHAPES_AFTER
+from boom_twin.twin.load_shedding import HEALTH_ABOVE, SHAPES_ABOVE
 
 SECONDS, RATE = 8, 100
 BUSY = range(3 * RATE, 5 * RATE)
-"""Strokes that have waited."""
+"""Strokes that are taken from a full queue."""
 LEFT_OUT = {Output.SHAPE, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.JOINT_STATES}  # swivels come with a shape
 
 
-def run(wait: float) -> tuple[Twin, list[Report], list[tuple[Output, bytes]]]:
+def run(share: float) -> tuple[Twin, list[Report], list[tuple[Output, bytes]]]:
     """A boom at rest whose encoders read what is predicted, with noise."""
     scene, random = load_scene(), np.random.default_rng(4)
     twin, encoder = Twin(scene, baseline=load_baseline()), ReportEncoder(scene, Settings())
     strokes, reports = strokes_of_posture(scene, "arch"), []
     for k in range(SECONDS * RATE):
-        twin.shedding.waited(wait if k in BUSY else 0.0)
+        twin.shedding.filled(share if k in BUSY else 0.0)
         stamp = 10**18 + k * 10**9 // RATE
         reports.append(twin.update(Sample(Stream.STROKES, stamp, strokes + random.normal(0.0, 2e-5, len(strokes)))))
         assert reports[-1].prediction is not None
@@ -44,10 +44,10 @@ def of(messages: list[tuple[Output, bytes]], key: Output) -> list[bytes]:
 
 
 @pytest.mark.parametrize(
-    ("wait", "shapes", "health"), [(SHAPES_AFTER + 0.01, 20, 0), (HEALTH_AFTER + 0.01, 20, 20), (0.4, 0, 0)]
+    ("share", "shapes", "health"), [(SHAPES_ABOVE + 0.01, 20, 0), (HEALTH_ABOVE + 0.01, 20, 20), (0.4, 0, 0)]
 )
-def test_shapes_go_first_then_health(wait: float, shapes: int, health: int, calm: list[tuple[Output, bytes]]) -> None:
-    twin, reports, messages = run(wait)
+def test_shapes_go_first_then_health(share: float, shapes: int, health: int, calm: list[tuple[Output, bytes]]) -> None:
+    twin, reports, messages = run(share)
     assert (twin.shedding.shapes, twin.shedding.health) == (shapes, health)
     for key in set(Output) - LEFT_OUT:
         assert of(messages, key) == of(calm, key), key

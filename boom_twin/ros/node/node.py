@@ -196,7 +196,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
-        self._twin.shedding.waited(self.queue.wait)
+        self._twin.shedding.filled(self.queue.share)
         self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
         for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg)):
             self._diagnostics.took(*step)

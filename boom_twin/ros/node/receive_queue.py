@@ -67,8 +67,8 @@ class ReceiveQueue:
     ----------
     received : int
         Messages of all topics that were put.
-    wait : float
-        Time (s) from arrival to reading of the message that is being read, or was last.
+    share : float
+        Messages that wait behind the one that is being read, or was last, of its topic; as a share of what may.
     is_behind : bool
         Whether the newest message had waited for the executor, so that there may be more.
     """
@@ -76,7 +76,7 @@ class ReceiveQueue:
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
         self._clock = clock
         self._topics: dict[str, _Topic] = {}
-        self.received, self.is_behind, self.wait = 0, False, 0.0
+        self.received, self.is_behind, self.share = 0, False, 0.0
 
     def __bool__(self) -> bool:
         """Whether a message waits."""
@@ -124,7 +124,7 @@ class ReceiveQueue:
         end = time.monotonic() + budget
         while (topic := self._next()) is not None:
             _, arrival, data = topic.waiting.popleft()
-            self.wait = wait = self._since(arrival)
+            self.share, wait = len(topic.waiting) / topic.depth, self._since(arrival)
             if not wait <= topic.wait:
                 topic.wait = wait
             topic.read(data)
