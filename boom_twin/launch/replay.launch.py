@@ -8,7 +8,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, OpaqueFunction, Shutdown
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    Shutdown,
+    TimerAction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 
@@ -42,6 +49,8 @@ PASSED_ON = (
     "scene", "params_file", "mapping", "namespace", "frame_prefix", "state_publisher", "monitor", "rviz", "record",
 )  # fmt: skip
 """To ``twin.launch.py``."""
+LAST = 3.0
+"""Seconds from the end of the session, in which node and recorder take what is on its way."""
 KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
 """What the session keeps, and how something else is given."""
 
@@ -81,5 +90,5 @@ def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     options = [part for name in names for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
     command = python_command("boom_twin.cli.main", "play", bag, "--clock", *options)
     command += ["--listeners", "2" if record else "1"]
-    over = Shutdown(reason="the session has been played")
-    return [ExecuteProcess(cmd=command, name="play", output="screen", on_exit=over)]
+    over = TimerAction(period=LAST, actions=[Shutdown(reason="the session has been played")])
+    return [ExecuteProcess(cmd=command, name="play", output="screen", on_exit=[over])]

@@ -202,7 +202,7 @@ def test_a_node_that_cannot_start_ends_all(start: Start, tmp_path: Path) -> None
 
 def test_a_session_is_played_into_the_twin_and_all_ends_with_it(start: Start, bag: Path, tmp_path: Path) -> None:
     out = tmp_path / "again"
-    launched = start("replay", bag=bag, namespace="front", state_publisher="false", rviz="false", record=out, rate="2.0")
+    launched = start("replay", bag=bag, namespace="front", state_publisher="false", rviz="false", record=out)
     assert launched.end() == 0, launched.said()
     assert launched.is_gone() and "sent in" in launched.said() and "\r" not in launched.said()
     found = scan(out)

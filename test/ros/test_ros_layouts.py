@@ -28,7 +28,14 @@ CHANNELS = [f"{kind}_{i}" for kind in ("joint", "cylinder") for i in range(1, 5)
 # What these modules of ROS 2 Jazzy have, of what is used here.
 API = {
     "launch": {"LaunchContext", "LaunchDescription", "LaunchDescriptionEntity"},
-    "launch.actions": {"DeclareLaunchArgument", "ExecuteProcess", "IncludeLaunchDescription", "OpaqueFunction", "Shutdown"},
+    "launch.actions": {
+        "DeclareLaunchArgument",
+        "ExecuteProcess",
+        "IncludeLaunchDescription",
+        "OpaqueFunction",
+        "Shutdown",
+        "TimerAction",
+    },
     "launch.launch_description_sources": {"PythonLaunchDescriptionSource"},
     "launch.substitutions": {"LaunchConfiguration", "ThisLaunchFileDir"},
     "launch_ros.actions": {"Node"},
