@@ -15,7 +15,7 @@ from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from boom_twin.config.settings import DEFAULT_FILE, load_settings, load_thresholds
+from boom_twin.config.settings import DEFAULT_FILE, read_parameters
 from boom_twin.errors import BoomTwinError
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.urdf import urdf
@@ -59,8 +59,7 @@ def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     check_packages(given)
     scene = load_scene(given["scene"] or None)
     load_mapping(path(given["mapping"]), len(scene.joints))
-    load_settings(Path(given["params_file"]))
-    load_thresholds(Path(given["params_file"]))
+    read_parameters(Path(given["params_file"]))
     found: list[LaunchDescriptionEntity] = [twin(given)]
     if is_set(given, "state_publisher"):
         found.append(state_publisher(given, scene))
