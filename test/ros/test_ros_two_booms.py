@@ -32,7 +32,7 @@ from boom_twin.messages.topic_table import TYPES, Output, Topics
 from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.replay import replay
 from boom_twin.ros.bag.recorder import COMPLETE
-from boom_twin.ros.runtime import message_class
+from boom_twin.ros.runtime import message_class, qos_profile
 from boom_twin.types import Stream
 
 BOOMS = {"front": "0.0", "rear": "1.0"}
@@ -42,8 +42,10 @@ RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.SHAPE)
 CONFIG = Path(boom_twin.__file__).parent / "msg_config"
 OPTIONAL = {"/front/cylinder_forces", "/clock", "/front/boom_twin/baseline"}
 """What there is with forces in the session, with --clock, with a baseline of one's own."""
-MAPPING = "inputs:\n" + "".join(f"  {stream.value}: {{qos: {{reliability: reliable}}}}\n" for stream in Stream)
-"""So that a busy machine loses nothing on the way to node or recorder."""
+MAPPING = "inputs:\n" + "".join(
+    f"  {stream.value}: {{qos: {{reliability: reliable, durability: transient_local}}}}\n" for stream in Stream
+)
+"""So that a busy machine loses nothing on the way to node or recorder, though they may find the player late."""
 PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
 
 
@@ -73,7 +75,7 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
     }
     graph = rclpy.create_node("graph")
     silent = [
-        graph.create_publisher(message_class(topic.type), f"/{name}{topic.absolute}", 10)
+        graph.create_publisher(message_class(topic.type), f"/{name}{topic.absolute}", qos_profile(topic.qos))
         for name in BOOMS
         for topic in inputs.values()
     ]
