@@ -21,7 +21,15 @@ setup(
     license="Apache-2.0",
     author="boom_twin developers",
     packages=find_packages(include=["boom_twin", "boom_twin.*"]),
-    package_data={"boom_twin": ["py.typed", "msg_config/*.yaml", "examples/*.yaml", "monitor/page/*", "ros/*.xml"]},
+    package_data={
+        "boom_twin": [
+            "py.typed",
+            *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "xml")),
+            "examples/*.yaml",
+            "monitor/page/*",
+            "ros/*.xml",
+        ]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", ["msg_config/resource/boom_twin"]),
         ("share/boom_twin", ["package.xml"]),

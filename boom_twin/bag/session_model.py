@@ -129,7 +129,7 @@ def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
     return SessionBaseline(load_baseline(given), str(given or DEFAULT_BASELINE))
 
 
-def mapping_of(session: Path, given: Path | None = None, joints: int | None = None) -> Mapped:
+def mapping_of(session: Path, given: Path | None = None, joints: int | None = None, namespace: str = "") -> Mapped:
     """The mapping of a session, found as its scene is by `scene_of`.
 
     Parameters
@@ -138,6 +138,8 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     given : Path, optional
     joints : int, optional
         As for `boom_twin.messages.mapping.load_mapping`.
+    namespace : str
+        In which the node was: names without a leading slash are those of this namespace.
 
     Returns
     -------
@@ -153,8 +155,10 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     """
     own = kept(session, "mapping", "--mapping") if given is None else None
     if own is None:
-        return Mapped(load_mapping(given, joints), DEFAULT_MAPPING if given is None else str(given))
-    try:
-        return Mapped(mapping_from(plain(own.text), own.source, joints), own.source)
-    except ValueError as error:
-        raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None
+        found = Mapped(load_mapping(given, joints), DEFAULT_MAPPING if given is None else str(given))
+    else:
+        try:
+            found = Mapped(mapping_from(plain(own.text), own.source, joints), own.source)
+        except ValueError as error:
+            raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None
+    return Mapped(found.topics.in_namespace(namespace), found.source) if namespace.strip("/") else found

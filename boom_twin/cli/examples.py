@@ -11,6 +11,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "recover": ("recover bags/broken --out out/saved",),
     "scene": ("scene", "scene --clearance"),
     "mapping": ("mapping",),
+    "views": ("views --namespace front --out out/views",),
     "urdf": ("urdf my_boom.yaml",),
     "statics": ("statics my_boom.yaml --posture arch", "statics --strokes=0.63,0.165,0.235,0.187 --json"),
     "response": ("response my_boom.yaml --posture arch", "response --posture arch --pump 0.4:130"),

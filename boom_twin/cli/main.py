@@ -12,7 +12,7 @@ import gc
 import json
 import os
 import sys
-from argparse import SUPPRESS, ArgumentParser, Namespace
+from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
@@ -43,6 +43,7 @@ COMMANDS: dict[str, str] = {
     "scene": "print the default scene file",
     "mapping": "print the default mapping of topics and sensors",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
+    "views": "what RViz, Foxglove and PlotJuggler show, for a boom in a namespace",
     "statics": "static equilibrium, cylinder forces, natural frequencies",
     "envelope": "sag, forces, frequencies, stresses over the whole range",
     "simulate": "the boom's answer to a stroke history",
@@ -176,6 +177,24 @@ def add_params(parser: ArgumentParser) -> None:
 def add_json(parser: ArgumentParser) -> None:
     """``--json``: stdout holds exactly one flat JSON object."""
     parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
+
+
+def add_ros_args(parser: ArgumentParser) -> None:
+    """``--namespace`` and ``--ros-args``, for `ros_arguments`."""
+    add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
+    told = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=told)
+
+
+def add_namespace(parser: ArgumentParser, told: str) -> None:
+    """``--namespace``."""
+    parser.add_argument("--namespace", metavar="NAME", default="", help=told)
+
+
+def ros_arguments(args: Namespace) -> list[str]:
+    """What rclpy is to be started with, or a further process of this package."""
+    namespace = args.namespace.strip("/")
+    return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
 
 
 def open_scene(source: str | None) -> Scene:

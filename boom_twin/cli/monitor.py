@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from errno import EADDRINUSE
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
 from .arguments import add_window, window_of
-from .main import add_session_scene, open_scene, open_session_scene, warn_incomplete
+from .main import add_ros_args, add_session_scene, open_scene, open_session_scene, ros_arguments, warn_incomplete
 
 if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
@@ -58,7 +58,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
-    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help="remappings of the twin's topics, as for any node")
+    add_ros_args(parser)
 
 
 def run(args: Namespace) -> int:
@@ -88,7 +88,7 @@ def _passed_on(args: Namespace) -> list[str]:
     """What `boom_twin record` is to know of what this was started with."""
     options = {"--scene": args.scene, "--mapping": args.mapping, "--baseline": args.baseline, "--params": args.params}
     given = [part for option, value in options.items() if value for part in (option, str(value))]
-    return [*given, *(["--ros-args", *args.ros_args] if args.ros_args else [])]
+    return [*given, *ros_arguments(args)]
 
 
 def _lower_priority() -> None:
@@ -109,7 +109,9 @@ def _sessions(args: Namespace) -> SessionList:
 
     def open_feed(path: Path) -> Feed:
         warn_incomplete(scan(path))
-        return bag_feed(path, open_session_scene(path, args.scene), settings, args.mapping, args.baseline, window)
+        return bag_feed(
+            path, open_session_scene(path, args.scene), settings, args.mapping, args.baseline, window, args.namespace
+        )
 
     print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
     return SessionList(sessions_in(args.bag), open_feed)
@@ -125,7 +127,7 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
     from ..ros.monitor_feed import TopicFeed
     from ..ros.runtime import ros
 
-    with ros(["--ros-args", *args.ros_args]):
+    with ros(ros_arguments(args)):
         shown = open_scene(args.scene) if args.scene else None
         with closing(TopicFeed(load_mapping(args.mapping), shown)) as feed:
             yield feed

@@ -19,6 +19,7 @@ from ..errors import BoomTwinError
 from ..ros.startup import require_rclpy
 from ..types import NANO
 from .arguments import not_negative, positive
+from .main import add_ros_args, ros_arguments
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
@@ -46,6 +47,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
     )
+    told = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
+    parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=told)
+    add_ros_args(parser)
 
 
 def run(args: Namespace) -> int:
@@ -55,12 +59,12 @@ def run(args: Namespace) -> int:
     from ..ros.runtime import ros
 
     session = scan(args.bag)
-    with ros([]):
+    with ros(ros_arguments(args)):
         player = Player(session, args.topics, args.clock)
         length = player.length(args.start, args.duration)
-        unmatched = player.wait(args.wait)
+        unmatched = player.wait(args.wait, args.listeners)
         if unmatched and args.wait > 0.0:
-            _check_listeners(unmatched, len(player.topics), args.wait)
+            _check_listeners(unmatched, player.unmatched(), len(player.topics), args)
         try:
             _play(player, args, length)
         except KeyboardInterrupt:
@@ -88,20 +92,22 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         if keys.are_read:
             print("space: pause and go on; Ctrl-C: end", file=sys.stderr)
         while True:
-            with tqdm(total=length, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
+            with tqdm(total=length, disable=None, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):
                     bar.update(elapsed * NANO - bar.n)
             if not args.loop:
                 return
 
 
-def _check_listeners(unmatched: list[str], topics: int, wait: float) -> None:
-    """Refuse to play to nobody; warn of single topics that nobody listens to."""
-    if len(unmatched) == topics:
+def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args: Namespace) -> None:
+    """Refuse to play to nobody; warn of single topics that too few listen to."""
+    if len(unheard) == topics:
         raise BoomTwinError(
-            f"nobody listened within {wait:g} s. Start twin_node, check ROS_DOMAIN_ID, or play anyway with --wait 0."
+            f"nobody listened within {args.wait:g} s. Start twin_node, check ROS_DOMAIN_ID and namespace, or play anyway "
+            "with --wait 0."
         )
-    print(f"warning: nobody listens to {', '.join(unmatched)}", file=sys.stderr)
+    told = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
+    print(f"warning: {told} to {', '.join(unmatched)}", file=sys.stderr)
 
 
 class Keys:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from argparse import REMAINDER, ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -21,7 +21,7 @@ from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
 from ..ros.startup import require_rclpy
 from .arguments import positive
-from .main import tell
+from .main import add_ros_args, ros_arguments, tell
 
 if TYPE_CHECKING:
     from ..ros.bag.recorder import Count
@@ -54,8 +54,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
     parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
-    ros_args = "namespace and remappings of the twin beside which it records: -r __ns:=/front"
-    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=ros_args)
+    add_ros_args(parser)
 
 
 def run(args: Namespace) -> int:
@@ -78,7 +77,7 @@ def run(args: Namespace) -> int:
     check_lasting(args.out)
     if args.out.is_dir() and (told := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
-    with ros(["--ros-args", *args.ros_args]), recorder_node() as node:
+    with ros(ros_arguments(args)), recorder_node() as node:
         wanted = [resolved(each, node) for each in wanted]
         sheet = replace(sheet, mapping=resolved_mapping(sheet.mapping or "", known, node))
         sheet = replace(sheet, topics={each.name: each.type for each in wanted})
@@ -87,7 +86,7 @@ def run(args: Namespace) -> int:
 
         def on_twin(told: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _with_twin_values(sheet, told)
+            more = _with_twin_values(sheet, told, known.frame)
             try:
                 more.write(args.out)
                 sheet = more
@@ -130,11 +129,17 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any]) -> SessionSheet:
-    """With what the running twin tells of itself; what was given instead stays, and the difference is told."""
+def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str) -> SessionSheet:
+    """With what the running twin tells of itself; what was given instead stays, and the difference is told.
+
+    The prefix that it puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
+    """
     from ..ros.bag.recorder import TEXTS
+    from ..ros.bag.subscriptions import with_mapped
 
     changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
+    if prefix := told.get("parameters", {}).get("frame_prefix"):
+        changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
     for name in TEXTS:
         if name in told:
             given, own = getattr(sheet, name), told[name]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
 from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import add_json, add_namespace, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
 from .progress import progress_of
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_params(parser)
     add_mapping(parser)
+    add_namespace(parser, "ROS namespace of the node in the session, where its mapping does not tell that")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
@@ -75,7 +76,16 @@ def run(args: Namespace) -> int:
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
         progress = partial(progress_of, unit="messages", name="replay")
-        options = settings, progress, args.mapping, not args.no_changes, not args.no_health, args.baseline, window
+        options = (
+            settings,
+            progress,
+            args.mapping,
+            not args.no_changes,
+            not args.no_health,
+            args.baseline,
+            window,
+            args.namespace,
+        )
         evaluator = Evaluator(scene.scene, settings, args.baseline, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -36,6 +37,16 @@ PLACES = {
 FINE = 0.1  # increment of an offset, as a share of its clearance, that counts as one of 1 rad
 
 
+@cache
+def _shapes(basis: BasisName, n: int) -> tuple[int, modes.Basis, Array, Array]:
+    """Points, shapes, weights and integrals of a part with `n` bending coordinates; many booms share them."""
+    points = max(3, n + MORE_POINTS[basis])
+    found = BASES[basis](n, points), modes.gauss_points(points)[1], modes.integration_matrix(points)
+    for array in (*found[0], *found[1:]):
+        array.flags.writeable = False
+    return points, *found
+
+
 def compile_scene(scene: Scene, basis: BasisName = "end-shapes") -> Plan:
     """Compile `scene`; `basis` chooses the bending shapes of all parts (`boom_twin.kernels.elements.beam_shapes`)."""
     builder = _Builder(scene, basis)
@@ -59,7 +70,7 @@ class _Builder:
     """Walks a scene from the base to the tip."""
 
     def __init__(self, scene: Scene, basis: BasisName) -> None:
-        self.scene, self.basis, self.more_points, self.layout = scene, BASES[basis], MORE_POINTS[basis], Layout()
+        self.scene, self.basis, self.layout = scene, basis, Layout()
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
         self.outline: list[tuple[int, int]] = []
         self.pins: list[str] = []
@@ -226,9 +237,7 @@ class _Builder:
         """A flexible part of section `index`."""
         section, n = self.scene.sections[index], self.scene.modes_of(index)
         assert section.A is not None and section.I is not None and section.rho_A is not None
-        points = max(3, n + self.more_points)
-        basis = self.basis(n, points)
-        _, share = modes.gauss_points(points)
+        points, basis, share, integrals = _shapes(self.basis, n)
         mass = (section.rho_A + (self.scene.line_fill or 0.0)) * length * share
         turning = (section.rho_I or 0.0) * length * share
         elastic = self.scene.material.E
@@ -253,7 +262,7 @@ class _Builder:
             axial_stiffness=elastic * section.A * length,
         )
         stiffness = modes.bending_stiffness(basis, elastic * section.I, length)
-        self.beam_tables.append((basis.psi, modes.integration_matrix(points) * length, stiffness, mass, turning))
+        self.beam_tables.append((basis.psi, integrals * length, stiffness, mass, turning))
         self._mark_frame()
         self.outline += [(1, history + 2 * k) for k in range(points)]
         self.layout.operate(program.BEAM, row)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -27,17 +28,25 @@ def read_parameters(path: Path) -> dict[str, Any]:
         raise UsageError(f"{path}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
 
 
-def checked(table: type[Table], values: dict[str, Any], source: str) -> Table:
-    """A table with these values; UsageError names every value that is out of bounds."""
+def checked(table: type[Table], values: dict[str, Any], source: str, others: Iterable[str] = ()) -> Table:
+    """A table with these values; UsageError names every value that is out of bounds, or unknown here and among `others`."""
     try:
         return table(**values)
     except ValidationError as error:
         lines = []
         for e in error.errors():
             name = ".".join(map(str, e["loc"]))
-            lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, e['msg'])}")
+            told = e["msg"]
+            if e["type"] == "extra_forbidden":
+                told = f"unknown. The nearest is `{nearest(name, [*table.model_fields, *others])}`"
+            lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, told)}")
         known = ", ".join(table.model_fields)
         raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """The known name that is most like one that is not."""
+    return get_close_matches(name, known, n=1, cutoff=0.0)[0]
 
 
 Share = Annotated[float, Field(gt=0, le=1)]
@@ -87,7 +96,7 @@ DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-NODE_ONLY = ("scene", "mapping", "health", "baseline", "autostart", "monitor")
+NODE_ONLY = ("scene", "mapping", "health", "baseline", "frame_prefix", "hardware_id", "autostart", "monitor")
 STROKE_RATE = 0.5
 """No cylinder is faster, m/s."""
 LIVE = "live"
@@ -201,4 +210,4 @@ def load_settings(path: Path | None = None) -> Settings:
     source = DEFAULT_FILE if path is None else Path(path)
     others = {*NODE_ONLY, *Thresholds.model_fields}
     values = {name: value for name, value in read_parameters(source).items() if name not in others}
-    return checked(Settings, values, str(source))
+    return checked(Settings, values, str(source), others)

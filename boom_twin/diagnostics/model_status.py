@@ -163,10 +163,12 @@ class ResidualJudge:
     ----------
     name : str
         Of the channel.
+    since : float
+        When the first residuals began to come, s of a clock that only goes forward: the window is no longer than that.
     """
 
-    def __init__(self, name: str) -> None:
-        self._judge = ComponentJudge(f"residual {name}")
+    def __init__(self, name: str, since: float) -> None:
+        self._judge, self._since = ComponentJudge(f"residual {name}"), since
         self._window: deque[_Sums] = deque()
 
     def take(self, normalised: Array, now: float) -> None:
@@ -184,16 +186,17 @@ class ResidualJudge:
         judge, count = self._judge, sum(sums.number for sums in self._window)
         judge.begin(at)
         rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
-        told = f"{rms:.2f} times as large as noise explains, for {thresholds.residual_window:g} s"
+        window = min(thresholds.residual_window, at.now - self._since)
+        told = f"{rms:.2f} times as large as noise explains, for {window:.2g} s"
         if alarm is not None:
             judge.fault(*alarm)
         judge.check("rms_normalised", rms, Bounds(thresholds.residual_warn, thresholds.residual_error), told)
         judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
         judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))
         judge.note("count", count)
-        judge.note("window_s", thresholds.residual_window)
+        judge.note("window_s", window)
         if not count:
-            judge.fault(Level.STALE, f"none for {thresholds.residual_window:g} s")
+            judge.fault(Level.STALE, f"none for {window:.2g} s")
         return judge.finish("as large as noise explains")
 
 

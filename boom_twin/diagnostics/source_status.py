@@ -61,8 +61,8 @@ class Reception:
         That arrived and gave way to newer ones before they were read.
     waiting : int
         That wait now.
-    wait : float
-        Longest time (s) from arrival to being read since the last look; NaN without any.
+    wait, latency : float
+        Longest time (s) from arrival to being read, and to being answered, since the last look; NaN without any.
     is_numbered : bool
         Whether the numbers since the last look were those of one publisher.
     """
@@ -72,6 +72,7 @@ class Reception:
     dropped: int = 0
     waiting: int = 0
     wait: float = nan
+    latency: float = nan
     is_numbered: bool = True
 
 
@@ -81,14 +82,19 @@ class ReceptionJudge:
     def __init__(self) -> None:
         self._judge = ComponentJudge("reception")
         self._before: dict[str, Reception] = {}
+        self._left_out: dict[str, int] = {}
 
-    def status(self, topics: Mapping[str, Reception], at: Evaluation) -> Status:
-        """State of the reception; `topics` by name."""
+    def status(self, topics: Mapping[str, Reception], left_out: Mapping[str, int], at: Evaluation) -> Status:
+        """State of the reception; `topics` by name, and what was left out for lack of time, in all, by what it is."""
         judge = self._judge
         judge.begin(at)
         for name, each in topics.items():
             self._check(name, each, at.thresholds)
-        self._before = dict(topics)
+        for name, count in left_out.items():
+            new = count - self._left_out.get(name, 0)
+            told = f"too many messages for the time there is: {new} {name} left out, no prediction"
+            judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
+        self._before, self._left_out = dict(topics), dict(left_out)
         return judge.finish("all that arrives is read at once")
 
     def _check(self, name: str, each: Reception, thresholds: Thresholds) -> None:
@@ -103,6 +109,7 @@ class ReceptionJudge:
         told = f"{name}: {share:.0%} of the messages were not read ({lost} never arrived, {dropped} gave way to newer ones)"
         bounds = Bounds(thresholds.unread_warn, thresholds.unread_error)
         self._judge.check(f"{name} unread_share", share, bounds, told)
+        self._judge.note(f"{name} latency_s", each.latency)
         told = f"{name}: messages wait {each.wait:.3f} s for their turn: too many come, or the model is too slow"
         self._judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
         if not each.is_numbered:

@@ -59,6 +59,7 @@ class TwinWatch:
         for stream in self._streams.values():
             stream.begin(now)
         self._model.begin(now)
+        self._looked = now
         self._residuals: list[Residuals] = []
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
@@ -112,6 +113,7 @@ class TwinWatch:
         clock: float,
         reception: Mapping[str, Reception] | None = None,
         other_booms: Mapping[Stream, str] | None = None,
+        left_out: Mapping[str, int] | None = None,
     ) -> list[Status]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
@@ -131,6 +133,8 @@ class TwinWatch:
             By name of the topic; None where nothing is received live, and so nobody publishes.
         other_booms : dict of Stream to str, optional
             Of inputs whose messages are of another boom: that in words.
+        left_out : dict of str to int, optional
+            What was left out for lack of time since the node was configured, by what it is.
         """
         at, others = Evaluation(self.thresholds, self._monotonic(), clock), other_booms or {}
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
@@ -142,7 +146,7 @@ class TwinWatch:
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
             found.insert(0, self._publishers.status(publishers, followed, at))
-            found.append(self._reception.status(reception, at))
+            found.append(self._reception.status(reception, left_out or {}, at))
         found.append(self._outputs.status(subscribers, at))
         if self.health is not None:
             found.append(self.health.status(at))
@@ -175,7 +179,8 @@ class TwinWatch:
             those = [each for each in taken if each.names == names]
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
-                self._judges.setdefault(name, ResidualJudge(name)).take(column, at.now)
+                self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
+        self._looked = at.now
         return [judge.status(self._alarm_of(name), at) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:

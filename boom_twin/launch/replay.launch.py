@@ -8,14 +8,24 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, OpaqueFunction, Shutdown
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    Shutdown,
+    TimerAction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
-from launch_ros.substitutions import FindPackageShare
+from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 
+from boom_twin.bag.advice import publishable
+from boom_twin.bag.reader import scan
 from boom_twin.bag.session_sheet import kept
+from boom_twin.config.settings import DEFAULT_FILE
 from boom_twin.system.child_process import python_command
 
+FLAG = ("true", "false")
 ARGUMENTS = [
     DeclareLaunchArgument("bag", description="session to play: rosbag2 directory or .mcap file"),
     DeclareLaunchArgument("rate", default_value="1.0", description="session time over real time"),
@@ -23,31 +33,41 @@ ARGUMENTS = [
     DeclareLaunchArgument("wait", default_value="120.0", description="seconds to wait for the node; the first start compiles"),
     DeclareLaunchArgument("scene", default_value="", description="scene file of the boom; empty: that of the session"),
     DeclareLaunchArgument(
-        "params_file",
-        default_value=PathJoinSubstitution([FindPackageShare("boom_twin"), "msg_config", "twin.yaml"]),
-        description="parameters of the node; `scene` above wins",
+        "params_file", default_value=str(DEFAULT_FILE), description="parameters of the node; the arguments here win"
     ),
     DeclareLaunchArgument("mapping", default_value="", description="names and units of sensors; empty: those of the session"),
-    DeclareLaunchArgument("namespace", default_value="", description="of the node; the session's topics must be in it"),
-    DeclareLaunchArgument("rviz", default_value="true", description="start RViz"),
+    DeclareLaunchArgument(
+        "namespace", default_value="", description="of all nodes; topics of a session that was recorded in one stay in that"
+    ),
+    DeclareLaunchArgument("frame_prefix", default_value="", description="before the name of every frame: front/"),
+    DeclareLaunchArgument("state_publisher", default_value="true", choices=FLAG, description="start robot_state_publisher: TF"),
+    DeclareLaunchArgument("monitor", default_value="false", choices=FLAG, description="the live page beside the node"),
+    DeclareLaunchArgument("rviz", default_value="true", choices=FLAG, description="start RViz"),
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
+PASSED_ON = (
+    "scene", "params_file", "mapping", "namespace", "frame_prefix", "state_publisher", "monitor", "rviz", "record",
+)  # fmt: skip
+"""To ``twin.launch.py``."""
+LAST = 3.0
+"""Seconds from the end of the session, in which node and recorder take what is on its way."""
 KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
 """What the session keeps, and how something else is given."""
 
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments above, the twin on simulated time, and the player; all ends with the session."""
-    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), player()])
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), OpaqueFunction(function=player)])
 
 
 def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """``twin.launch.py`` on the session's clock, with the session's scene and mapping where no others are given."""
-    names = ("scene", "params_file", "mapping", "namespace", "rviz", "record")
-    given = {name: LaunchConfiguration(name).perform(context) for name in names}
-    files = kept_files(Path(LaunchConfiguration("bag").perform(context)), [name for name in KEPT if not given[name]])
+    given = {name: LaunchConfiguration(name).perform(context) for name in PASSED_ON}
+    bag = Path(LaunchConfiguration("bag").perform(context))
+    publishable(scan(bag))  # raises if nothing of it can be played
+    files = kept_files(bag, [name for name in KEPT if not given[name]])
     source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/twin.launch.py"])
-    arguments = {**given, **files, "use_sim_time": "true"}
+    arguments = {**given, **files, "use_sim_time": "true", "ignore_timestamp": "true"}
     return [IncludeLaunchDescription(source, launch_arguments=list(arguments.items()))]
 
 
@@ -63,8 +83,12 @@ def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
     return {name: f"{folder.name}/{name}.yaml" for name in texts}
 
 
-def player() -> ExecuteProcess:
-    """The session's inputs and its clock, once the node listens."""
-    options = [part for name in ("rate", "start", "wait") for part in (f"--{name}", LaunchConfiguration(name))]
-    command = [*python_command("boom_twin.cli.main", "play"), LaunchConfiguration("bag"), "--clock", *options]
-    return ExecuteProcess(cmd=command, name="play", output="screen", on_exit=Shutdown(reason="the session has been played"))
+def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """The session's inputs and its clock, once the node listens, and the recorder if there is one."""
+    bag, record = (LaunchConfiguration(name).perform(context) for name in ("bag", "record"))
+    names = ("rate", "start", "wait", "namespace")
+    options = [part for name in names for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
+    command = python_command("boom_twin.cli.main", "play", bag, "--clock", *options)
+    command += ["--listeners", "2" if record else "1"]
+    over = TimerAction(period=LAST, actions=[Shutdown(reason="the session has been played")])
+    return [ExecuteProcess(cmd=command, name="play", output="screen", on_exit=[over])]

@@ -126,7 +126,8 @@ class BlockDecoder:
                 if known is not None:
                     stamps[rows] = known.layout.stamps_in(block, rows)
                     usual, values = self._read(known, block, rows, stamps[rows])
-                    found += [(rows[usual], _of_stream(stream, stamps[rows[usual]], each[usual])) for stream, each in values]
+                    taken, delays = stamps[rows[usual]], self._decoder.delays
+                    found += [(rows[usual], _of_stream(stream, taken - delays[stream], each[usual])) for stream, each in values]
                     if known.oddities and usual.any():
                         turns.append((int(rows[usual][0]), known, int(usual.sum())))
                 turns += zip(rows[~usual].tolist(), repeat(known), repeat(0))
@@ -184,11 +185,13 @@ class BlockDecoder:
         self, known: _Known, block: MessageBlock, rows: Integers, stamps: Integers
     ) -> tuple[NDArray[np.bool_], list[tuple[Stream, Array]]]:
         """Which of some messages have nothing but values, and the values of every stream of all of them."""
-        usual = np.full(len(rows), bool(known.streams)) & (stamps > 0) & (stamps < LATEST)
+        usual = np.full(len(rows), bool(known.streams)) & (stamps != 0)
         if not usual.any():
             return usual, []
         numbers, found = known.layout.numbers_in(block, rows), []
         for stream, columns, places, (zeros, factors) in known.streams:
+            taken = stamps - self._decoder.delays[stream]
+            usual &= (taken > 0) & (taken < LATEST)
             if SENSORS[stream].is_imu:
                 usual &= numbers[:, -1] != NO_MEASUREMENT
             values = np.full((len(rows), self._width), np.nan)

@@ -11,7 +11,7 @@ import numpy as np
 from ..twin.blocks import Integers
 from ..types import SECOND, Array
 from .encoded_block import Bytes
-from .message_fields import fill_header
+from .message_fields import FRAME, fill_header
 from .type_store import jazzy
 
 ORIGIN = 4
@@ -91,9 +91,9 @@ class Template:
         return rows
 
 
-def stamped(header: Any) -> None:
+def stamped(header: Any, frame: str = FRAME) -> None:
     """Put the placeholder of a stamp, and the frame, into a header."""
-    fill_header(header, STAMP * SECOND)
+    fill_header(header, STAMP * SECOND, frame)
 
 
 def _places(bits: Any, first: int, count: int) -> Any:

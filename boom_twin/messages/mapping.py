@@ -12,9 +12,10 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, stream_of
+from ..types import SENSORS, Stream, stream_of
 from .topic_table import (
     TYPES,
+    InputTopic,
     Qos,
     Sensor,
     Topic,
@@ -34,6 +35,8 @@ _REMEDIES = {
     "unit": "Give the unit of the published values.",
     "absolute": "Give root or head, where on its section the inclinometer sits; leave it out for an encoder.",
     "depth": "Give a number of messages.",
+    "delay": "Give the seconds by which the stamps come after the readings.",
+    "frame": "Give the name of a frame without a leading slash: base_link.",
 }
 _SEE = "See the comments in msg_config/topics.yaml."
 
@@ -74,7 +77,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     topics: Topics | None = None
     try:
         topics = Topics.model_validate(values)
-        faults += _name_faults(topics)
+        faults += [*_name_faults(topics), *_delay_faults(topics)]
     except ValidationError as error:
         faults += [_fault(detail) for detail in error.errors(include_url=False)]
     if joints is not None:
@@ -152,7 +155,9 @@ def _model_at(place: list[str]) -> type[BaseModel]:
     """What the key at `place` stands in."""
     if place[0] == "sensors" and len(place) > 1:
         return Sensor
-    return Qos if "qos" in place[:-1] else Topic if len(place) > 1 else Topics
+    if "qos" in place[:-1]:
+        return Qos
+    return {"inputs": InputTopic}.get(place[0], Topic) if len(place) > 1 else Topics
 
 
 def _name_faults(topics: Topics) -> Iterator[Fault]:
@@ -168,3 +173,10 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
                 yield Fault(f"{place}.qos", topic.qos.model_dump(), bound, "Give both the same.")
         elif first != place:
             yield Fault(f"{place}.name", topic.name, f"{first} has this name too", "Give each its own name.")
+
+
+def _delay_faults(topics: Topics) -> Iterator[Fault]:
+    """A delay of the strokes, whose stamps are those of all outputs."""
+    if delay := topics.inputs[Stream.STROKES].delay:
+        bound = "every output has the stamp of a stroke sample, so the other streams' delays count against it"
+        yield Fault("inputs.cylinder_strokes.delay", delay, bound, f"Give the others {-delay:g} instead.")

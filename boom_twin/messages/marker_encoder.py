@@ -10,7 +10,7 @@ import numpy as np
 
 from ..types import Array, Prediction
 from .cdr_encoder import NumberFields, Template, stamped
-from .message_fields import fill_xz
+from .message_fields import FRAME, fill_xz
 from .topic_table import TYPES, Output
 from .type_store import new_message
 
@@ -51,10 +51,12 @@ class ShapeMarkers:
         Factor of the displacements.
     force_scale : float
         Force that has the full colour, N.
+    frame : str
+        Of all markers.
     """
 
-    def __init__(self, exaggeration: float, force_scale: float) -> None:
-        self._factor, self._scale = exaggeration, force_scale
+    def __init__(self, exaggeration: float, force_scale: float, frame: str = FRAME) -> None:
+        self._factor, self._scale, self._frame = exaggeration, force_scale, frame
         self._template: Template | None = None
         self._past: deque[tuple[int, bytes]] = deque()
 
@@ -117,7 +119,7 @@ class ShapeMarkers:
 
     def _marker(self, namespace: str, number: int, kind: int, colour: tuple[float, ...]) -> Any:
         marker = new_message("visualization_msgs/msg/Marker")
-        stamped(marker.header)
+        stamped(marker.header, self._frame)
         marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, ADD
         marker.pose.orientation.w, marker.lifetime.sec = 1.0, LIFETIME
         marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour

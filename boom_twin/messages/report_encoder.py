@@ -14,14 +14,14 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
-from ..scene.kinematics import PassiveJoints
+from ..scene.kinematics import PassiveJoints, TipJoints
 from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
 from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, Residuals, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
-from .message_fields import fill_header, fill_xz
+from .message_fields import FRAME, fill_header, fill_xz
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message
@@ -30,10 +30,10 @@ OK, WARN, ERROR = range(3)
 """Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""
 
 
-def encode_health(health: Health) -> bytes:
+def encode_health(health: Health, frame: str = FRAME) -> bytes:
     """A diagnostic_msgs/DiagnosticArray in CDR, with the stamp of `health`; see ``topics.yaml`` for its values."""
     msg = new_message(TYPES[Output.HEALTH])
-    fill_header(msg.header, health.stamp)
+    fill_header(msg.header, health.stamp, frame)
     msg.status = [_status(alarm) for alarm in health.alarms]
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
 
@@ -63,11 +63,11 @@ def _status(alarm: Alarm) -> Any:
 FROM_REST = "from_rest"
 
 
-def encode_changes(change: Change) -> bytes:
+def encode_changes(change: Change, frame: str = FRAME) -> bytes:
     """The message of a change, in CDR."""
     values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
     msg = new_message(TYPES[Output.CHANGES])
-    fill_header(msg.header, change.stamp)
+    fill_header(msg.header, change.stamp, frame)
     msg.name, msg.position = list(values), np.array(list(values.values()), dtype=float)
     return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
 
@@ -190,20 +190,23 @@ class ReportEncoder:
         What the reports are about.
     settings : Settings
         How ``shape`` is drawn.
+    frame : str
+        In all headers: that of the base.
     """
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        count = len(scene.joints)
+    def __init__(self, scene: Scene, settings: Settings, frame: str = FRAME) -> None:
+        count, self._frame = len(scene.joints), frame
+        self._tip = TipJoints(scene)
         self._passive = PassiveJoints(scene)
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
         self._predicted = [(row.output, self._template(row.output, row.put), row.numbers) for row in PREDICTED]
         self._estimated = [(row.output, self._template(row.output, row.put), row.numbers) for row in ESTIMATED]
         self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _put_vector)
-        self._joints = self._joint_states(names, count, 0)
-        self._all_joints = self._joint_states([*names, *self._passive.names], count, len(self._passive.names))
+        self._joints = self._joint_states([*names, *TipJoints.NAMES], count)
+        self._all_joints = self._joint_states([*names, *TipJoints.NAMES, *self._passive.names], count)
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
-        self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale)
+        self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
         for output in Output:  # their encoders are compiled here, not when the first message waits
             jazzy().get_msgdef(TYPES[output])
 
@@ -224,7 +227,7 @@ class ReportEncoder:
             messages += [(output, template.fill(e.stamp, numbers(e))) for output, template, numbers in self._estimated]
         messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         if report.change is not None:
-            messages.append((Output.CHANGES, encode_changes(report.change)))
+            messages.append((Output.CHANGES, encode_changes(report.change, self._frame)))
         if report.health is not None:
             messages += self._fill_health(report.health)
         if p is not None and p.shape is not None:
@@ -255,29 +258,35 @@ class ReportEncoder:
 
     def _template(self, key: Output, put: Callable[[Any, NumberFields], None]) -> Template:
         msg, fields = new_message(TYPES[key]), NumberFields()
-        stamped(msg.header)
+        stamped(msg.header, self._frame)
         put(msg, fields)
         return Template(TYPES[key], msg, fields)
 
-    def _joint_states(self, names: list[str], count: int, passive: int) -> Template:
-        """Joints first, cylinders after them, passive joints last; only cylinders have an effort."""
+    def _joint_states(self, names: list[str], count: int) -> Template:
+        """Joints first, cylinders after them, those of the tip and passive ones last; only cylinders have an effort."""
+        others = len(names) - 2 * count
 
         def put(msg: Any, fields: NumberFields) -> None:
-            own, efforts, others = (fields.row(number) for number in (2 * count, count, passive))
-            msg.name, msg.position = names, np.array(own + others)
-            msg.effort = np.array([nan] * count + efforts + [nan] * passive)
+            own, efforts, more = (fields.row(number) for number in (2 * count, count, others))
+            msg.name, msg.position = names, np.array(own + more)
+            msg.effort = np.array([nan] * count + efforts + [nan] * others)
 
         return self._template(Output.JOINT_STATES, put)
 
     def _fill_joint_states(self, p: Prediction) -> bytes:
         """With the passive joints where there is a shape."""
         if p.shape is None:
-            return self._joints.fill(p.stamp, _joint_numbers(p))
-        return self._all_joints.fill(p.stamp, [*_joint_numbers(p), *self._passive.positions(p.joints)])
+            return self._joints.fill(p.stamp, self._joint_numbers(p))
+        return self._all_joints.fill(p.stamp, [*self._joint_numbers(p), *self._passive.positions(p.joints)])
+
+    def _joint_numbers(self, p: Prediction | PredictionBlock) -> Array:
+        """What ``joint_states`` tells of joints, cylinders and the tip; of a block a column for every prediction."""
+        tip = self._tip.positions(p.joints, p.tip_position, p.tip_angle)
+        return np.concatenate([p.joints.T, p.strokes.T, p.cylinder_forces.T, tip])
 
     def _joint_states_rows(self, p: PredictionBlock) -> Iterator[tuple[Integers, Bytes]]:
         """Of all predictions, by rows of the block; those with a shape apart."""
-        numbers, has_shape = _joint_numbers(p), np.zeros(len(p.at), bool)
+        numbers, has_shape = self._joint_numbers(p), np.zeros(len(p.at), bool)
         has_shape[list(p.outlines)] = True
         bare, shaped = np.flatnonzero(~has_shape), np.flatnonzero(has_shape)
         yield bare, self._joints.fill_rows(p.stamps[bare], numbers[:, bare])
@@ -308,12 +317,7 @@ class ReportEncoder:
 
     def _fill_health(self, health: Health) -> Messages:
         uncertainty = self._uncertainty.fill(health.stamp, health.tip_sigmas)
-        return [(Output.HEALTH, encode_health(health)), (Output.TIP_UNCERTAINTY, uncertainty)]
-
-
-def _joint_numbers(p: Prediction | PredictionBlock) -> Array:
-    """What ``joint_states`` tells of joints and cylinders; of a block a column for every prediction."""
-    return np.concatenate([p.joints.T, p.strokes.T, p.cylinder_forces.T])
+        return [(Output.HEALTH, encode_health(health, self._frame)), (Output.TIP_UNCERTAINTY, uncertainty)]
 
 
 def _residual_numbers(values: Array, sigmas: Array) -> Array:

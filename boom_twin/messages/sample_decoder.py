@@ -100,6 +100,8 @@ class SampleDecoder:
             Before 1970, or more seconds than a message can hold; no sample.
     other_boom_names : dict of Stream to list of str
         The names that the newest of these messages had, of another boom.
+    delays : dict of Stream to int
+        By how much stamps of messages are later than those of their samples, ns.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -107,6 +109,7 @@ class SampleDecoder:
         self._channels = {stream: _Channels(topics, stream, joints) for stream in Stream}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
+        self.delays = {stream: topics.delay(stream) for stream in Stream}
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
         self.other_boom_names: dict[Stream, list[str]] = {}
@@ -132,7 +135,8 @@ class SampleDecoder:
         Sample or None
             None when no value of it can be used.
         """
-        if not 0 < stamp_ns < LATEST:
+        taken = stamp_ns - self.delays[stream]
+        if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
         raw = self._force(msg, stream) if stream in self._by_axis else self._by_name(msg, stream)
@@ -143,7 +147,7 @@ class SampleDecoder:
         if all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        return Sample(stream, stamp_ns, np.array(values, dtype=np.float64))
+        return Sample(stream, taken, np.array(values, dtype=np.float64))
 
     def places(self, stream: Stream, msg: Any) -> tuple[list[int] | None, list[str]]:
         """Where the channels of a stream stand among the readings of a message, and what is odd about that.

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import NUMBER, SENSORS, Mount, Stream, channels_of, sensor_kind
+from ..types import NUMBER, SECOND, SENSORS, Mount, Stream, channels_of, sensor_kind
 
 AXES = ("x", "y", "z")
 
@@ -156,16 +156,26 @@ class Topic(_Entry):
         return self.name if self.name.startswith("/") else f"/{self.name}"
 
 
+class InputTopic(Topic):
+    """One topic of readings; ``delay``: by how much its stamps are later than the readings, s."""
+
+    delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
+
+
 class EventTopic(Topic):
     """Where an operator's marks go."""
 
     type: Literal["rcl_interfaces/msg/Log"]
 
 
-class Topics(_Entry):
-    """All topics by role, and the sensors that are not as usual by channel; `boom_twin.messages.mapping` reads them."""
+OneTopic = TypeVar("OneTopic", bound=Topic)
 
-    inputs: dict[Stream, Topic]
+
+class Topics(_Entry):
+    """All topics by role, frame of the outputs, sensors that are not as usual; `boom_twin.messages.mapping` reads them."""
+
+    frame: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_/.-]*$", max_length=200)]
+    inputs: dict[Stream, InputTopic]
     outputs: dict[Output, Topic]
     events: EventTopic
     sensors: dict[str, Sensor] = {}
@@ -182,6 +192,24 @@ class Topics(_Entry):
         for stream in Stream:
             found.setdefault(self.inputs[stream].name, []).append(stream)
         return found
+
+    def renamed(self, name: Callable[[Topic], str]) -> Topics:
+        """These topics, each by the name that `name` gives of it."""
+
+        def new(topic: OneTopic) -> OneTopic:
+            return topic.model_copy(update={"name": name(topic)})
+
+        inputs, outputs = ({key: new(topic) for key, topic in each.items()} for each in (self.inputs, self.outputs))
+        return self.model_copy(update={"inputs": inputs, "outputs": outputs, "events": new(self.events)})
+
+    def in_namespace(self, namespace: str) -> Topics:
+        """These topics by the names that they have if the node is in `namespace` (``/`` is none)."""
+        space = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+        return self.renamed(lambda topic: topic.name if topic.name.startswith("/") else f"{space}{topic.absolute}")
+
+    def delay(self, stream: Stream) -> int:
+        """By how much the stamps of a stream are later than its readings, ns."""
+        return round(self.inputs[stream].delay * SECOND)
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """The sensors of a stream by channel, in the order of its samples."""

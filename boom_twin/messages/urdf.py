@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
-from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
+from ..scene.kinematics import CYLINDER, LEFT, RIGHT, TipJoints, linkage
 from ..scene.schema import Cylinder, Scene, section_depth
 from .message_fields import FRAME
 
 NAME = "boom"
-TIP = "tip"
+TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
 UP_IS_POSITIVE = "0 -1 0"
 """Axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns."""
 EYE = 0.1
@@ -29,7 +29,9 @@ boom in the x-z plane; metres and radians. Zero of every section: in line with t
 Links                  origin, and direction of x
   base_link            as in the scene, in the axes of the base
   section_i            inboard pivot, towards the outboard pivot
-  tip                  outboard pivot of the last section, as that section
+  tip                  outboard pivot of the deflected boom, as its last head; tip_rigid that of straight sections,
+                       tip_along and tip_across lie between
+  imu_link             the tip IMU, as tip
   cylinder_i_barrel    barrel pin, towards the rod pin
   cylinder_i_rod       rod pin, away from the barrel pin
   link_l_i, link_r_i   pin D, pin E, towards pin Q where the two links meet (joints B1, B2, B3)
@@ -37,13 +39,16 @@ Links                  origin, and direction of x
 Joints                 published in ~/joint_states
   joint_i              every message: predicted, root of section i against head of section i-1
   cylinder_i           every message: estimated stroke, 0 = closed
+  tip_dx, tip_dz       every message: from tip_rigid to the predicted tip, along and across the last section
+  tip_pitch            every message: the last head against its section's x
   cylinder_i_swivel    with every ~/shape (20 Hz): the barrel in section i-1 (i = 1: in the base)
   link_l_i_swivel      likewise: link L in section i-1
   link_r_i_swivel      likewise: link R in section i
 
 A URDF is a tree, so rod pins and pins Q are not joints here. The published positions of the swivels close these loops, for
-rigid sections; mimic joints could not, because they are linear. Sections are drawn undeformed: see ~/shape for how they
-bend. A scene tells no limits of effort and velocity; the zeros stand for that. No inertia: see `boom_twin check`.
+rigid sections; mimic joints could not, because they are linear. Sections are drawn straight, and only tip and imu_link are
+where the deflected boom has them: see ~/shape for how it bends. A scene tells no limits of effort and velocity; the zeros
+stand for that. No inertia: see `boom_twin check`.
 """
 
 
@@ -63,9 +68,7 @@ def urdf(scene: Scene) -> str:
         _cylinder(robot, scene, i)
         if scene.joints[i].kind != "A":
             _links(robot, scene, i)
-    SubElement(robot, "link", name=TIP)
-    last = len(scene.sections)
-    _joint(robot, "tip_fixed", "fixed", f"section_{last}", TIP, (scene.sections[-1].length, 0.0))
+    _tip(robot, scene)
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'
 
@@ -109,6 +112,19 @@ def _links(robot: Element, scene: Scene, i: int) -> None:
                 _bar(link, (start, 0.0), (row.along, row.left), BAR * length, "link")
     _joint(robot, LEFT.format(i + 1), "continuous", _carrier(i), left, (pivot[0] + row.dx, pivot[1] + row.dy))
     _joint(robot, RIGHT.format(i + 1), "continuous", f"section_{i + 1}", right, (row.ex, row.ey))
+
+
+def _tip(robot: Element, scene: Scene) -> None:
+    """From the end of the last section to the tip of the deflected boom, with its IMU."""
+    for name in (TIP_RIGID, TIP_ALONG, TIP_ACROSS, TIP, IMU):
+        SubElement(robot, "link", name=name)
+    _joint(robot, "tip_fixed", "fixed", f"section_{len(scene.sections)}", TIP_RIGID, (scene.sections[-1].length, 0.0))
+    reach = sum(section.length for section in scene.sections)
+    along, across, pitch = TipJoints.NAMES
+    _limit(_joint(robot, along, "prismatic", TIP_RIGID, TIP_ALONG, (0.0, 0.0), axis="1 0 0"), -reach, reach)
+    _limit(_joint(robot, across, "prismatic", TIP_ALONG, TIP_ACROSS, (0.0, 0.0), axis="0 0 1"), -reach, reach)
+    _joint(robot, pitch, "continuous", TIP_ACROSS, TIP, (0.0, 0.0))
+    _joint(robot, "imu_fixed", "fixed", TIP, IMU, (0.0, 0.0))
 
 
 def _carrier(i: int) -> str:

@@ -136,6 +136,7 @@ def replay(
     health: bool = True,
     baseline: str | Path | None = None,
     window: TimeWindow = WHOLE,
+    namespace: str = "",
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -164,6 +165,8 @@ def replay(
     window : TimeWindow, optional
         The part of the session that is replayed. The model starts at rest where that begins, whatever the boom did then; the
         times of the result count from there.
+    namespace : str
+        ROS namespace of the node in the session, where the mapping does not tell that.
 
     Returns
     -------
@@ -179,7 +182,8 @@ def replay(
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
-        return replay_into(building, bag, scene, settings, progress, mapping, changes, health, baseline, window)
+        options = progress, mapping, changes, health, baseline, window, namespace
+        return replay_into(building, bag, scene, settings, *options)
 
 
 def replay_into(
@@ -193,6 +197,7 @@ def replay_into(
     health: bool = True,
     baseline: str | Path | None = None,
     window: TimeWindow = WHOLE,
+    namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
@@ -202,7 +207,7 @@ def replay_into(
     session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
     taken = scene_for(session.path, scene)
     scene, joints = taken.scene, len(taken.scene.joints)
-    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints)
+    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
     topics, wanted = mapped.topics, _wanted(session, mapped.topics)
     refuse_other_names(session, topics, joints, taken.source)
     usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None

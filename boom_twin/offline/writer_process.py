@@ -40,7 +40,7 @@ class ReportWriter:
     notes : mapping of str to str
         Kept in the bag.
     topics : Topics
-        How its topics are named.
+        How its topics and the frame of its outputs are named.
     scene : Scene
         What the reports are about.
     settings : Settings
@@ -60,7 +60,7 @@ class ReportWriter:
         self._reports: list[Report] = []
         self._joints = len(scene.joints)
         self._pipe = Pipe(__name__, str(directory), inherited=[lock])
-        self._pipe.send((dict(notes), topics.outputs, scene, settings))
+        self._pipe.send((dict(notes), topics, scene, settings))
 
     def wait_ready(self) -> None:
         """Until the process can begin."""
@@ -100,8 +100,8 @@ def main(directory: Path) -> int:
     items = received(sys.stdin.buffer)
     try:
         notes, topics, scene, settings = next(items)
-        outputs: dict[str, Topic] = {key: topic for key, topic in topics.items() if key is not Output.DIAGNOSTICS}
-        encoder = ReportEncoder(scene, settings)
+        outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}
+        encoder = ReportEncoder(scene, settings, topics.frame)
         with SessionWriter(directory, outputs, notes) as writer:
             say_ready()
             for batch in items:

@@ -18,6 +18,7 @@ from ..monitor.data.feed import Feed
 from ..monitor.data.store import Store
 from ..scene.schema import Scene
 from ..types import SECOND, Stream
+from .bag.subscriptions import resolved_topics
 from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
@@ -47,8 +48,9 @@ class TopicFeed(Feed):
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
-        super().__init__("live", Store(CAPACITY), topics, scene)
         self._node = rclpy.create_node(NAME)
+        topics = resolved_topics(topics, self._node)
+        super().__init__("live", Store(CAPACITY), topics, scene)
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:
@@ -60,7 +62,7 @@ class TopicFeed(Feed):
                 self._heard.append((heard, topic.absolute))
         events = topics.events
         self._events = self._node.create_publisher(Log, events.absolute, qos_profile(events.qos))
-        self._asked = self._node.create_client(Trigger, f"/{NODE}/acknowledge")
+        self._asked = self._node.create_client(Trigger, f"{NODE}/acknowledge")
 
     def poll(self) -> None:
         """Take what has come."""

@@ -145,6 +145,34 @@ class PassiveJoints:
         return positions
 
 
+class TipJoints:
+    """Positions of the joints that lead from the tip of rigid sections to that of the deflected boom, of one scene."""
+
+    NAMES = ("tip_dx", "tip_dz", "tip_pitch")
+
+    def __init__(self, scene: Scene) -> None:
+        self._pivot, self._lengths = np.array(scene.base.pivot), np.array([section.length for section in scene.sections])
+
+    def positions(self, joints: Array, tip: Array, angle: Array | float) -> Array:
+        """What lies between, in the order of `NAMES`, shape (3, ..): along and across the last section, m; its turn, rad.
+
+        Parameters
+        ----------
+        joints : ndarray, shape (.., n)
+            Relative joint angles of the deflected boom, rad.
+        tip : ndarray, shape (.., 2)
+            Its tip, m.
+        angle : ndarray or float, shape (..)
+            Orientation of its last head, rad.
+        """
+        headings, pivots = rigid_chain(self._pivot, self._lengths, joints)
+        (x, y), heading = (tip - pivots[..., -1, :]).T, headings[..., -1].copy()
+        along, across = np.cos(heading), np.sin(heading)
+        found = np.array([along * x + across * y, along * y - across * x, angle - heading])
+        found[np.isnan(found)] = np.nan  # of two NaN, which one a sum has depends on how many are summed at once
+        return found
+
+
 def _plain(row: np.record) -> SimpleNamespace:
     """The fields of a record as Python numbers, which cost a tenth to read."""
     return SimpleNamespace(**{name: row[name].item() for name in LINKAGE.names or ()})
@@ -219,13 +247,13 @@ def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
 
 
 def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Array]:
-    """Headings (n,) in rad, and pivots and tip (n + 1, 2) in m, of rigid sections at relative joint `angles` (rad), shape (n,).
+    """Headings (.., n) in rad, and pivots and tip (.., n + 1, 2) in m, of rigid sections at relative joint `angles` (rad).
 
-    The first `pivot` (2,) in m; `lengths` (n,) of the sections, m.
+    `angles` have shape (.., n); the first `pivot` (2,) in m; `lengths` (n,) of the sections, m.
     """
-    headings = np.cumsum(angles)
-    steps = lengths[:, None] * np.stack([np.cos(headings), np.sin(headings)], axis=1)
-    return headings, pivot + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    headings = np.cumsum(angles, axis=-1)
+    steps = lengths[:, None] * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    return headings, pivot + np.concatenate([np.zeros_like(steps[..., :1, :]), np.cumsum(steps, axis=-2)], axis=-2)
 
 
 def skeleton(scene: Scene, angles: Array) -> Skeleton:

@@ -24,6 +24,7 @@ from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from .load_shedding import LoadShedding
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, STROKES, UNMATCHED, Limits, TwinState, new_output
 from .stroke_check import FAR
@@ -91,6 +92,8 @@ class BlockUpdate:
     judge : HealthMonitor or None
     counts : Counter
         Of events; ``deflected``, ``not followed`` and ``unmatched`` are counted here.
+    shedding : LoadShedding
+        Asked what is left out.
 
     Attributes
     ----------
@@ -107,7 +110,9 @@ class BlockUpdate:
         modes: DeviationModes,
         judge: HealthMonitor | None,
         counts: Counter[str],
+        shedding: LoadShedding,
     ) -> None:
+        self._shedding = shedding
         self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
         self._modes, self._judge, self._told_counts = modes, judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
@@ -191,8 +196,11 @@ class BlockUpdate:
             self._told_counts.update(events)
         if not clock[BEGINS_SLOT]:
             return
-        news.outlines[at] = self._boom.outline()
-        if self._judge is not None:
+        if not self._shedding.leaves_out_shape():
+            news.outlines[at] = self._boom.outline()
+        if self._judge is not None and self._shedding.leaves_out_health():
+            self._told = tuple(self._found.counts.tolist())
+        elif self._judge is not None:
             self._tell_health()
             off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
             health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)

@@ -26,6 +26,7 @@ from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
 from .expected_readings import Deviations
+from .load_shedding import LoadShedding
 from .run import Run
 from .sample_check import SHORTEST, SampleCheck
 from .stamp_check import (
@@ -68,6 +69,8 @@ class Twin:
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
+    shedding : LoadShedding
+        Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
     steps : StepChoice
@@ -90,6 +93,7 @@ class Twin:
         self._on_block, scene = on_block, as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
+        self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
         self._widths = [len(names) for names in self._channels.values()]
@@ -161,9 +165,8 @@ class Twin:
         self._modes = DeviationModes(scene, self.plan, self.settings, self.mounts)
         self.steps = choose_steps(scene, self.plan, self.settings)
         limits = limits_of(scene, self.plan, self.settings, self.steps, self.mounts)
-        self._compiled = BlockUpdate(
-            self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge, self.counts
-        )
+        parts = self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
 
     def _take_over(self, stamp: int) -> list[str]:

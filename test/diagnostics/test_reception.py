@@ -15,7 +15,7 @@ def received(*looks: Reception) -> Status:
     """The state after looks that are two seconds apart."""
     judge = ReceptionJudge()
     for second, each in enumerate(looks):
-        status = judge.status({"cylinder_strokes": each}, Evaluation(T, 2.0 * second, 0.0))
+        status = judge.status({"cylinder_strokes": each}, {}, Evaluation(T, 2.0 * second, 0.0))
     return status
 
 
@@ -70,3 +70,16 @@ def test_streams_that_share_a_topic_may_have_a_publisher_each() -> None:
 
     assert status(("/cylinders", "/encoders")).level == Level.OK
     assert status(("/cylinders", "/encoders", "/other")).level == Level.ERROR
+
+
+def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
+    judge, counts = ReceptionJudge(), ({"shapes": 0}, {"shapes": 7}, {"shapes": 7}, {"shapes": 7})
+    found = [judge.status({}, each, Evaluation(T, 10.0 * k, 0.0)) for k, each in enumerate(counts)]
+    assert [status.level for status in found] == [Level.OK, Level.WARN, Level.OK, Level.OK]
+    assert found[1].message == "too many messages for the time there is: 7 shapes left out, no prediction"
+    assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]
+
+
+def test_latency_is_told_beside_the_wait() -> None:
+    values = received(Reception(100, 0, 0, 0, 0.001, 0.004)).values
+    assert (values["cylinder_strokes wait_s"], values["cylinder_strokes latency_s"]) == (0.001, 0.004)

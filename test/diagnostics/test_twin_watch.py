@@ -97,6 +97,16 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
     assert levels.count(Level.WARN) >= 1
 
 
+def test_a_window_is_told_as_long_as_it_is(rig: Rig) -> None:
+    """Two seconds after the beginning nothing has lasted for ten."""
+    rig.scale = 5.0
+    told = [rig.second()["residual joint_3"] for _ in range(14)]
+    assert [status.values["window_s"] for status in told] == pytest.approx([*range(1, 11), 10, 10, 10, 10])
+    raised = next(status for status in told if status.level == Level.ERROR)
+    assert raised.message.endswith(f"for {raised.values['window_s']:.2g} s") and raised.values["window_s"] < 5.0
+    assert told[-1].message.endswith("for 10 s")
+
+
 def test_residuals_that_stop_are_stale(rig: Rig) -> None:
     after(rig, 2)
     for _ in range(12):

@@ -108,23 +108,24 @@ def test_angular_sign_fits_the_axes() -> None:
     np.testing.assert_allclose(lift, [0.0, 0.0, 0.7])
 
 
+TIP = ["tip_dx", "tip_dz", "tip_pitch"]
 SWIVELS = ["cylinder_1_swivel", *(f"{name}_{i}_swivel" for i in (2, 3) for name in ("cylinder", "link_l", "link_r"))]
 
 
 def test_joint_states(filled: dict[Output, Any]) -> None:
     msg = filled[Output.JOINT_STATES]
-    assert list(msg.name) == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3", *SWIVELS]
+    assert list(msg.name) == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3", *TIP, *SWIVELS]
     assert msg.position.tolist()[:6] == [1.0, -0.5, -0.25, 0.31, 0.22, 0.13]
-    assert np.all(np.abs(msg.position[6:]) <= np.pi)
+    assert np.all(np.abs(msg.position[9:]) <= np.pi)
     assert len(msg.velocity) == 0
-    np.testing.assert_array_equal(msg.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2, *[np.nan] * len(SWIVELS)])
+    np.testing.assert_array_equal(msg.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2, *[np.nan] * len([*TIP, *SWIVELS])])
 
 
 def test_passive_joints_come_with_a_shape_only() -> None:
     """Both lengths in turn, from one outlet."""
     own, bare = encoder(), replace(report(), prediction=replace(prediction(), shape=None))
     counts = [len(decoded(own.fill(each))[Output.JOINT_STATES].name) for each in (report(), bare, report())]
-    assert counts == [13, 6, 13]
+    assert counts == [16, 9, 16]
 
 
 def test_residuals_are_named(filled: dict[Output, Any]) -> None:

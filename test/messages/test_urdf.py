@@ -16,7 +16,7 @@ from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy
 from boom_twin.messages.urdf import urdf
-from boom_twin.scene.kinematics import PassiveJoints, skeleton, strokes_of_posture
+from boom_twin.scene.kinematics import PassiveJoints, skeleton, stroke_curve, strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 
@@ -102,7 +102,7 @@ def test_links_are_those_of_the_comment(boom: tuple[Scene, Element]) -> None:
     scene, robot = boom
     n = range(1, len(scene.sections) + 1)
     six_bars = [i for i in n if scene.joints[i - 1].kind != "A"]
-    expected = {"base_link", "tip", *(f"section_{i}" for i in n)}
+    expected = {"base_link", "tip_rigid", "tip_along", "tip_across", "tip", "imu_link", *(f"section_{i}" for i in n)}
     expected |= {f"cylinder_{i}_{part}" for i in n for part in ("barrel", "rod")}
     expected |= {f"link_{side}_{i}" for i in six_bars for side in "lr"}
     assert {link.attrib["name"] for link in robot.findall("link")} == expected
@@ -110,7 +110,7 @@ def test_links_are_those_of_the_comment(boom: tuple[Scene, Element]) -> None:
 
 def test_every_revolute_joint_turns_about_minus_y(boom: tuple[Scene, Element]) -> None:
     axes = {(joint.attrib["type"], joint.find("axis").attrib["xyz"]) for joint in boom[1].findall("joint[axis]")}
-    assert axes == {("revolute", "0 -1 0"), ("continuous", "0 -1 0"), ("prismatic", "1 0 0")}
+    assert axes == {("revolute", "0 -1 0"), ("continuous", "0 -1 0"), ("prismatic", "1 0 0"), ("prismatic", "0 0 1")}
 
 
 def test_limits_are_those_of_the_scene(boom: tuple[Scene, Element]) -> None:
@@ -197,8 +197,30 @@ def test_joint_states_drive_every_joint() -> None:
     for i in (2, 3, 4):  # the rod of a deflected boom misses its pin by what the oil and the section give way
         place = poses[f"link_l_{i}"] @ [scene.joints[i - 1].lL, 0.0, 0.0, 1.0]
         np.testing.assert_allclose(place, poses[f"link_r_{i}"] @ [scene.joints[i - 1].lR, 0.0, 0.0, 1.0], atol=1e-9)
+    np.testing.assert_array_equal(poses["imu_link"], poses["tip"])
     rod = bones_of(scene, positions).joints[0].rod_pin
     assert np.hypot(*(poses["cylinder_1_rod"][[0, 2], 3] - rod)) < 5e-3
+
+
+@pytest.mark.parametrize("name", ["default", "one", "shuffled"])
+def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
+    """Position and pitch of the frame ``tip`` by the rules of URDF, while the boom moves; apart from that of straight ones."""
+    scene = booms()[name]
+    twin, encoder, robot = Twin(scene), ReportEncoder(scene, Settings()), ElementTree.fromstring(urdf(scene))
+    middle = np.radians([sum(joint.range_deg) / 2 for joint in scene.joints])
+    begin = np.array([stroke_curve(scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
+    apart = []
+    for k in range(40):
+        report = twin.update(Sample(Stream.STROKES, k * 5_000_000, begin + 1e-3 * np.sin(0.3 * k)))
+        predicted = report.prediction
+        assert predicted is not None
+        msg = jazzy().deserialize_cdr(dict(encoder.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
+        poses = frames(robot, dict(zip(msg.name, msg.position.tolist(), strict=True)))
+        at(poses["tip"], (0.0, 0.0), predicted.tip_position)
+        along = [np.cos(predicted.tip_angle), 0.0, np.sin(predicted.tip_angle)]
+        np.testing.assert_allclose(poses["tip"][:3, 0], along, atol=1e-9)
+        apart.append(np.linalg.norm(poses["tip"][:3, 3] - poses["tip_rigid"][:3, 3]))
+    assert max(apart) > 5e-4
 
 
 def bones_of(scene: Scene, positions: dict[str, float]) -> Any:

@@ -38,6 +38,23 @@ def test_it_agrees_with_setup_py() -> None:
     assert PACKAGE.findtext("export/build_type") == "ament_python"
 
 
+def test_it_tells_who_made_it_and_where_the_licence_is() -> None:
+    (author,), (url,), (licence,) = (PACKAGE.findall(name) for name in ("author", "url", "license"))
+    assert author.text and url.text and url.attrib["type"] == "website"
+    assert "Apache License" in (ROOT / licence.attrib["file"]).read_text(encoding="utf-8")
+    order = [each.tag for each in PACKAGE if each.tag not in ("exec_depend", "test_depend", "export")]
+    assert order == ["name", "version", "description", "maintainer", "license", "url", "author"]
+
+
+def test_the_declared_quality_is_that_of_the_version() -> None:
+    """REP-2004: a level above 3 is all that a version below 1.0 may claim."""
+    text = (ROOT / "QUALITY_DECLARATION.md").read_text(encoding="utf-8")
+    (level,) = re.findall(r"claims to be in the \*\*Quality Level (\d)\*\* category", text)
+    assert int(level) > 3 or int(str(PACKAGE.findtext("version")).split(".")[0]) >= 1
+    for path in re.findall(r"\]\((?!http)([^)#]+)", text):
+        assert (ROOT / path).exists(), path
+
+
 def test_everything_of_ros_that_is_used_is_named() -> None:
     launched = re.findall(r'package="(\w+)"', "".join(p.read_text() for p in (ROOT / "boom_twin/launch").glob("*.py")))
     used = {name.split("/")[0] for name in TYPES.values()} | {"std_msgs"} | set(launched) | imported("ros") | imported("launch")

@@ -46,6 +46,10 @@ class Process:
         fields = Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
+    @property
+    def is_running(self) -> bool:
+        return self._child.poll() is None
+
     def said(self) -> str:
         return self._log.read_text()
 

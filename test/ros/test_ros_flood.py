@@ -107,6 +107,8 @@ def test_a_flood(active: Any, bench: Any, remote: Any, send: Callable[..., None]
     assert worst.level >= b"\x01"
     values = {pair.key: pair.value for pair in worst.values}
     assert int(values["cylinder_strokes dropped"]) + int(values["cylinder_strokes lost"]) > 0, values
+    shed = [pair.value for status in told(bench, "reception") for pair in status.values if pair.key == "shapes left_out"]
+    assert sum(map(int, shed)) > 0  # and they are told
     bench.until(lambda: told(bench, "reception")[-1].level == b"\x00")
     began = time.monotonic()
     assert active.stop() == 0

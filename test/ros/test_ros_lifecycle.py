@@ -104,6 +104,8 @@ def test_a_bad_scene_ends_the_node_with_its_fault(spawn_node: Callable[..., Any]
         (["-p", "lag:=0.045"], "lag: the stroke filter adapts by itself: leave it out, or set stroke_agility"),
         (["-p", "gap:=1"], "1.0, not 1"),
         (["--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
+        (["-p", "strok_rate:=0.4"], "strok_rate: unknown. The nearest is `stroke_rate`"),
+        (["-p", "frame_prefix:=/front/"], "names of frames have no leading slash (tf2). Give 'front/'"),
     ],
 )
 def test_a_bad_argument_ends_the_node_with_its_name(spawn_node: Callable[..., Any], arguments: list[str], words: str) -> None:

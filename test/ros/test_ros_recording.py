@@ -111,7 +111,11 @@ def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
     assert len(list(recorded.glob("*.mcap"))) >= 3
     assert sheet["scene"] == default_text() + "# a copy\n"  # as the node told it
     assert "baseline" not in sheet  # the package's own
-    assert sheet["twin"] == {"scene": str(recorded.parent / "scene.yaml"), **Settings().model_dump()}
+    assert sheet["twin"] == {
+        "scene": str(recorded.parent / "scene.yaml"),
+        "frame_prefix": "",
+        **Settings().model_dump(),
+    }
 
 
 def test_the_reader_of_mcap_gives_the_same_bytes(recorded: Path) -> None:

@@ -57,12 +57,7 @@ def test_changes_are_validated_and_the_scene_stays() -> None:
 
 def test_texts_of_results_are_short_and_say_what_matters() -> None:
     rest = statics(None, "arch")
-    assert (
-        "\n" not in repr(rest)
-        and len(repr(rest)) < 300
-        and "frequencies 1.06" in repr(rest)
-        and str(rest) == repr(rest)
-    )
+    assert "\n" not in repr(rest) and len(repr(rest)) < 300 and "frequencies 1.06" in repr(rest) and str(rest) == repr(rest)
     table = rest._repr_html_()
     assert table.startswith("<table>") and "<th>tip</th><td>8.188, -0.4401 m</td>" in table
     assert repr(load_scene()).startswith("Scene(sections 4, 3.86, 3.3, 3.2, 3.1 m")

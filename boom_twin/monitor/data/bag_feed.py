@@ -90,6 +90,7 @@ def bag_feed(
     mapping: Path | None = None,
     baseline: Path | None = None,
     window: TimeWindow = WHOLE,
+    namespace: str = "",
 ) -> BagFeed:
     """Open a session.
 
@@ -107,6 +108,8 @@ def bag_feed(
         What is known of this rig while all is well; likewise.
     window : TimeWindow, optional
         The part that is shown; a twin starts at rest where it begins.
+    namespace : str
+        Likewise.
 
     Raises
     ------
@@ -117,7 +120,7 @@ def bag_feed(
     """
     session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
     scene = taken.scene
-    topics = mapping_of(path, mapping, len(scene.joints)).topics
+    topics = mapping_of(path, mapping, len(scene.joints), namespace).topics
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts

@@ -179,6 +179,11 @@ def resolved_topic(topic: Topic, node: Any) -> Topic:
     return topic.model_copy(update={"name": node.resolve_topic_name(topic.name.replace("~", NODE, 1))})
 
 
+def resolved_topics(topics: Topics, node: Any) -> Topics:
+    """Likewise of all of them."""
+    return topics.renamed(lambda topic: resolved_topic(topic, node).name)
+
+
 def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
     """Text of a mapping that says what `text` does, with all names of `topics` as `resolved` has them."""
     places: dict[tuple[str, ...], Topic] = {("inputs", stream.value): topic for stream, topic in topics.inputs.items()}
@@ -186,8 +191,13 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
     for place, topic in places.items():
         name = resolved_topic(topic, node).absolute
         if name != topic.absolute:
-            text = with_value(text if plain(text) else "{}", (*place, "name"), name)
+            text = with_mapped(text, (*place, "name"), name)
     return text
+
+
+def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
+    """Text of a mapping with another value at one place."""
+    return with_value(text if plain(text) else "{}", place, value)
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | None:

@@ -24,6 +24,7 @@ from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
+from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Report, Sample, Stream
 from ..log import Log
@@ -39,11 +40,14 @@ class DiagnosticsPublisher:
     node : Node
     topic : Topic
         Where they are published.
+    hardware_id : str
+        What is diagnosed; empty: the node's name.
     """
 
-    def __init__(self, node: Node, topic: Topic) -> None:
+    def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
         self._node, self._logger = node, Log(node)
         self._name = node.get_fully_qualified_name().lstrip("/")
+        self._hardware_id = hardware_id or self._name
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
 
@@ -75,6 +79,7 @@ class DiagnosticsPublisher:
             name=f"{self._name}: {status.name}",
             level=bytes([status.level]),
             message=_text(status.message),
+            hardware_id=self._hardware_id,
             values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
         )
 
@@ -162,12 +167,14 @@ class Diagnostics:
         self._node, self._logger, self._queue = node, Log(node), queue
         self._inputs = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS])
+        hardware_id = node.get_parameter("hardware_id").value
+        self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS], hardware_id)
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
+        self._shedding: LoadShedding | None = None
         self._scene, self._joints = "", 0
         self._other_boom_names: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
@@ -177,7 +184,7 @@ class Diagnostics:
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts)
         stress = stress_watch(twin.scene)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
-        self._counts = {"samples": twin.counts, "messages": decoder.oddities}
+        self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
         self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()
 
@@ -226,7 +233,9 @@ class Diagnostics:
         peers = self._peers
         others, received = self._other_booms(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others))
+        shed = self._shedding
+        left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
+        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others, left_out))
         self._tell_oddities()
         self._tell_clock(clock)
 

@@ -8,12 +8,14 @@ from collections.abc import Sequence
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from ...messages.topic_table import NODE, Topics
+from ...messages.topic_table import NODE, Topic, Topics
 from ...system.child_process import end_process, python_command
 from ..bag.recorder import TEXTS
 
 LOOK = 1.0
 """Seconds of steady time between looks at whether it still runs."""
+SERVICES = ("acknowledge", "get_parameters", *TEXTS)
+"""Of the node, that the page or the recorder that it starts asks."""
 END_TIMEOUT = 1.0
 """Seconds that it may take to end."""
 
@@ -35,13 +37,16 @@ class MonitorProcess:
 
     def __init__(self, node: Node, topics: Topics, mapping: str, scene: str) -> None:
         self._node = node
-        known = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
-        names = {topic.absolute: node.resolve_topic_name(topic.name) for topic in known}
-        names |= {f"/{NODE}/{name}": node.resolve_service_name(f"~/{name}") for name in ("get_parameters", *TEXTS)}
+        namespace = node.get_namespace()
+        there = topics.in_namespace(namespace)
+        pairs = zip(_all(there), _all(topics), strict=True)
+        names = {one.name: node.resolve_topic_name(other.name) for one, other in pairs}
+        own = f"{namespace.rstrip('/')}/{NODE}"
+        names |= {f"{own}/{name}": node.resolve_service_name(f"~/{name}") for name in SERVICES}
         arguments = ["--until-stdin-ends"]
         for option, path in (("--mapping", mapping), ("--scene", scene)):
             arguments += [option, path] if path else []
-        arguments.append("--ros-args")
+        arguments += ["--ros-args", "-r", f"__ns:={namespace}"]
         for name, resolved in names.items():
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
         self._process = _start(arguments)
@@ -57,6 +62,10 @@ class MonitorProcess:
         if code is not None:
             self._timer.cancel()
             self._node.get_logger().warning(f"the monitor ended with {code}; `boom_twin monitor` starts another one")
+
+
+def _all(topics: Topics) -> list[Topic]:
+    return [*topics.inputs.values(), *topics.outputs.values(), topics.events]
 
 
 def _start(arguments: Sequence[str]) -> subprocess.Popen[bytes]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -25,7 +26,7 @@ from ..log import Log
 from ..runtime import message_class, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
-from .parameters import baseline_of, baseline_text, current, declare, guard, path_of
+from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of
 from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
@@ -147,8 +148,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
+        import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
         self._twin, self._decoder = twin, SampleDecoder(joints, topics)
-        self._encoder = ReportEncoder(scene, settings)
+        self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
@@ -194,7 +196,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
-        self._diagnostics.seen(stream, stamp)
+        self._twin.shedding.filled(self.queue.share)
+        self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
         for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg)):
             self._diagnostics.took(*step)
             for each in step.report.all:

@@ -14,9 +14,10 @@ from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ...config.settings import RETIRED, Settings, Table, Thresholds, checked
+from ...config.settings import RETIRED, Settings, Table, Thresholds, checked, nearest
 from ...errors import UsageError
 from ...health.baseline import Baseline, load_baseline
+from ...messages.topic_table import Topics
 from ..runtime import one_line
 
 SOURCE = "parameters of the node"
@@ -46,6 +47,8 @@ TABLE = (
     ParameterRow("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     ParameterRow("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
     ParameterRow("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
+    ParameterRow("frame_prefix", "", "put before the frame of all outputs, as robot_state_publisher does: front/", FIXED),
+    ParameterRow("hardware_id", "", "of the boom, in every status of /diagnostics; empty: the node's name", AT_START),
     ParameterRow("autostart", True, "the node configures and activates itself", AT_START),
     ParameterRow("monitor", False, "the live page runs beside the node, in a process of its own", FIXED),
     *(_row(name, field, name in Settings.live_names()) for name, field in Settings.model_fields.items()),
@@ -59,7 +62,7 @@ def declare(node: Node) -> None:
     Raises
     ------
     UsageError
-        A value given at start has the wrong type or is out of range, or is of a parameter that there is no more.
+        A value given at start has the wrong type or is out of range, or is of a parameter that there is not, or no more.
     """
     for name, remedy in RETIRED.items():
         if node.declare_parameter(name, descriptor=ParameterDescriptor(dynamic_typing=True)).value is not None:
@@ -72,6 +75,14 @@ def declare(node: Node) -> None:
         raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
     except ParameterException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
+    if unknown := sorted(name for name in node._parameter_overrides if not _is_known(node, name)):
+        told = "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
+        raise UsageError(f"{SOURCE}: {told}. See msg_config/twin.yaml.")
+
+
+def _is_known(node: Node, name: str) -> bool:
+    """Whether the parameter was declared, here or by rclpy; QoS overrides are declared with their topics."""
+    return node.has_parameter(name) or name.startswith("qos_overrides.")
 
 
 def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[str, float]], None]) -> None:
@@ -103,6 +114,15 @@ def path_of(node: Node, name: str) -> Path | None:
     """The path in the parameter ``scene``, ``mapping`` or ``baseline``; None = the package's own."""
     text: str = node.get_parameter(name).value
     return Path(text) if text else None
+
+
+def frame_of(node: Node, topics: Topics) -> str:
+    """The frame of all outputs; UsageError if there can be no such frame."""
+    prefix: str = node.get_parameter("frame_prefix").value
+    if prefix.startswith("/"):
+        told = "names of frames have no leading slash (tf2)"
+        raise UsageError(f"{SOURCE}: frame_prefix = {prefix!r}: {told}. Give {prefix.lstrip('/')!r}.")
+    return prefix + topics.frame
 
 
 def baseline_of(node: Node) -> Baseline | None:

@@ -30,7 +30,8 @@ class _Topic:
         self.waiting: deque[tuple[int, int, bytes]] = deque()
         self.depth, self.read = depth, read
         self.received = self.lost = self.dropped = 0
-        self.wait, self.number, self._missed, self._is_numbered = nan, -1, 0, True
+        self.wait = self.latency = nan
+        self.number, self._missed, self._is_numbered = -1, 0, True
 
     def count(self, number: int | None) -> None:
         """Go on with a message of this number; a number that is not above the last one is another publisher's."""
@@ -46,8 +47,9 @@ class _Topic:
     def look(self) -> Reception:
         """What is known; begins a new span of time."""
         self.lost += self._missed if self._is_numbered else 0
-        found = Reception(self.received, self.lost, self.dropped, len(self.waiting), self.wait, self._is_numbered)
-        self._missed, self._is_numbered, self.wait = 0, True, nan
+        counts = self.received, self.lost, self.dropped, len(self.waiting)
+        found = Reception(*counts, self.wait, self.latency, self._is_numbered)
+        self._missed, self._is_numbered, self.wait, self.latency = 0, True, nan, nan
         return found
 
 
@@ -65,6 +67,8 @@ class ReceiveQueue:
     ----------
     received : int
         Messages of all topics that were put.
+    share : float
+        Messages that wait behind the one that is being read, or was last, of its topic; as a share of what may.
     is_behind : bool
         Whether the newest message had waited for the executor, so that there may be more.
     """
@@ -72,7 +76,7 @@ class ReceiveQueue:
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
         self._clock = clock
         self._topics: dict[str, _Topic] = {}
-        self.received, self.is_behind = 0, False
+        self.received, self.is_behind, self.share = 0, False, 0.0
 
     def __bool__(self) -> bool:
         """Whether a message waits."""
@@ -120,12 +124,18 @@ class ReceiveQueue:
         end = time.monotonic() + budget
         while (topic := self._next()) is not None:
             _, arrival, data = topic.waiting.popleft()
-            wait = max(0, self._clock() - arrival) * NANO
+            self.share, wait = len(topic.waiting) / topic.depth, self._since(arrival)
             if not wait <= topic.wait:
                 topic.wait = wait
             topic.read(data)
+            latency = self._since(arrival)
+            if not latency <= topic.latency:
+                topic.latency = latency
             if time.monotonic() >= end:
                 return
+
+    def _since(self, arrival: int) -> float:
+        return max(0, self._clock() - arrival) * NANO
 
     def catch_up(self) -> None:
         """Read what arrived before a request that is about to be answered, so far as there is time for it."""

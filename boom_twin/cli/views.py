@@ -1,0 +1,32 @@
+"""`boom_twin views`: what RViz, Foxglove and PlotJuggler show, for a boom in a namespace."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from ..errors import BoomTwinError
+from .main import add_namespace
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Where to, and of which boom."""
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="folder for the three files; none is written over"
+    )
+    add_namespace(parser, "ROS namespace of the twin")
+    parser.add_argument("--frame-prefix", metavar="TEXT", default="", help="as the node's parameter frame_prefix: front/")
+
+
+def run(args: Namespace) -> int:
+    """Write the files and print their paths."""
+    from ..messages.view_files import VIEWS, view_text
+
+    args.out.mkdir(parents=True, exist_ok=True)
+    if there := [args.out / view.name for view in VIEWS if (args.out / view.name).exists()]:
+        raise BoomTwinError(f"{', '.join(map(str, there))}: there already. Move it away, or choose another folder.")
+    for view in VIEWS:
+        path = args.out / view.name
+        path.write_text(view_text(view.read_text(encoding="utf-8"), args.namespace, args.frame_prefix), encoding="utf-8")
+        print(path)
+    return 0

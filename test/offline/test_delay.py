@@ -1,0 +1,69 @@
+"""A stream whose stamps lag by a constant: the mapping tells by how much, and a replay is that of stamps that are right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay
+from boom_twin.bag.reader import read, read_both, scan
+from boom_twin.bag.session_sheet import SessionSheet
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.messages.mapping import mapping_from
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import TYPES, load_topics
+from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.types import NANO, SECOND, Stream
+
+SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
+FIRST = 1500
+DELAYS = {Stream.ANGLES: 0.02, Stream.IMU: -0.0075, Stream.FORCES: 0.004}
+MAPPING = "inputs:\n" + "".join(f"  {stream.value}: {{delay: {delay}}}\n" for stream, delay in DELAYS.items())
+
+
+def written(path: Path, delays: dict[Stream, float]) -> Path:
+    """The first messages of every topic of the bundled session, their stamps later by `delays`; log times as they were."""
+    inputs = load_topics().inputs
+    streams = {topic.absolute: stream for stream, topic in inputs.items()}
+    with SessionWriter(path, {stream.value: topic for stream, topic in inputs.items()}, {"origin": "synthetic, a test"}) as bag:
+        count = dict.fromkeys(Stream, 0)
+        for name, log, _, msg in read_both(scan(SESSION), {name: TYPES[stream] for name, stream in streams.items()}):
+            stream = streams[name]
+            count[stream] += 1
+            if count[stream] <= FIRST:
+                fill_header(msg.header, stamp_of(msg) + round(delays.get(stream, 0.0) * SECOND))
+                bag.write_encoded(stream.value, log, bytes(jazzy().serialize_cdr(msg, TYPES[stream])))
+    return path
+
+
+def test_a_delay_that_is_mapped_leaves_no_trace(tmp_path: Path) -> None:
+    """Outputs are those of the session with right stamps, bit for bit; without the mapping they are not."""
+    scene, right, late = load_scene(), written(tmp_path / "right", {}), written(tmp_path / "late", DELAYS)
+    digests = [replay(bag, scene, tmp_path / f"{bag.name}_out").summary["output_sha256"] for bag in (right, late)]
+    assert digests[0] != digests[1]
+    SessionSheet("test", "", "", MAPPING, {}).write(late)
+    found = replay(late, scene, tmp_path / "mapped_out").summary
+    assert found["mapping"].endswith("session.yaml, mapping")
+    assert found["output_sha256"] == digests[0]
+
+
+@pytest.mark.parametrize("delay", [0.5, -0.5])
+def test_stamps_at_the_edge_of_time_stay_refused(delay: float) -> None:
+    decoder = SampleDecoder(2, mapping_from({"inputs": {"joint_angles": {"delay": delay}}}, "test"))
+    msg = new_message(TYPES[Stream.ANGLES])
+    msg.name, msg.position = ["joint_1", "joint_2"], np.array([0.1, 0.2])
+    assert decoder.put(Stream.ANGLES, 0, msg) is None
+    sample = decoder.put(Stream.ANGLES, 10**9, msg)
+    assert sample is not None and sample.stamp * NANO == pytest.approx(1.0 - delay)
+    assert (decoder.put(Stream.ANGLES, 10**8, msg) is None) == (delay > 0.0)
+    assert decoder.put(Stream.STROKES, 10**8, msg) is None  # other names: nothing of the strokes is shifted
+    assert decoder.delays[Stream.STROKES] == 0 and decoder.oddities["no stamp"] == 1
+
+
+def test_the_bundled_session_has_all_three() -> None:
+    """Else the test above would compare nothing."""
+    names = {load_topics().inputs[stream].absolute: TYPES[stream] for stream in DELAYS}
+    assert {name for name, _, _ in read(scan(SESSION), names)} == set(names)
