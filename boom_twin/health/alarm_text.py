@@ -9,11 +9,13 @@ import numpy as np
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Ranked
 from .inference.fault_catalogue import Form, Parameter, physical
-from .inference.hypotheses import UNKNOWN, Cause, Explanation, Verdict
+from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
-NAMED, KEPT = 0.9, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
+NAMED = 0.9  # probability of a cause beside the others that is taken for certain
+FITS, NAMED_AFTER = 2.5, 2.0  # squares over those of noise that a cause may leave, and time (s) it takes, to be told by name
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
+DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
@@ -36,56 +38,53 @@ class AlarmText:
         self._advised: tuple[str, str] | None = None
         self._advice = ""
 
-    def alarm(self, alarm: Alarm, verdict: Verdict, signature: Signature | None) -> Alarm:
-        """The alarm with its present explanation."""
+    def alarm(self, alarm: Alarm, verdict: Verdict, span: float, signature: Signature | None) -> Alarm:
+        """The alarm with its present explanation, of evidence that has taken `span` s; a name stays until there is another."""
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
-        certain = self._certain(alarm, verdict)
-        if certain is not None:
-            rank = next(rank for rank in ranks if rank.cause == certain)
-            told = self._sentence(rank)
-            return replace(alarm, kind=rank.parts[0][0], cause=certain, told=told, ranked=ranks)
-        if verdict.best.place is None:
-            told = f"{alarm.channel} deviates as no single fault that is known would make it"
+        fits, best = verdict.excess <= FITS, verdict.causes[0]
+        if fits and span >= NAMED_AFTER and best.probability >= NAMED:
+            told = self._sentence(ranks[0], verdict.best)
+            return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
+        if alarm.cause is not None:
+            return alarm
+        if not fits and span >= NAMED_AFTER:
+            told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
-    @staticmethod
-    def _certain(alarm: Alarm, verdict: Verdict) -> str | None:
-        """The cause that is named: one that is probable enough; one that was is kept while it is still quite probable."""
-        best = verdict.causes[0]
-        if best.name != UNKNOWN and best.probability >= NAMED:
-            return best.name
-        share = {cause.name: cause.probability for cause in verdict.causes}
-        return alarm.cause if alarm.cause is not None and share[alarm.cause] >= KEPT else None
-
     def _ranked(self, cause: Cause, excess: float) -> Ranked:
         parts = tuple(
-            (self._known[part.place].kind, part.value, part.sigma * excess**0.5, self._known[part.place].unit)
-            for part in cause.parts
-            if part.place is not None
+            (self._kind(part), part.value, part.sigma * excess**0.5, self._known[part.place].unit)
+            for part in {part.place: part for part in reversed(cause.parts)}.values()
         )
         return Ranked(cause.name, cause.probability, parts)
 
-    def _sentence(self, rank: Ranked) -> str:
-        """Cause, amount and certainty."""
+    def _kind(self, part: Explanation) -> str:
+        """In a word what is the matter."""
+        each = self._known[part.place]
+        return "drift" if part.is_growing and each.form in DRIFTING else each.kind
+
+    def _sentence(self, rank: Ranked, best: Explanation) -> str:
+        """Cause, amount, trend and certainty."""
         kind, value, sigma, unit = rank.parts[0]
-        each = next(p for p in self._known if p.cause == rank.cause and p.kind == kind)
+        each = self._known[best.place]
         if each.form is Form.SCENE and not unit:
             now, own = physical(each, self._scene, value), physical(each, self._scene, 0.0)
             spread = abs(physical(each, self._scene, value + sigma) - now)
             amount = f"{now:.3g} +- {spread:.1g}, {100 * (now / own - 1):+.0f} % of the scene's"
         else:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
-        return f"{rank.cause} {kind}: {amount} (probability {rank.probability:.3f})"
+        trend = f", {best.rate:+.2g} {unit}/s" if best.is_growing and unit else ", growing" if best.is_growing else ""
+        return f"{rank.cause} {kind}: {amount}{trend} (probability {rank.probability:.3f})"
 
     def _advised_move(self, verdict: Verdict, signature: Signature | None) -> str:
         """The move that would best tell the two most probable causes apart; worked out once for every pair."""
         one, other = verdict.causes[0], verdict.causes[1]
         pair = (one.name, other.name)
-        if signature is None or UNKNOWN in pair:
+        if signature is None:
             return ""
         if pair != self._advised:
             self._advised, self._advice = pair, self._best_move(one.parts[0], other.parts[0], signature.strokes)

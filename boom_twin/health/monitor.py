@@ -68,9 +68,7 @@ class HealthMonitor:
             stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream in CHECKED
         }
-        ended = self.residuals.close(self._told)
-        if ended is not None:
-            self._ended.append(ended)
+        self._ended += self.residuals.close(self._told)
         self.residuals.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
@@ -114,8 +112,7 @@ class HealthMonitor:
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
             alarms += monitor.alarms
-        if self.residuals.alarm is not None:
-            alarms.append(self.residuals.alarm)
+        alarms += self.residuals.alarms
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas())
 
     def _judge(self, block: Block) -> list[Alarm]:
@@ -131,12 +128,11 @@ class HealthMonitor:
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
         if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
-            ended = self.residuals.close(start)
+            news += self.residuals.close(start)
             self.residuals.begin()
-            return news if ended is None else [*news, ended]
+            return news
         averaged = self._means(block, predictions, {stream: rows.left for stream, rows in readings.items()})
-        told = self.residuals.take(averaged, self._noise)
-        return news if told is None else [*news, told]
+        return news + self.residuals.take(averaged, self._noise)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
