@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Ranked
+from ..types import NANO, Alarm, Array, Ranked
 from .inference.fault_catalogue import Form, Parameter, physical
 from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
-NAMED = 0.9  # probability of a cause beside the others that is taken for certain
-FITS, NAMED_AFTER = 2.5, 2.0  # squares over those of noise that a cause may leave, and time (s) it takes, to be told by name
+NAMED, RENAMED = 0.9, 0.99  # probability of a cause beside the others that is taken for certain; of another than was named
+FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
+NAMED_AFTER, GROWING_AFTER = 2.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
 DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
@@ -37,23 +38,37 @@ class AlarmText:
         self._scene, self._known, self._signatures, self._errors = scene, known, signatures, errors
         self._advised: tuple[str, str] | None = None
         self._advice = ""
+        self._leading: tuple[str, int] = "", 0
 
-    def alarm(self, alarm: Alarm, verdict: Verdict, span: float, signature: Signature | None) -> Alarm:
-        """The alarm with its present explanation, of evidence that has taken `span` s; a name stays until there is another."""
+    def alarm(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, signature: Signature | None) -> Alarm:
+        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until there is another."""
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
-        fits, best = verdict.excess <= FITS, verdict.causes[0]
-        if fits and span >= NAMED_AFTER and best.probability >= NAMED:
+        best = verdict.causes[0]
+        if self._is_certain(alarm, verdict, span, stamp):
             told = self._sentence(ranks[0], verdict.best)
             return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
         if alarm.cause is not None:
             return alarm
-        if not fits and span >= NAMED_AFTER:
+        if verdict.excess > FITS and span >= NAMED_AFTER:
             told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
+
+    def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int) -> bool:
+        """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
+        best = verdict.causes[0]
+        is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
+        least = NAMED if alarm.cause in (None, best.name) and not is_growing else RENAMED
+        leads = best.probability >= least and verdict.excess <= FITS
+        if not leads or (is_growing and (span < GROWING_AFTER or verdict.level > 0)):
+            self._leading = "", stamp
+            return False
+        if self._leading[0] != best.name:
+            self._leading = best.name, stamp
+        return (stamp - self._leading[1]) * NANO >= NAMED_AFTER
 
     def _ranked(self, cause: Cause, excess: float) -> Ranked:
         parts = tuple(

@@ -16,7 +16,7 @@ from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..scene.summary import explain
-from ..types import NANO, Alarm, Array, Mount
+from ..types import NANO, SECOND, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
 from .detection import Detector
@@ -29,6 +29,8 @@ from .suspicion import CRUDE, DETUNING, LEVELS, Suspicion, carried_on
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
+LEAST_SPAN, SWINGS = 3.0, 8.0  # s that evidence has to take for an alarm; and while a load shakes the boom
+EXCITED_FOR = 15.0  # s for which that is so after the load last showed
 PERIOD = 3  # blocks between two looks at a suspicion
 SURE = 15.0  # ln of how much more probable a fault must be than none
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
@@ -98,7 +100,7 @@ class ResidualMonitor:
         self._suspicion: Suspicion | None = None
         self._alarm: Alarm | None = None
         self._carried: dict[str, float] = {}
-        self._blocks = 0
+        self._blocks, self._excited = 0, -SECOND * 60
         self._watch_anew()
 
     def _watch_anew(self) -> None:
@@ -178,6 +180,8 @@ class ResidualMonitor:
             self._suspicion = None
             return []
         verdict = suspicion.explain()
+        if verdict.level > 0:
+            self._excited = start
         news = self._judge(start, suspicion, verdict)
         if self._suspicion is suspicion and suspicion.is_outdated(verdict):
             self._carried = carried_on(verdict) if self._alarm is not None else {}
@@ -186,15 +190,22 @@ class ResidualMonitor:
 
     def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         """Open, change or end an alarm."""
+        if suspicion.span < self._least_span(start):
+            return []
         if self._alarm is None:
-            return self._open(start, suspicion, verdict) if verdict.strength >= SURE and self.levels.max() >= 1.0 else []
+            is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
+            return self._open(start, suspicion, verdict) if is_sure else []
         if verdict.strength < GONE:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
-        self._alarm = self._tell.alarm(self._alarm, verdict, suspicion.span, self.signature)
+        self._alarm = self._tell.alarm(self._alarm, verdict, suspicion.span, start, self.signature)
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
+
+    def _least_span(self, start: int) -> float:
+        """Time (s) that evidence has to take: long enough to tell a fault from a load, so some strokes of a pump."""
+        return SWINGS if (start - self._excited) * NANO < EXCITED_FOR else LEAST_SPAN
 
     def _open(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         if (known := self._change_of_known(suspicion, verdict)) is not None:
@@ -202,7 +213,7 @@ class ResidualMonitor:
         channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
-        self._alarm = self._tell.alarm(alarm, verdict, suspicion.span, self.signature)
+        self._alarm = self._tell.alarm(alarm, verdict, suspicion.span, start, self.signature)
         return [self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:

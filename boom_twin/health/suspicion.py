@@ -19,7 +19,7 @@ DETUNING = 0.15  # share by which a fault may change natural frequencies
 CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
-MISFIT = 2.5  # times the squares that noise leaves, in the recent blocks
+MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
@@ -89,8 +89,10 @@ class Suspicion:
 
     def is_outdated(self, verdict: Verdict) -> bool:
         """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
-        if self.blocks <= RECENT or self.blocks > LONGEST:
-            return self.blocks > LONGEST
+        if self.blocks <= RECENT:
+            return False
+        if self.blocks > LONGEST or verdict.excess > WHOLE_MISFIT:
+            return True
         recent = [sum(column, Evidence.none(2 * len(self.mean))) for column in zip(*self._recent, strict=True)]
         best = verdict.best if verdict.strength > 0.0 else None
         logs, squares = self._bank.fit(recent, self._coefficients(best), self.mean, self.covariance)

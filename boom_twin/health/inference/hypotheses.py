@@ -34,6 +34,7 @@ from .fault_catalogue import Parameter, variances
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 0.3, 10.0  # weight of that shape; time (s) in which a fault grows to its size
+CRUDE = 0.003  # see above
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,7 @@ class HypothesisTest:
         excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1))
         priors = np.concatenate([self._priors, self._priors + log(GROWING_PRIOR)])
         priors += np.tile([carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
-        weights = factors / excess + priors
+        weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
         shares = np.exp(weights - weights.max())
         shares = shares.sum(axis=0) / shares.sum()
         levels = np.argmax(factors, axis=0)

@@ -16,7 +16,7 @@ a given deviation, with a correlation exp(-travel / REACH) over the travel of th
 
 A third one is a force at the tip that the model does not know, by a pump or the wind: a Gauss-Markov process of a given level
 (N, standard deviation of each component) and correlation time `LOAD_TIME`, about a mean that is not known either, as a pump's
-thrust has one, of the same level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once. How large
+thrust has one, of `MEAN` times that level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once. How large
 the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured tells.
 
 A Kalman filter on all these turns the means of residuals in blocks into innovations: white and of unit variance while all is
@@ -44,7 +44,9 @@ LEAST_DAMPING = 2e-4  # of omega, so that every mode has a finite variance
 SHAPE = 0.5  # see above
 REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
-LOAD_TIME, MEAN_TIME = 1.0, 60.0  # s, correlation of the load about its mean, and of that
+LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
+ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
+MEAN = 2.0  # see above
 LOAD = 4  # states of the load: x and y about the mean, and the mean's
 
 
@@ -157,7 +159,8 @@ class InnovationFilter:
     def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float = 0.0) -> None:
         self._block, self._detuning2, self._channels, self._level2 = block, detuning**2, channels, level**2
         self._x, self._p = np.zeros((LOAD + channels, columns)), np.zeros((LOAD + channels, LOAD + channels))
-        self._p[:LOAD, :LOAD] = self._level2 * np.eye(LOAD)
+        self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
+        self._p[:LOAD, :LOAD] = np.diag(self._stationary)
         self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
         self._posture: ModalStates | None = None
@@ -177,6 +180,8 @@ class InnovationFilter:
         self._x, self._p, self._size = x, p, size
         self._least, self._driven = modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
+        at_once = self._level2 * (modes.lifted**2).sum(axis=1)
+        self._rough, self._pushed = ROUGH**2 * at_once, float(at_once[-2:].sum())
         self._turn = np.eye(size + LOAD)
         self._turn[:size, :size] = modes.turn
         self._turn[:size, size:] = np.hstack([modes.pushed, modes.pushed])
@@ -206,13 +211,14 @@ class InnovationFilter:
         Innovations
             Of the channels that were measured, and the probability of the residuals among them.
         """
+        shaking += self._pushed
         self._go_on(errors2, shaking, travel)
         rows = np.isfinite(table[:, 0])
         if not rows.any():
             return Innovations(table[:0], 0.0)
         shown = self._shown[rows]
         cross = self._p @ shown.T
-        own = (noise + np.diag(shaking * self._shaken))[np.ix_(rows, rows)]
+        own = (noise + np.diag(shaking * self._shaken + self._rough))[np.ix_(rows, rows)]
         root = np.linalg.cholesky(shown @ cross + own)
         white = np.linalg.solve(root, np.hstack([table[rows] - shown @ self._x, cross.T]))
         innovation, cross = white[:, : table.shape[1]], white[:, table.shape[1] :]
@@ -233,7 +239,7 @@ class InnovationFilter:
         self._p[at:] *= kept
         self._p[:, at:] *= kept
         self._p[:m, :m] += self._least + shaking * self._driven
-        self._p[m:at, m:at] += np.diag((1.0 - self._kept**2) * self._level2)
+        self._p[m:at, m:at] += np.diag((1.0 - self._kept**2) * self._stationary)
         self._p[at:, at:] += np.diag((1.0 - kept * kept) * errors2)
 
 
@@ -242,6 +248,6 @@ def _swung(modes: ModalStates, level2: float) -> Array:
     turn, pushed = modes.turn, modes.pushed
     still = np.linalg.solve(np.eye(len(turn)) - turn, pushed) if len(turn) else pushed
     omegas = 2.0 * math.pi * np.repeat(modes.frequencies, 2)
-    spread = 2.0 * level2 * (still**2).sum(axis=1)
+    spread = (1.0 + MEAN**2) * level2 * (still**2).sum(axis=1)
     spread[1::2] = spread[0::2] * omegas[0::2] ** 2
     return np.diag(spread)
