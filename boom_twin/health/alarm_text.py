@@ -12,9 +12,9 @@ from .inference.fault_catalogue import Form, Parameter, physical
 from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
-NAMED, RENAMED = 0.9, 0.99  # probability of a cause beside the others that is taken for certain; of another than was named
+NAMED, RENAMED = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of another than was named
 FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
-NAMED_AFTER, GROWING_AFTER = 2.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
+NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
 DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart

@@ -32,7 +32,7 @@ SKIPPED = 2  # blocks in which a fault may still be on its way
 LEAST_SPAN, SWINGS = 3.0, 8.0  # s that evidence has to take for an alarm; and while a load shakes the boom
 EXCITED_FOR = 15.0  # s for which that is so after the load last showed
 PERIOD = 3  # blocks between two looks at a suspicion
-SURE = 15.0  # ln of how much more probable a fault must be than none
+SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
@@ -190,7 +190,7 @@ class ResidualMonitor:
 
     def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         """Open, change or end an alarm."""
-        if suspicion.span < self._least_span(start):
+        if suspicion.span < (LEAST_SPAN if verdict.strength > OBVIOUS else self._least_span(start)):
             return []
         if self._alarm is None:
             is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..types import NANO, Array
-from .inference.block_problem import BLOCK, CALM, BlockProblem
+from .inference.block_problem import BLOCK, BlockProblem
 from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
 from .inference.innovation_filter import InnovationFilter
 
 LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
-DETUNING = 0.15  # share by which a fault may change natural frequencies
+DETUNING = 0.25  # share by which a fault may change natural frequencies
 CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
@@ -51,7 +51,7 @@ class Suspicion:
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
         channels, coefficients = len(errors2), 2 * len(mean)
         self._filters = [InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, float(each)) for each in levels]
-        self.size, self._beyond, self.blocks = np.zeros(channels), 0.0, 0
+        self.size, self.blocks = np.zeros(channels), 0
         self._evidence = [Evidence.none(coefficients) for _ in levels]
         self._recent: deque[list[Evidence]] = deque(maxlen=RECENT)
 
@@ -67,21 +67,14 @@ class Suspicion:
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
         noise, crude = problem.noise(self._noise2), self._errors2 + (CRUDE * self.size) ** 2
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
-        beyond, found = self._shaking(problem), []
-        for number, each in enumerate(self._filters):
+        found = []
+        for each in self._filters:
             each.tune(problem.modes)
-            shaking = problem.shaking + (0.0 if number else beyond)
-            innovations = each.step(table, noise, crude, shaking, problem.travel)
+            innovations = each.step(table, noise, crude, problem.shaking, problem.travel)
             found.append(Evidence.of(innovations.white, innovations.log))
         self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
         self._recent.append(found)
         self.blocks += 1
-
-    def _shaking(self, problem: BlockProblem) -> float:
-        """Mean square of the tip's acceleration that the IMU reads beyond what is predicted, lately."""
-        beyond = np.nansum((problem.table[-2:, 0] - self.size[-2:]) ** 2)
-        self._beyond = max(self._beyond * math.exp(-BLOCK * NANO / CALM), float(beyond))
-        return self._beyond
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""

@@ -118,7 +118,8 @@ def test_a_growing_fault_is_as_probable_as_densely(seed):
     prior = KNOWN[3].faulty ** 2 * np.diag([1.0, 1.0 / GROWN**2])
     spread = problem.spread + columns @ prior @ columns.T
     left = problem.signature @ problem.mean
-    assert found.log_factor == pytest.approx(log_density(problem.values, left, spread) - problem.log(), abs=1e-7)
+    wanted = log_density(problem.values, left, spread) - problem.log() + np.log(GROWING_PRIOR)
+    assert found.log_factor == pytest.approx(wanted, abs=1e-7)
     assert found.rate == pytest.approx(0.2, abs=5.0 * found.rate_sigma) and found.is_growing
     assert found.value == pytest.approx(0.5 + 0.2 * SPAN, abs=5.0 * found.sigma)
 
@@ -131,9 +132,9 @@ def test_probabilities(seed):
     assert [cause.probability for cause in verdict.causes] == sorted((c.probability for c in verdict.causes), reverse=True)
     scale = verdict.excess * (1.0 + CRUDE * verdict.strength * verdict.excess)
     weights = dict.fromkeys(range(4), 0.0)
-    for shape, prior in ((False, 1.0), (True, GROWING_PRIOR)):
-        for place, each in explained(verdict, shape).items():
-            weights[place] += np.exp(each.log_factor / scale) * KNOWN[place].prior * prior
+    for growing in (False, True):
+        for place, each in explained(verdict, growing).items():
+            weights[place] += np.exp(each.log_factor / scale) * KNOWN[place].prior
     sensor = next(cause for cause in verdict.causes if cause.name == "joint_1.sensor")
     assert {part.place for part in sensor.parts} == {1, 2}
     assert sensor.probability == pytest.approx((weights[1] + weights[2]) / sum(weights.values()))

@@ -81,7 +81,7 @@ def test_what_angles_read_of_modes(boom):
 
 @pytest.mark.parametrize("posture", ["arch", "horizontal"])
 def test_a_load_at_rest_bends_the_boom_as_its_weight_does(posture):
-    """What a lasting force at the tip does to the channels, by modes: what the same weight does in the boom's own equilibrium."""
+    """What a lasting force at the tip does to the channels, by modes: as the same weight in the boom's own equilibrium."""
     scene = load_scene()
     known = tuple(each for each in parameters(scene) if each.cause == "tip.payload")
     strokes = strokes_of_posture(scene, posture)

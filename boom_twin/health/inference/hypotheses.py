@@ -10,7 +10,8 @@ a fault whose coefficients c have the prior N(0, F) is more probable than none b
     ln B = l_c' (L_cc + F^-1)^-1 l_c / 2 - ln det(I + F L_cc) / 2.
 
 A fault has one of two shapes: it is as large all the time, or it grows steadily (two coefficients: what it was at the
-beginning, and its rate). A slow fault of any cause thus has an equal chance beside a drifting sensor.
+beginning, and its rate), the second being much less probable from the outset: slow gusts look like that, too. A slow fault of
+any cause thus has an equal chance beside a drifting sensor.
 
 How large the unknown load at the tip is belongs to every hypothesis, that of no fault too: the evidence comes from filters of
 several levels of it (see `innovation_filter`), and the probability of a fault is the sum over all levels. So a boom that
@@ -33,7 +34,7 @@ from ...types import Array
 from .fault_catalogue import Parameter, variances
 
 STEADY, GROWING = 0, 1
-GROWING_PRIOR, GROWN = 0.3, 10.0  # weight of that shape; time (s) in which a fault grows to its size
+GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
 CRUDE = 0.003  # see above
 
 
@@ -211,8 +212,7 @@ class HypothesisTest:
         squares = np.array([each.squares for each in healthy])[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
         excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1))
-        priors = np.concatenate([self._priors, self._priors + log(GROWING_PRIOR)])
-        priors += np.tile([carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
+        priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
         weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
         shares = np.exp(weights - weights.max())
         shares = shares.sum(axis=0) / shares.sum()
@@ -246,7 +246,7 @@ class HypothesisTest:
         explained = (vector * found).sum(axis=1)
         now = np.array([1.0, span])
         values, sigmas = found @ now, np.sqrt(np.einsum("i,pij,j->p", now, spread, now))
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas)
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + log(GROWING_PRIOR)
         return np.stack([factors, explained, values, sigmas, found[:, 1], np.sqrt(spread[:, 1, 1])])
 
     def _sided(self, values: Array, sigmas: Array) -> Array:

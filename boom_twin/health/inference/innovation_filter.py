@@ -16,8 +16,9 @@ a given deviation, with a correlation exp(-travel / REACH) over the travel of th
 
 A third one is a force at the tip that the model does not know, by a pump or the wind: a Gauss-Markov process of a given level
 (N, standard deviation of each component) and correlation time `LOAD_TIME`, about a mean that is not known either, as a pump's
-thrust has one, of `MEAN` times that level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once. How large
-the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured tells.
+thrust has one, of `MEAN` times that level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
+How large the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured
+tells.
 
 A Kalman filter on all these turns the means of residuals in blocks into innovations: white and of unit variance while all is
 well, but for what parameters add. Its gains do not depend on what is measured, so the same filter run over the signature of a

@@ -1,7 +1,7 @@
 """Sessions of the health benchmark as they lie on disk; needs no Exudyn.
 
-A file holds ``stamps``, ``angle_stamps`` (m,) ns, and ``strokes``, ``joints``, ``forces`` (m, n) and ``imu`` (m, 2) as read, NaN
-where a reading is missing. SI.
+A file holds ``stamps``, ``angle_stamps`` (m,) ns, and ``strokes``, ``joints``, ``forces`` (m, n) and ``imu`` (m, 2) as read,
+NaN where a reading is missing. SI.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python test/bench/health/table.py out/health/outcomes.jsonl [--each]
 
-A name is right if it is the cause of a fault that is, or was, there when it is told; any other name is wrong, and so is every alarm of a
-healthy session a false one. An `alarm` is one that was told of while the fault was there, named or not. Intervals are Wilson's,
-95 %; rates of false alarms those of a Poisson process.
+A name is right if it is the cause of a fault that has begun when it is told; any other name is wrong, and every alarm of a
+healthy session is a false one. `alarm`: one was told of after the fault's onset, named or not. Intervals are Wilson's, 95 %;
+rates of false alarms those of a Poisson process.
 """
 
 from __future__ import annotations
@@ -90,7 +90,8 @@ def healthy(rows: list[Row]) -> list[str]:
         wrong = sum(len(wrong_names(row)) for row in own)
         if own:
             low, high = (0.5 * chi2.ppf(0.025, 2 * alarms) if alarms else 0.0), 0.5 * chi2.ppf(0.975, 2 * alarms + 2)
-            lines.append(f"| {name} | {len(own)} | {hours:.2f} | {alarms} | {wrong} | {24 * low / hours:.0f}-{24 * high / hours:.0f} |")
+            rate = f"{24 * low / hours:.0f}-{24 * high / hours:.0f}"
+            lines.append(f"| {name} | {len(own)} | {hours:.2f} | {alarms} | {wrong} | {rate} |")
     return lines
 
 
@@ -108,7 +109,8 @@ def faulty(rows: list[Row], key: Callable[[Row], str]) -> list[str]:
         own = [row for row in rows if key(row) == group]
         alarm = sum(told_after(row) is not None for row in own)
         right, wrong = sum(named(row) for row in own), sum(bool(wrong_names(row)) for row in own)
-        lines.append(f"| {group} | {len(own)} | {share(alarm, len(own))} | {share(right, len(own))} | {share(wrong, len(own))} |")
+        shares = " | ".join(share(hits, len(own)) for hits in (alarm, right, wrong))
+        lines.append(f"| {group} | {len(own)} | {shares} |")
     return lines
 
 
@@ -135,12 +137,13 @@ def main() -> None:
     tables = [healthy(well), faulty(one, lambda row: "pump or wind" if row["loads"] else "quiet")]
     print("\n\n".join("\n".join(table) for table in [*tables, faulty(one, kind_of), summary(ill)]))
     for row in rows if args.each else []:
-        print(f"\n{row['number']} rig {row['rig']} {row['rate']:g} Hz x{row['noise']:g} {row['faults']} {row['loads']} {row['streams']}")
+        seen = f"rig {row['rig']} {row['rate']:g} Hz x{row['noise']:g} {row['streams']}"
+        print(f"\n{row['number']} {row['faults']} {row['loads']} {seen}")
         for told in row["told"]:
             cause = told["cause"] or "-"
             until = "" if told["until"] is None else f"..{told['until']:.1f}"
             ranks = " ".join(f"{name}:{p:.2f}" for name, p, _ in told["ranked"][:3])
-            print(f"  {told['at']:5.1f} {told['channel']} @{told['since']:.1f}{until} {told['kind']} {cause} [{ranks}] {told['told'][:90]}")
+            print(f"  {told['at']:5.1f} {told['channel']} @{told['since']:.1f}{until} {told['kind']} {cause} [{ranks}]")
 
 
 if __name__ == "__main__":
