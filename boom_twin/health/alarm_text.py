@@ -12,7 +12,8 @@ from .inference.fault_catalogue import Form, Parameter, physical
 from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
-NAMED, RENAMED = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of another than was named
+NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
+REFUTED = 1e-3  # probability of the cause that was named, below which another may be
 FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
 NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
@@ -40,12 +41,17 @@ class AlarmText:
         self._advice = ""
         self._leading: tuple[str, int] = "", 0
 
-    def alarm(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, signature: Signature | None) -> Alarm:
-        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until there is another."""
+    def alarm(
+        self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool, signature: Signature | None
+    ) -> Alarm:
+        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
+
+        `is_calm`: no load shakes the boom.
+        """
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
         best = verdict.causes[0]
-        if self._is_certain(alarm, verdict, span, stamp):
+        if self._is_certain(alarm, verdict, span, stamp, is_calm):
             told = self._sentence(ranks[0], verdict.best)
             return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
         if alarm.cause is not None:
@@ -53,27 +59,33 @@ class AlarmText:
         if verdict.excess > FITS and span >= NAMED_AFTER:
             told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
+        if len(ranks) == 1:
+            return replace(alarm, kind="residual", cause=None, told=f"{best.name} most likely, not yet certain", ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
-    def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int) -> bool:
+    def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
         best = verdict.causes[0]
         is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
-        least = NAMED if alarm.cause in (None, best.name) and not is_growing else RENAMED
-        leads = best.probability >= least and verdict.excess <= FITS
-        if not leads or (is_growing and (span < GROWING_AFTER or verdict.level > 0)):
+        leads = best.probability >= (GROWING if is_growing else NAMED) and verdict.excess <= FITS
+        shares = {cause.name: cause.probability for cause in verdict.causes}
+        is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
+        if not leads or is_held or (is_growing and (span < GROWING_AFTER or not is_calm)):
             self._leading = "", stamp
             return False
-        if self._leading[0] != best.name:
+        if not alarm.told or self._leading[0] != best.name:
             self._leading = best.name, stamp
         return (stamp - self._leading[1]) * NANO >= NAMED_AFTER
 
     def _ranked(self, cause: Cause, excess: float) -> Ranked:
+        """With each of its faults in the shape that is more probable."""
+        shapes: dict[int, Explanation] = {}
+        for part in cause.parts:
+            shapes.setdefault(part.place, part)
         parts = tuple(
-            (self._kind(part), part.value, part.sigma * excess**0.5, self._known[part.place].unit)
-            for part in {part.place: part for part in reversed(cause.parts)}.values()
+            (self._kind(part), part.value, part.sigma * excess**0.5, self._known[part.place].unit) for part in shapes.values()
         )
         return Ranked(cause.name, cause.probability, parts)
 

@@ -183,7 +183,7 @@ class HealthMonitor:
         if len(power) and np.isfinite(power.sum()):
             heard = np.minimum(power.mean(axis=0), LOUDEST * stated)
             self._noise2[stream] += NOISE_SHARE * (heard - self._noise2[stream])
-        return np.maximum(self._noise2[stream], stated)
+        return np.asarray(np.maximum(self._noise2[stream], stated))
 
     def _tip_sigmas(self) -> Array:
         """Of the predicted tip, m: what strokes and parameters may be off by."""

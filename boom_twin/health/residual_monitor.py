@@ -29,8 +29,9 @@ from .suspicion import CRUDE, DETUNING, LEVELS, Suspicion, carried_on
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
-LEAST_SPAN, SWINGS = 3.0, 8.0  # s that evidence has to take for an alarm; and while a load shakes the boom
-EXCITED_FOR = 15.0  # s for which that is so after the load last showed
+LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm; and while a load shakes the boom: a pump's stroke
+EXCITED_FOR = 20.0  # s for which a load counts after it last showed
+LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 PERIOD = 3  # blocks between two looks at a suspicion
 SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
@@ -81,6 +82,7 @@ class ResidualMonitor:
         on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
         known, n = parameters(scene), len(scene.joints)
+        self._scene = scene
         self._names, self._count = names, len(known)
         self._linear = LinearModel(scene, settings, mounts, known)
         self._mean, self.covariance = baseline.healthy(known)
@@ -100,7 +102,8 @@ class ResidualMonitor:
         self._suspicion: Suspicion | None = None
         self._alarm: Alarm | None = None
         self._carried: dict[str, float] = {}
-        self._blocks, self._excited = 0, -SECOND * 60
+        self._blocks = 0
+        self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._watch_anew()
 
     def _watch_anew(self) -> None:
@@ -180,8 +183,7 @@ class ResidualMonitor:
             self._suspicion = None
             return []
         verdict = suspicion.explain()
-        if verdict.level > 0:
-            self._excited = start
+        self._shaken[verdict.level] = start
         news = self._judge(start, suspicion, verdict)
         if self._suspicion is suspicion and suspicion.is_outdated(verdict):
             self._carried = carried_on(verdict) if self._alarm is not None else {}
@@ -190,7 +192,9 @@ class ResidualMonitor:
 
     def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         """Open, change or end an alarm."""
-        if suspicion.span < (LEAST_SPAN if verdict.strength > OBVIOUS else self._least_span(start)):
+        load = self._load_lately(start)
+        waiting = LEAST_SPAN if load == 0.0 or verdict.strength > OBVIOUS else SWINGS
+        if suspicion.span < waiting or self._weight(verdict.best) < LOAD_MEANS * load:
             return []
         if self._alarm is None:
             is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
@@ -199,13 +203,18 @@ class ResidualMonitor:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
-        self._alarm = self._tell.alarm(self._alarm, verdict, suspicion.span, start, self.signature)
+        self._alarm = self._tell.alarm(self._alarm, verdict, suspicion.span, start, load == 0.0, self.signature)
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
 
-    def _least_span(self, start: int) -> float:
-        """Time (s) that evidence has to take: long enough to tell a fault from a load, so some strokes of a pump."""
-        return SWINGS if (start - self._excited) * NANO < EXCITED_FOR else LEAST_SPAN
+    def _load_lately(self, start: int) -> float:
+        """Highest level (N) of the load at the tip lately; 0 of a calm boom."""
+        return float(self._levels[start - self._shaken < EXCITED_FOR * SECOND].max(initial=0.0))
+
+    def _weight(self, each: Explanation) -> float:
+        """Magnitude (N) of the force at the tip that would be taken for this fault; infinite of one that no load looks like."""
+        reach = {"tip.payload": 1.0, "line_fill": 0.5 * self._scene.reach}.get(self._bank.known[each.place].cause, math.inf)
+        return abs(each.value) * math.hypot(*self._scene.gravity) * reach
 
     def _open(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         if (known := self._change_of_known(suspicion, verdict)) is not None:
@@ -213,7 +222,8 @@ class ResidualMonitor:
         channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
-        self._alarm = self._tell.alarm(alarm, verdict, suspicion.span, start, self.signature)
+        is_calm = self._load_lately(start) == 0.0
+        self._alarm = self._tell.alarm(alarm, verdict, suspicion.span, start, is_calm, self.signature)
         return [self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:

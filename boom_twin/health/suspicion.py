@@ -15,7 +15,7 @@ from .inference.innovation_filter import InnovationFilter
 
 LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
-DETUNING = 0.25  # share by which a fault may change natural frequencies
+DETUNING = 0.15  # share by which a fault may change natural frequencies
 CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them

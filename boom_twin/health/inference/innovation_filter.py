@@ -47,7 +47,7 @@ REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
 LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
-MEAN = 2.0  # see above
+MEAN = 1.0  # see above
 LOAD = 4  # states of the load: x and y about the mean, and the mean's
 
 
