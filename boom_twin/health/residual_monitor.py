@@ -255,8 +255,12 @@ class ResidualMonitor:
         if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or suspicion.is_outdated(verdict):
             return
         before = self._known.get(cause or "")
-        value = best.value + (before.value if before is not None and before.place == best.place else 0.0)
-        self._known[cause or ""] = _KnownFault(self._alarm if before is None else before.alarm, best.place, value)
+        if before is None:
+            self._known[cause or ""] = _KnownFault(self._alarm, best.place, best.value)
+        elif before.place == best.place:
+            self._known[cause or ""] = replace(before, value=before.value + best.value)
+        else:
+            return
         self._alarm, self._suspicion, self._carried = None, None, {}
         self._start_about_known()
 

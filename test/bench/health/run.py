@@ -24,7 +24,10 @@ from boom_twin import Twin, load_scene
 from boom_twin.calibration.baseline import learn_baseline
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.types import NANO, Alarm
+from boom_twin.twin.blocks import ReportBlock, block_of
+from boom_twin.types import NANO, Alarm, Health, Sample
+
+AT_ONCE = 400  # samples
 
 
 def main(args: Namespace) -> None:
@@ -62,15 +65,26 @@ def outcome(sessions: Path, out: Path, each: Scenario) -> dict[str, Any]:
     """What is true of a session and everything that was told of it: each alarm at each of its changes."""
     twin = Twin(load_scene(), baseline=load_baseline(baseline_file(out, each.rig)) if each.rig else Baseline())
     told: list[dict[str, Any]] = []
-    last: dict[tuple[str, int], tuple[Any, ...]] = {}
-    for sample in stored.load_samples(sessions, each):
-        health = twin.update(sample).health
-        for alarm in () if health is None else health.alarms:
-            state = (alarm.cause, alarm.kind, alarm.until, tuple(rank.cause for rank in alarm.ranked[:2]))
-            if last.get((alarm.channel, alarm.since)) != state:
-                last[alarm.channel, alarm.since] = state
-                told.append(_told(alarm, sample.stamp))
+    last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
+    samples = stored.load_samples(sessions, each)
+    for first in range(0, len(samples), AT_ONCE):
+        for health in _health(twin, samples[first : first + AT_ONCE]):
+            for alarm in health.alarms:
+                key = alarm.channel, alarm.since, alarm.kind if alarm.cause is None else alarm.cause
+                state = alarm.until, tuple(rank.cause for rank in alarm.ranked[:2])
+                if last.get(key) != state:
+                    last[key] = state
+                    told.append(_told(alarm, health.stamp))
     return each.row | {"told": told}
+
+
+def _health(twin: Twin, samples: list[Sample]) -> list[Health]:
+    """What the twin tells of its health while it takes these samples."""
+    found: list[Health] = []
+    for report in twin.update_block(block_of(samples, len(twin.scene.joints))):
+        each = report.health.values() if isinstance(report, ReportBlock) else [report.health]
+        found += [health for health in each if health is not None]
+    return found
 
 
 def _told(alarm: Alarm, stamp: int) -> dict[str, Any]:
