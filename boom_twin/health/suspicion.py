@@ -16,6 +16,7 @@ from .inference.innovation_filter import InnovationFilter
 LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
 DETUNING = 0.15  # share by which a fault may change natural frequencies
+SHAKEN = 0.3  # m/s^2 rms of the predicted tip acceleration at which a block counts half: a fault changes the vibration, too
 CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
@@ -67,11 +68,11 @@ class Suspicion:
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
         noise, crude = problem.noise(self._noise2), self._errors2 + (CRUDE * self.size) ** 2
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
-        found = []
+        found, weight = [], 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         for each in self._filters:
             each.tune(problem.modes)
             innovations = each.step(table, noise, crude, problem.shaking, problem.travel)
-            found.append(Evidence.of(innovations.white, innovations.log))
+            found.append(Evidence.of(innovations.white, innovations.log).weighted(weight))
         self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
         self._recent.append(found)
         self.blocks += 1

@@ -48,8 +48,8 @@ class Evidence:
         L and l.
     squares : float
         Sum of the squares of the innovations, all coefficients 0.
-    rows : int
-        Their number.
+    rows : float
+        Their number; less where they count less.
     log : float
         Logarithm of their probability with all coefficients 0.
     """
@@ -57,7 +57,7 @@ class Evidence:
     matrix: Array
     vector: Array
     squares: float
-    rows: int
+    rows: float
     log: float
 
     @staticmethod
@@ -71,6 +71,11 @@ class Evidence:
         left, signature = white[:, 0], white[:, 1:]
         matrix, vector = np.asarray(signature.T @ signature), np.asarray(signature.T @ left)
         return Evidence(matrix, vector, float(left @ left), len(left), log)
+
+    def weighted(self, weight: float) -> Evidence:
+        """Counting `weight` times as much."""
+        matrix, vector = weight * self.matrix, weight * self.vector
+        return Evidence(matrix, vector, weight * self.squares, weight * self.rows, weight * self.log)
 
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(
@@ -211,7 +216,7 @@ class HypothesisTest:
         factors = fits[:, 0] + (logs - logs.max())[:, None]
         squares = np.array([each.squares for each in healthy])[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
-        excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1))
+        excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1.0))
         priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
         weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
         shares = np.exp(weights - weights.max())
@@ -274,7 +279,7 @@ class HypothesisTest:
         fitted = np.array([2.0 * each.vector @ coefficients - coefficients @ each.matrix @ coefficients for each in healthy])
         logs = np.array([each.log for each in healthy]) + 0.5 * fitted
         squares = np.array([each.squares for each in healthy]) - fitted
-        return logs, squares / max(healthy[0].rows, 1)
+        return logs, squares / max(healthy[0].rows, 1.0)
 
     def coefficients(self, each: Explanation, span: float) -> Array:
         """Of the fault alone, `span` (s) after its evidence began; shape (2 * parameters,)."""
