@@ -203,7 +203,9 @@ class ResidualMonitor:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
-        self._alarm = self._tell.alarm(self._alarm, verdict, suspicion.span, start, load == 0.0, self.signature)
+        self._alarm = self._tell.alarm(
+            self._alarm, suspicion.explain_calmly(), suspicion.span, start, load == 0.0, self.signature
+        )
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
 
@@ -223,7 +225,7 @@ class ResidualMonitor:
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
         is_calm = self._load_lately(start) == 0.0
-        self._alarm = self._tell.alarm(alarm, verdict, suspicion.span, start, is_calm, self.signature)
+        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), suspicion.span, start, is_calm, self.signature)
         return [self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:

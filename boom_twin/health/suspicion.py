@@ -16,7 +16,7 @@ from .inference.innovation_filter import InnovationFilter
 LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
 DETUNING = 0.15  # share by which a fault may change natural frequencies
-SHAKEN = 0.3  # m/s^2 rms of the predicted tip acceleration at which a block counts half: a fault changes the vibration, too
+SHAKEN = 0.3  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
 CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
@@ -54,6 +54,7 @@ class Suspicion:
         self._filters = [InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, float(each)) for each in levels]
         self.size, self.blocks = np.zeros(channels), 0
         self._evidence = [Evidence.none(coefficients) for _ in levels]
+        self._calm = self._evidence
         self._recent: deque[list[Evidence]] = deque(maxlen=RECENT)
 
     @property
@@ -72,14 +73,19 @@ class Suspicion:
         for each in self._filters:
             each.tune(problem.modes)
             innovations = each.step(table, noise, crude, problem.shaking, problem.travel)
-            found.append(Evidence.of(innovations.white, innovations.log).weighted(weight))
+            found.append(Evidence.of(innovations.white, innovations.log))
         self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
+        self._calm = [before + new.weighted(weight) for before, new in zip(self._calm, found, strict=True)]
         self._recent.append(found)
         self.blocks += 1
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""
         return self._bank.explain(self._evidence, self.mean, self.covariance, self.span, self._carried)
+
+    def explain_calmly(self) -> Verdict:
+        """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
+        return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
 
     def is_outdated(self, verdict: Verdict) -> bool:
         """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
