@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from ..scene.schema import Scene
-from ..types import Alarm, Array, Ranked
+from ..types import NANO, Alarm, Array, Ranked
 from .inference.fault_catalogue import Form, Parameter, physical
-from .inference.hypotheses import UNKNOWN, Cause, Explanation, Verdict
+from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
-NAMED, KEPT = 0.9, 0.2  # probability of a cause beside the others that is taken for certain; and that is then kept
+NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
+REFUTED = 1e-3  # probability of the cause that was named, below which another may be
+FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
+NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
+DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
@@ -35,57 +39,79 @@ class AlarmText:
         self._scene, self._known, self._signatures, self._errors = scene, known, signatures, errors
         self._advised: tuple[str, str] | None = None
         self._advice = ""
+        self._leading: tuple[str, int] = "", 0
 
-    def alarm(self, alarm: Alarm, verdict: Verdict, signature: Signature | None) -> Alarm:
-        """The alarm with its present explanation."""
+    def alarm(
+        self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool, signature: Signature | None
+    ) -> Alarm:
+        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
+
+        `is_calm`: no load shakes the boom.
+        """
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
-        certain = self._certain(alarm, verdict)
-        if certain is not None:
-            rank = next(rank for rank in ranks if rank.cause == certain)
-            told = self._sentence(rank)
-            return replace(alarm, kind=rank.parts[0][0], cause=certain, told=told, ranked=ranks)
-        if verdict.best.place is None:
-            told = f"{alarm.channel} deviates as no single fault that is known would make it"
+        best = verdict.causes[0]
+        if self._is_certain(alarm, verdict, span, stamp, is_calm):
+            told = self._sentence(ranks[0], verdict.best)
+            return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
+        if alarm.cause is not None:
+            return alarm
+        if verdict.excess > FITS and span >= NAMED_AFTER:
+            told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
+        if len(ranks) == 1:
+            return replace(alarm, kind="residual", cause=None, told=f"{best.name} most likely, not yet certain", ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
-    @staticmethod
-    def _certain(alarm: Alarm, verdict: Verdict) -> str | None:
-        """The cause that is named: one that is probable enough; one that was is kept while it is still quite probable."""
+    def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool) -> bool:
+        """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
         best = verdict.causes[0]
-        if best.name != UNKNOWN and best.probability >= NAMED:
-            return best.name
-        share = {cause.name: cause.probability for cause in verdict.causes}
-        return alarm.cause if alarm.cause is not None and share[alarm.cause] >= KEPT else None
+        is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
+        leads = best.probability >= (GROWING if is_growing else NAMED) and verdict.excess <= FITS
+        shares = {cause.name: cause.probability for cause in verdict.causes}
+        is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
+        if not leads or is_held or (is_growing and (span < GROWING_AFTER or not is_calm)):
+            self._leading = "", stamp
+            return False
+        if not alarm.told or self._leading[0] != best.name:
+            self._leading = best.name, stamp
+        return (stamp - self._leading[1]) * NANO >= NAMED_AFTER
 
     def _ranked(self, cause: Cause, excess: float) -> Ranked:
+        """With each of its faults in the shape that is more probable."""
+        shapes: dict[int, Explanation] = {}
+        for part in cause.parts:
+            shapes.setdefault(part.place, part)
         parts = tuple(
-            (self._known[part.place].kind, part.value, part.sigma * excess**0.5, self._known[part.place].unit)
-            for part in cause.parts
-            if part.place is not None
+            (self._kind(part), part.value, part.sigma * excess**0.5, self._known[part.place].unit) for part in shapes.values()
         )
         return Ranked(cause.name, cause.probability, parts)
 
-    def _sentence(self, rank: Ranked) -> str:
-        """Cause, amount and certainty."""
+    def _kind(self, part: Explanation) -> str:
+        """In a word what is the matter."""
+        each = self._known[part.place]
+        return "drift" if part.is_growing and each.form in DRIFTING else each.kind
+
+    def _sentence(self, rank: Ranked, best: Explanation) -> str:
+        """Cause, amount, trend and certainty."""
         kind, value, sigma, unit = rank.parts[0]
-        each = next(p for p in self._known if p.cause == rank.cause and p.kind == kind)
+        each = self._known[best.place]
         if each.form is Form.SCENE and not unit:
             now, own = physical(each, self._scene, value), physical(each, self._scene, 0.0)
             spread = abs(physical(each, self._scene, value + sigma) - now)
             amount = f"{now:.3g} +- {spread:.1g}, {100 * (now / own - 1):+.0f} % of the scene's"
         else:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
-        return f"{rank.cause} {kind}: {amount} (probability {rank.probability:.3f})"
+        trend = f", {best.rate:+.2g} {unit}/s" if best.is_growing and unit else ", growing" if best.is_growing else ""
+        return f"{rank.cause} {kind}: {amount}{trend} (probability {rank.probability:.3f})"
 
     def _advised_move(self, verdict: Verdict, signature: Signature | None) -> str:
         """The move that would best tell the two most probable causes apart; worked out once for every pair."""
         one, other = verdict.causes[0], verdict.causes[1]
         pair = (one.name, other.name)
-        if signature is None or UNKNOWN in pair:
+        if signature is None:
             return ""
         if pair != self._advised:
             self._advised, self._advice = pair, self._best_move(one.parts[0], other.parts[0], signature.strokes)

@@ -22,6 +22,8 @@ UNCERTAIN = 2.0
 SHAKEN = 3.0
 """Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
 looks like noise in strokes may be motion."""
+LOUDEST, NOISE_SHARE = 100.0, 0.05
+"""Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
 CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 
@@ -68,9 +70,10 @@ class HealthMonitor:
             stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream in CHECKED
         }
-        ended = self.residuals.close(self._told)
-        if ended is not None:
-            self._ended.append(ended)
+        self._ended += self.residuals.close(self._told)
+        self._noise2 = {
+            stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED
+        }
         self.residuals.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
@@ -114,8 +117,7 @@ class HealthMonitor:
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
             alarms += monitor.alarms
-        if self.residuals.alarm is not None:
-            alarms.append(self.residuals.alarm)
+        alarms += self.residuals.alarms
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas())
 
     def _judge(self, block: Block) -> list[Alarm]:
@@ -131,12 +133,11 @@ class HealthMonitor:
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
         if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
-            ended = self.residuals.close(start)
+            news += self.residuals.close(start)
             self.residuals.begin()
-            return news if ended is None else [*news, ended]
+            return news
         averaged = self._means(block, predictions, {stream: rows.left for stream, rows in readings.items()})
-        told = self.residuals.take(averaged, self._noise)
-        return news if told is None else [*news, told]
+        return news + self.residuals.take(averaged, self._noise)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
@@ -157,7 +158,9 @@ class HealthMonitor:
         """Means of the residuals (k, channels) of every stream that is judged."""
         stamps, found = predictions.stamps, []
         for stream in JUDGED:
-            mean, count = means(left[stream], self._settings.variance(SENSORS[stream]) ** 0.5)
+            stated = self._settings.variance(SENSORS[stream])
+            mean, count = means(left[stream], stated**0.5)
+            count = count * stated / self._measured_noise(stream, left[stream], stated)
             if stream in self._sensors:
                 mean[self._sensors[stream].masked] = np.nan
             found.append((mean, count))
@@ -173,6 +176,14 @@ class HealthMonitor:
             rates=rates,
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
         )
+
+    def _measured_noise(self, stream: Stream, left: Array, stated: float) -> Array:
+        """Variance (channels,) of single readings lately, by their second differences; at least that which is stated."""
+        power = bends2(left)
+        if len(power) and np.isfinite(power.sum()):
+            heard = np.minimum(power.mean(axis=0), LOUDEST * stated)
+            self._noise2[stream] += NOISE_SHARE * (heard - self._noise2[stream])
+        return np.asarray(np.maximum(self._noise2[stream], stated))
 
     def _tip_sigmas(self) -> Array:
         """Of the predicted tip, m: what strokes and parameters may be off by."""

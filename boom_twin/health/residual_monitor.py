@@ -1,113 +1,51 @@
-"""Monitor residuals for lasting deviations: suspicion, alarm, and the ranked causes of one alarm at a time."""
+"""Monitor residuals for lasting deviations: suspicion, alarm, ranked causes; and go on with faults that are known.
+
+A fault that has a name, a size that no longer changes and an explanation that fits becomes part of what is known: residuals are
+judged about it from then on, its alarm stays. So a second fault is found, and the first one's end or change.
+"""
 
 from __future__ import annotations
 
-from collections import deque
+import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, Alarm, Array, Mount
+from ..scene.summary import explain
+from ..types import NANO, SECOND, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
 from .detection import Detector
-from .inference.block_problem import BLOCK, CALM, BlockMeans, BlockProblem, LinearModel
-from .inference.fault_catalogue import Form, Parameter, parameters
-from .inference.hypotheses import Evidence, HypothesisTest, Regression, Verdict
+from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
+from .inference.fault_catalogue import parameters
+from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
 from .inference.sensitivities import Signature
+from .suspicion import CRUDE, DETUNING, LEVELS, Suspicion, carried_on
 
-DETUNING = 0.4  # share by which a fault may change natural frequencies
-CRUDE = 0.07  # share of a deviation by which its signature, a derivative, may be wrong
-LEVEL = 2.0  # s, over which the size of a deviation is taken for that
-UNKNOWN_TIMES = 30.0  # deviation of an unknown fault over that of the model's error
-GONE = -15.0  # ln of how much less probable a fault is than none when it has ended
-RECENT = 100  # blocks over which an alarm is held or given up, 10 s
-
-
-class Suspicion:
-    """Weighs faults.
-
-    Parameters
-    ----------
-    bank : HypothesisTest
-    start : int
-        Stamp (ns) of its first block.
-    mean, covariance : ndarray
-        Of the parameters while all was well.
-    errors2, noise2 : ndarray, shape (channels,)
-        Variance of the model's error in one posture, and factor on the variance of the sensors' noise, while all is well.
-    clock : int
-        Stamp (ns) at which the columns of drifts are 0.
-    """
-
-    def __init__(
-        self, bank: HypothesisTest, start: int, mean: Array, covariance: Array, errors2: Array, noise2: Array, clock: int
-    ) -> None:
-        self._bank, self.start, self._mean, self._covariance = bank, start, mean, covariance
-        self._errors2, self._noise2 = errors2, noise2
-        channels, block = len(errors2), BLOCK * NANO
-        self._faulty = InnovationFilter(channels, 1 + len(mean), block, DETUNING)
-        self._unknown = InnovationFilter(channels, 1, block, DETUNING)
-        self._size, self._beyond = np.zeros(channels), 0.0
-        self._evidence, self._span = Evidence.none(len(mean)), 0.0
-        self._recent: deque[Evidence] = deque(maxlen=RECENT)
-        self._turn = drifts_from(bank.known, (start - clock) * NANO)
-
-    def take(self, problem: BlockProblem) -> None:
-        """Take one block."""
-        self._faulty.tune(problem.modes)
-        self._unknown.tune(problem.modes)
-        left = problem.table[:, 0]
-        measured = np.isfinite(left)
-        self._size[measured] += BLOCK * NANO / LEVEL * (left[measured] - self._size[measured])
-        shaking = self._shaking(problem)
-        self._span = (problem.start - self.start) * NANO
-        noise = problem.noise(self._noise2)
-        crude = self._errors2 + (CRUDE * self._size) ** 2
-        faulty = self._faulty.step(problem.table, noise, crude, shaking, problem.travel)
-        large = UNKNOWN_TIMES**2 * self._errors2
-        unknown = self._unknown.step(problem.table[:, :1], noise, large, shaking, problem.travel)
-        found = Evidence.of(faulty.white, faulty.log, unknown.log)
-        self._evidence = self._evidence + found
-        self._recent.append(found)
-
-    def _shaking(self, problem: BlockProblem) -> float:
-        """Mean square of the tip's acceleration: what is predicted, and what the IMU reads beyond that."""
-        beyond = np.nansum((problem.table[-2:, 0] - self._size[-2:]) ** 2)
-        self._beyond = max(self._beyond * float(np.exp(-BLOCK * NANO / CALM)), float(beyond))
-        return problem.shaking + self._beyond
-
-    def explain(self) -> Verdict:
-        """Weigh all hypotheses; drifts begin with the case."""
-        return self._bank.explain(self._evidence.turned(self._turn), self._mean, self._covariance, self._span)
-
-    def has_ended(self, verdict: Verdict) -> bool:
-        """Whether the last seconds speak against the fault that explains all of the case best."""
-        if len(self._recent) < RECENT:
-            return False
-        recently = sum(self._recent, Evidence.none(len(self._mean))).turned(self._turn)
-        return self._bank.support(recently, verdict.best, self._mean, self._covariance) < GONE
-
-
-def drifts_from(known: tuple[Parameter, ...], time: float) -> Array:
-    """Makes every drift begin at `time` (s): its column less `time` times that of the bias; shape (parameters, parameters)."""
-    turn = np.eye(len(known))
-    bias = {each.index: i for i, each in enumerate(known) if each.form is Form.ANGLE}
-    for i, each in enumerate(known):
-        if each.form is Form.DRIFT:
-            turn[bias[each.index], i] = -time
-    return turn
-
-
-SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a case is begun, and given up if it has not become an alarm
+SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
-ENOUGH, PERIOD = 2, 5  # blocks before the first look at a case, and between two looks at a case
-SURE = 15.0  # ln of how much more probable a fault must be than none
+LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm; and while a load shakes the boom: a pump's stroke
+EXCITED_FOR = 20.0  # s for which a load counts after it last showed
+LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
+PERIOD = 3  # blocks between two looks at a suspicion
+SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
+GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
+KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
+ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
+
+
+@dataclass(frozen=True)
+class _KnownFault:
+    """A fault that the twin goes on with: its alarm, its parameter and that one's value."""
+
+    alarm: Alarm
+    place: int
+    value: float
 
 
 class ResidualMonitor:
@@ -127,10 +65,9 @@ class ResidualMonitor:
 
     Attributes
     ----------
-    alarm : Alarm or None
-        The one that lasts.
     surprise : ndarray, shape (channels,)
-        What the newest block leaves that healthy deviations do not explain; of unit variance, NaN where nothing was measured.
+        What the newest block leaves that healthy deviations and known faults do not explain; of unit variance, NaN where
+        nothing was measured.
     covariance : ndarray, shape (parameters, parameters)
         Of the parameters while all is well, as the baseline has it.
     """
@@ -145,27 +82,41 @@ class ResidualMonitor:
         on_block: Callable[[BlockProblem], object] | None = None,
     ) -> None:
         known, n = parameters(scene), len(scene.joints)
+        self._scene = scene
         self._names, self._count = names, len(known)
         self._linear = LinearModel(scene, settings, mounts, known)
-        mean, self.covariance = baseline.healthy(known)
+        self._mean, self.covariance = baseline.healthy(known)
         self._errors2, self._noise2, self._detuning = baseline.errors(n) ** 2, baseline.noise(n) ** 2, baseline.detuning
+        self._levels = LEVELS * explain(scene).mass * math.hypot(*scene.gravity)
         self._bank = HypothesisTest(known)
         self._tell = AlarmText(scene, known, self._linear.signatures, baseline.errors(n))
-        self._regression = Regression(mean, self.covariance)
+        self._known: dict[str, _KnownFault] = {}
         self._detector = Detector(len(names), BLOCK * NANO, settings.false_alarms / 86400.0)
-        self.surprise = np.full(len(names), np.nan)
         self._on_block = on_block
+        self._regression = Regression(self._mean, self.covariance)
         self.begin()
 
     def begin(self) -> None:
-        """The boom starts from rest: what moved is forgotten, what is known of its parameters is kept."""
-        channels, size, block = len(self._names), 1 + self._count, BLOCK * NANO
-        self._healthy = InnovationFilter(channels, size, block, self._detuning)
+        """The boom starts from rest: what moved is forgotten, what is known of its parameters and faults is kept."""
         self._linear.begin()
-        self._detector.reset()
-        self._case: Suspicion | None = None
+        self._suspicion: Suspicion | None = None
+        self._alarm: Alarm | None = None
+        self._carried: dict[str, float] = {}
         self._blocks = 0
-        self.alarm: Alarm | None = None
+        self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
+        self._watch_anew()
+
+    def _watch_anew(self) -> None:
+        """Begin to look for deviations from what is known now."""
+        detuning = DETUNING if self._known else self._detuning
+        self._healthy = InnovationFilter(len(self._names), 1 + self._count, BLOCK * NANO, detuning)
+        self._detector.reset()
+        self.surprise = np.full(len(self._names), np.nan)
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Those that last: of faults that are known, and the one that is being looked into."""
+        return (*(each.alarm for each in self._known.values()), *([] if self._alarm is None else [self._alarm]))
 
     @property
     def levels(self) -> Array:
@@ -177,82 +128,158 @@ class ResidualMonitor:
         """At the present posture."""
         return self._linear.signature
 
-    def take(self, block: BlockMeans, noise: StrokeNoise) -> Alarm | None:
-        """Take one block; gives the alarm if it began, changed or ended."""
+    def take(self, block: BlockMeans, noise: StrokeNoise) -> list[Alarm]:
+        """Take one block; gives the alarms that began, changed or ended."""
         problem = self._linear.take(block, noise)
         if problem is None or not np.isfinite(block.left).any():
-            return None
+            return []
         if self._on_block is not None:
             self._on_block(problem)
         self._watch(problem)
-        if self._case is not None and problem.start >= self._case.start:
-            self._case.take(problem)
-        if self.alarm is None:
-            return self._open(block.start)
+        if self._suspicion is None or problem.start < self._suspicion.start:
+            return []
+        self._suspicion.take(problem)
         self._blocks += 1
-        return self._go_on(block.start) if self._blocks % PERIOD == 0 else None
+        return self._look(block.start) if self._blocks % PERIOD == 0 else []
 
     def _watch(self, problem: BlockProblem) -> None:
-        """Innovations beyond what healthy parameters explain; the first suspicious one begins a case."""
+        """Innovations beyond what healthy parameters and known faults explain; the first suspicious one begins a suspicion."""
         self._healthy.tune(problem.modes)
-        noise = problem.noise(self._noise2)
-        found = self._healthy.step(problem.table, noise, self._errors2, problem.shaking, problem.travel)
-        known = self._regression.mean, self._regression.covariance
-        left, _ = self._regression.take(found.white, self.alarm is None)
+        noise, known = problem.noise(self._noise2), self._regression
+        found = self._healthy.step(problem.table, noise, self._errors_about(problem), problem.shaking, problem.travel)
+        left, _ = known.take(found.white, self._suspicion is None)
         self.surprise = np.full(len(self._names), np.nan)
         self.surprise[np.isfinite(problem.table[:, 0])] = left
-        if self.alarm is not None:
+        if self._alarm is not None:
             return
         self._detector.take(self.surprise)
-        if self._regression.has_strayed:  # too slowly for the detector; now it will be told at once
-            self._regression.restart()
-            self._case = None
-        if self._case is None and self._detector.suspicion > SUSPICIOUS:
-            assert self._linear.epoch is not None
-            start = problem.start + SKIPPED * BLOCK
-            self._case = Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._linear.epoch)
+        if known.has_strayed:  # too slowly for the detector; now it will be told at once
+            known.restart()
+            self._suspicion = None
+        if self._suspicion is None and self._detector.suspicion > SUSPICIOUS:
+            self._carried = {}
+            self._suspect(problem.start + SKIPPED * BLOCK)
+
+    def _errors_about(self, problem: BlockProblem) -> Array:
+        """Variance of the model's error (channels,), and of the signatures of known faults."""
+        errors2 = self._errors2
+        for each in self._known.values():
+            errors2 = errors2 + (CRUDE * each.value * problem.table[:, 1 + each.place]) ** 2
+        return errors2
+
+    def _suspect(self, start: int) -> None:
+        """Collect evidence from `start` (ns) on."""
+        known = self._regression.mean, self._regression.covariance
+        self._suspicion = Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, self._carried)
+        self._blocks = 0
 
     # -- suspicion, alarm, end ------------------------------------------------------------------------------------------
 
-    def _open(self, start: int) -> Alarm | None:
-        """An alarm where the detector says so, if a fault explains the case better than none."""
-        if self._case is None or self._detector.suspicion < CLEAN:
-            self._case = None
-            return None
-        levels = self.levels
-        channel = int(np.argmax(levels))
-        if levels[channel] < 1.0 or start < self._case.start + ENOUGH * BLOCK:
-            return None
-        verdict = self._case.explain()
-        if verdict.strength < SURE:
-            self._detector.reset(np.arange(len(levels)) == channel)
-            return None
-        since = start - (self._detector.blocks_since(channel) - 1) * BLOCK
-        self.alarm, self._blocks = Alarm(self._names[channel], "residual", since, None, None, ""), 0
-        return self._told(verdict)
+    def _look(self, start: int) -> list[Alarm]:
+        """Weigh all that was collected; gives the news."""
+        suspicion = self._suspicion
+        assert suspicion is not None
+        if self._alarm is None and self._detector.suspicion < CLEAN:
+            self._suspicion = None
+            return []
+        verdict = suspicion.explain()
+        self._shaken[verdict.level] = start
+        news = self._judge(start, suspicion, verdict)
+        if self._suspicion is suspicion and suspicion.is_outdated(verdict):
+            self._carried = carried_on(verdict) if self._alarm is not None else {}
+            self._suspect(start + BLOCK)
+        return news
 
-    def _go_on(self, start: int) -> Alarm | None:
-        """Go on with an alarm: other causes may become likely, or it may end."""
-        assert self._case is not None
-        verdict = self._case.explain()
-        return self.close(start) if self._case.has_ended(verdict) else self._told(verdict)
+    def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+        """Open, change or end an alarm."""
+        load = self._load_lately(start)
+        waiting = LEAST_SPAN if load == 0.0 or verdict.strength > OBVIOUS else SWINGS
+        if suspicion.span < waiting or self._weight(verdict.best) < LOAD_MEANS * load:
+            return []
+        if self._alarm is None:
+            is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
+            return self._open(start, suspicion, verdict) if is_sure else []
+        if verdict.strength < GONE:
+            return self._end_open(start) if suspicion.span > GONE_AFTER else []
+        if (known := self._change_of_known(suspicion, verdict)) is not None:
+            return self._end_known(known, start)
+        self._alarm = self._tell.alarm(
+            self._alarm, suspicion.explain_calmly(), suspicion.span, start, load == 0.0, self.signature
+        )
+        self._go_on_with(suspicion, verdict)
+        return [*self.alarms]
 
-    def forget(self) -> None:
-        """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
-        if self.alarm is None:
-            self._case = None
-            self._detector.reset()
+    def _load_lately(self, start: int) -> float:
+        """Highest level (N) of the load at the tip lately; 0 of a calm boom."""
+        return float(self._levels[start - self._shaken < EXCITED_FOR * SECOND].max(initial=0.0))
 
-    def close(self, stamp: int) -> Alarm | None:
-        """End the alarm, if there is one."""
-        if self.alarm is None:
-            return None
-        ended = replace(self.alarm, until=stamp)
-        self.alarm, self._case = None, None
+    def _weight(self, each: Explanation) -> float:
+        """Magnitude (N) of the force at the tip that would be taken for this fault; infinite of one that no load looks like."""
+        reach = {"tip.payload": 1.0, "line_fill": 0.5 * self._scene.reach}.get(self._bank.known[each.place].cause, math.inf)
+        return abs(each.value) * math.hypot(*self._scene.gravity) * reach
+
+    def _open(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+        if (known := self._change_of_known(suspicion, verdict)) is not None:
+            return self._end_known(known, start)
+        channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
+        since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
+        alarm = Alarm(self._names[channel], "residual", since, None, None, "")
+        is_calm = self._load_lately(start) == 0.0
+        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), suspicion.span, start, is_calm, self.signature)
+        return [self._alarm]
+
+    def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
+        """The known fault whose end goes with what is measured about as well as any other explanation does."""
+        best = max(part.log_factor for cause in verdict.causes for part in cause.parts)
+        for each in self._known.values():
+            if suspicion.log_factor(Explanation(each.place, 0, 0.0, -each.value, 0.0)) > best - ENDED:
+                return each
+        return None
+
+    def _end_known(self, known: _KnownFault, start: int) -> list[Alarm]:
+        """The known fault is there no more; an alarm that its end has raised was none."""
+        del self._known[known.alarm.cause or ""]
+        self._start_about_known()
+        return [*self._end_open(start), replace(known.alarm, until=start)]
+
+    def _end_open(self, start: int) -> list[Alarm]:
+        """End the alarm that is being looked into, if there is one."""
+        ended = [] if self._alarm is None else [replace(self._alarm, until=start)]
+        self._alarm, self._suspicion, self._carried = None, None, {}
         self._detector.reset()
         return ended
 
-    def _told(self, verdict: Verdict) -> Alarm:
-        assert self.alarm is not None
-        self.alarm = self._tell.alarm(self.alarm, verdict, self.signature)
-        return self.alarm
+    def _go_on_with(self, suspicion: Suspicion, verdict: Verdict) -> None:
+        """The fault becomes known, if it has a name and a size that stays."""
+        assert self._alarm is not None
+        best, cause = verdict.best, self._alarm.cause
+        is_sure = cause == verdict.causes[0].name and best.sigma < KNOWN_WITHIN * abs(best.value)
+        if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or suspicion.is_outdated(verdict):
+            return
+        before = self._known.get(cause or "")
+        if before is None:
+            self._known[cause or ""] = _KnownFault(self._alarm, best.place, best.value)
+        elif before.place == best.place:
+            self._known[cause or ""] = replace(before, value=before.value + best.value)
+        else:
+            return
+        self._alarm, self._suspicion, self._carried = None, None, {}
+        self._start_about_known()
+
+    def _start_about_known(self) -> None:
+        """Parameters are healthy but for the faults that are known."""
+        mean = self._mean.copy()
+        for each in self._known.values():
+            mean[each.place] += each.value
+        self._regression = Regression(mean, self.covariance)
+        self._watch_anew()
+
+    def forget(self) -> None:
+        """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
+        if self._alarm is None:
+            self._suspicion = None
+            self._detector.reset()
+
+    def close(self, stamp: int) -> list[Alarm]:
+        """End the alarm that is being looked into, if there is one."""
+        return self._end_open(stamp)

@@ -148,12 +148,13 @@ class SensorCheck:
         self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
         self._listen(left[1:], span)
         steps = np.diff(left, axis=0)
+        noise = np.sqrt(np.fmax(self._power, self._sigma**2))
         sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
         findings = SensorFindings(
             stuck=self._stuck(times[2:], all_raw[2:]),
             noisy=self._power > (NOISY * self._sigma) ** 2,
-            spikes=self._spikes(steps) if sudden else np.zeros(count, dtype=bool),
-            jumped=self._jumps(times, all_raw, left) if sudden else np.zeros(count),
+            spikes=self._spikes(steps, noise) if sudden else np.zeros(count, dtype=bool),
+            jumped=self._jumps(times, all_raw, left, noise) if sudden else np.zeros(count),
             silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
             outside=((raw < self._low) | (raw > self._high)).sum(axis=0) > 0.5 * len(raw),
         )
@@ -164,11 +165,14 @@ class SensorCheck:
         none = np.zeros(count, dtype=bool)
         return SensorFindings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
 
-    def _spikes(self, steps: Array) -> Flags:
-        """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next."""
+    def _spikes(self, steps: Array, noise: Array) -> Flags:
+        """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next.
+
+        The noise (channels,) is that which is measured: a sensor that has twice as much as stated gives no spikes by that.
+        """
         with np.errstate(invalid="ignore"):
             out, back = steps[:-1], -steps[1:]
-            lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * self._sigma) & (out * back > 0.0)
+            lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * noise) & (out * back > 0.0)
             lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
         return np.asarray(lone.any(axis=0))
 
@@ -201,12 +205,12 @@ class SensorCheck:
         witnessed = live.any() and len(live) > 1
         return np.asarray((self._run >= self._patience) & (times[-1] - self._since >= REPEATS_FOR) & witnessed)
 
-    def _jumps(self, times: Array, raw: Array, left: Array) -> Array:
+    def _jumps(self, times: Array, raw: Array, left: Array, noise: Array) -> Array:
         """How far readings changed from one to the next, for good, while the model did not; 0 where they did not."""
         with np.errstate(invalid="ignore"):
             step, measured = left[2:-1] - left[1:-2], raw[2:-1] - raw[1:-2]
             lasting = 0.5 * (left[2:-1] + left[3:]) - 0.5 * (left[:-3] + left[1:-2])
-            least = np.maximum(JUMP * self._sigma, self._fastest * (times[2:-1] - times[1:-2]))[:, None]
+            least = np.maximum(JUMP * noise, self._fastest * (times[2:-1] - times[1:-2])[:, None])
             sudden = (np.abs(measured) > least) & (np.abs(step) > least) & (np.abs(lasting) > 0.7 * np.abs(step))
             calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
             sudden &= calm < 0.3 * np.abs(step)

@@ -23,11 +23,11 @@ TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: 
 
 
 @lru_cache
-def session(seconds: float = 12.0) -> tuple[Sample, ...]:
+def session(seconds: float = 12.0, folder: Path = SESSION) -> tuple[Sample, ...]:
     """Its samples."""
     streams, found = {stream.value: stream for stream in TYPES}, []
     wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
-    for topic, _, msg in read(scan(SESSION), wanted):
+    for topic, _, msg in read(scan(folder), wanted):
         stream = streams[topic.lstrip("/")]
         stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
         if found and (stamp - found[0].stamp) * NANO > seconds:

@@ -18,10 +18,14 @@ KNOWN = (
     Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, one_sided=True),
     Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0),
     Parameter("joint_1.sensor", "bias", Form.ANGLE, 0, "rad", 1e-4, 5e-3),
-    Parameter("joint_1.sensor", "drift", Form.DRIFT, 0, "rad/s", 0.0, 3e-4),
+    Parameter("cylinder_1.rod.clearance", "grown", Form.PLAY, 0, "m", 0.0, 4e-4),
 )
 THETA = np.array([0.03, -1.2, 1.5e-4, 0.0])
-STILL = ModalStates(np.zeros(0), *(np.zeros((0, 0)) for _ in range(4)), np.zeros((JOINTS + 2, 0)), np.zeros(JOINTS + 2))
+CHANNELS = JOINTS + 2
+STILL = ModalStates(
+    np.zeros(0), *(np.zeros((0, 0)) for _ in range(4)), np.zeros((CHANNELS, 0)), np.zeros(CHANNELS), np.zeros((0, 2)),
+    np.zeros((CHANNELS, 2)),
+)  # fmt: skip
 
 
 def session(seed: int, blocks: int, angle_error: float = 2e-4, angle_noise: float = 1.0) -> list[BlockProblem]:

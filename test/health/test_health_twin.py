@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -128,6 +130,40 @@ def test_the_order_of_arrival_does_not_matter():
     one, other = faulty(Stream.ANGLES, "bias", 0), run(shifted)
     assert one.told() == other.told() and one.told()
     assert [health.levels.tobytes() for health in one.health] == [health.levels.tobytes() for health in other.health]
+
+
+PUMPED = Path(__file__).parents[2] / "bags" / "pump_session"
+
+
+def test_pump_and_wind_are_no_fault():
+    """The bundled session that pulses of 130 N and gusts shake, which no twin knows of: no alarm."""
+    outcome = run(session(40.0, PUMPED))
+    assert len(outcome.health) >= 38 and outcome.states() == []
+
+
+def test_a_fault_under_pump_and_wind():
+    """An encoder that reads 0.5 degrees too much all of a sudden while the boom is shaken: told, and no other is accused."""
+    outcome = run(spoilt(session(25.0, PUMPED), Stream.ANGLES, 2, lambda v, t: v + 0.5 * DEGREE * min(1.0, t / 2.0), 8.0))
+    assert outcome.told() and outcome.told()[0][0] >= 8.0
+    assert outcome.causes() <= {"joint_3.sensor"}
+    assert "joint_3.sensor" in [rank.cause for rank in outcome.states()[-1][1].ranked[:2]]
+
+
+def test_a_slow_fault_is_not_another():
+    """A bias that comes on over 6 s is told while it grows; no other cause is ever named."""
+    outcome = run(spoilt(session(25.0), Stream.ANGLES, 1, lambda v, t: v + 0.3 * DEGREE * min(1.0, t / 6.0), 5.0))
+    assert first_after(outcome, 5.0) <= 8.0
+    assert outcome.causes() <= {"joint_2.sensor"}
+    assert "joint_2.sensor" in [rank.cause for rank in outcome.states()[-1][1].ranked[:2]]
+
+
+def test_twice_the_stated_noise_gives_no_spikes():
+    rng, sigma = np.random.default_rng(5), math.sqrt(3.0) * Settings().angle_sigma
+    noisy = [
+        replace(s, values=s.values + rng.normal(0.0, sigma, 4)) if s.stream is Stream.ANGLES else s
+        for s in session(18.0)
+    ]
+    assert run(noisy).states() == []
 
 
 def test_a_twin_without_a_baseline_tells_nothing():

@@ -17,6 +17,7 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import Settings
 from boom_twin.estimation.sensor_model import Mounting, Reading
 from boom_twin.estimation.stroke_filter import corners
+from boom_twin.health.inference.fault_catalogue import parameters
 from boom_twin.health.inference.innovation_filter import (
     HIGHEST,
     KEEPS_STEP,
@@ -28,7 +29,9 @@ from boom_twin.health.inference.innovation_filter import (
     modes_of,
     oscillation,
 )
+from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.types import G
 
 BLOCK, CHANNELS, DETUNING = 0.1, 3, 0.02
 ERRORS2 = np.array([0.5, 1.0, 2.0]) ** 2
@@ -74,6 +77,27 @@ def test_what_angles_read_of_modes(boom):
         wanted = math.sin(x) / x * joint_increments(plan, state, work, noise.modes[k])
         assert modes.shown[:4, 2 * k] == pytest.approx(wanted, rel=1e-4, abs=1e-9)
     assert not modes.shown[:, 1::2].any()
+
+
+@pytest.mark.parametrize("posture", ["arch", "horizontal"])
+def test_a_load_at_rest_bends_the_boom_as_its_weight_does(posture):
+    """What a lasting force at the tip does to the channels, by modes: as the same weight in the boom's own equilibrium."""
+    scene = load_scene()
+    known = tuple(each for each in parameters(scene) if each.cause == "tip.payload")
+    strokes = strokes_of_posture(scene, posture)
+    signatures = Signatures(scene, known, (None,) * len(scene.joints))
+    signature = signatures.at(strokes)
+    assert signature is not None
+    boom = signatures.nominal
+    variance, quiet = Settings().stroke_variance, np.tile([1.0, 0.0, 0.0], (boom.plan.joints, 1))
+    spectrum = StrokeSpectrum(variance, 0.005, corners(variance, 0.005, 1.0), quiet, np.zeros(boom.plan.joints))
+    noise = stroke_noise(boom.plan, boom.state, boom.work, spectrum)
+    modes = modes_of(noise, boom.plan, boom.state, boom.work, boom.reading, BLOCK, None)
+    still = np.linalg.solve(np.eye(len(modes.turn)) - modes.turn, modes.pushed)
+    by_force = (modes.shown @ still + modes.lifted)[:, 1]
+    by_weight = -signature.channels[:, 0] / G
+    assert np.abs(by_force - by_weight).max() < 0.03 * np.abs(by_weight).max()
+    assert np.abs(by_force[-2:] - by_weight[-2:]).max() < 0.1 * np.abs(by_weight[-2:]).max()
 
 
 def test_wrong_frequencies_shake_by_the_predicted_vibration(boom):
@@ -125,7 +149,8 @@ def made(*frequencies: float) -> ModalStates:
         driven[at, at] = 100.0 * np.array([[BLOCK**3 / 3.0, BLOCK**2 / 2.0], [BLOCK**2 / 2.0, BLOCK]])
     shown = np.zeros((CHANNELS, 2 * size))
     shown[:, ::2] = rng.normal(size=(CHANNELS, size))
-    return ModalStates(np.array(frequencies), turn, least, driven, rest, shown, rng.uniform(1.0, 2.0, CHANNELS))
+    shaken, pushed, lifted = rng.uniform(1.0, 2.0, CHANNELS), rng.normal(size=(2 * size, 2)), rng.normal(size=(CHANNELS, 2))
+    return ModalStates(np.array(frequencies), turn, least, driven, rest, shown, shaken, pushed, lifted)
 
 
 class Source:

@@ -264,8 +264,6 @@ class LinearModel:
     signatures : Signatures
     signature : Signature or None
         At the newest block; None before the first.
-    epoch : int or None
-        Stamp (ns) at which the columns of drifts are 0.
     """
 
     def __init__(
@@ -274,14 +272,12 @@ class LinearModel:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
-        self._drifts = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DRIFT]
         self._late = [i for i, each in enumerate(known) if each.form is Form.DELAY]
         self.begin()
 
     def begin(self) -> None:
         """The boom starts from rest."""
         self.signature: Signature | None = None
-        self.epoch: int | None = None
         self._tuned: StrokeNoise | None = None
         self._modes: ModalStates | None = None
         self._before: Array | None = None
@@ -289,8 +285,6 @@ class LinearModel:
 
     def take(self, block: BlockMeans, noise: StrokeNoise) -> BlockProblem | None:
         """One block; None while there is no equilibrium to linearise about."""
-        if self.epoch is None:
-            self.epoch = block.start
         if self.signature is None or np.abs(block.strokes - self.signature.strokes).max() > STEP:
             self.signature = self.signatures.at(block.strokes) or self.signature
         if self.signature is None:
@@ -308,10 +302,7 @@ class LinearModel:
         return BlockProblem(block.start, self._table(block, self.signature), own, spread, shaking, travel, self._modes)
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
-        assert self.epoch is not None
         table = np.column_stack([block.left, signature.channels])
-        for column, row in self._drifts:
-            table[row, 1 + column] = (block.start - self.epoch) * NANO
         for column in self._late:
             table[: len(block.rates), 1 + column] = -block.rates
         return table

@@ -22,7 +22,6 @@ class Form(Enum):
 
     SCENE = "scene"  # by another equilibrium of the model
     ANGLE = "angle"  # adds to one angle
-    DRIFT = "drift"  # adds to one angle, in proportion to time
     STROKE = "stroke"  # adds to one stroke
     SCALE = "scale"  # multiplies one stroke
     PLAY = "play"  # lengthens one cylinder the way it is pulled
@@ -94,7 +93,6 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0),
     ]
     found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
-    found += [Parameter(f"joint_{i + 1}.sensor", "drift", Form.DRIFT, i, "rad/s", 0.0, 3e-4, prior=0.3) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, True, 0.1) for i in each]

@@ -5,88 +5,102 @@ deviations of all parameters (mean m, covariance P) integrated out,
 
     L' = L (I + P L)^-1,   l' = (I + L P)^-1 (l - L m),
 
-a fault with prior N(0, F) in one parameter f is more probable than none by the factor
+a fault whose coefficients c have the prior N(0, F) is more probable than none by the factor
 
-    ln B = l_f^2 / (L_ff + 1/F) / 2 - ln(1 + F L_ff) / 2,
+    ln B = l_c' (L_cc + F^-1)^-1 l_c / 2 - ln det(I + F L_cc) / 2.
 
-and one that is unknown by the factor of a model whose errors are many times larger. (Gaussian model comparison; MacKay,
-Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best explanation leaves is compared with
-what noise leaves; where it is more, all logarithms are divided by the ratio, so that a model that is not quite right is not
-quite sure.
+A fault has one of two shapes: it is as large all the time, or it grows steadily (two coefficients: what it was at the
+beginning, and its rate), the second being much less probable from the outset: slow gusts look like that, too. A slow fault of
+any cause thus has an equal chance beside a drifting sensor.
+
+How large the unknown load at the tip is belongs to every hypothesis, that of no fault too: the evidence comes from filters of
+several levels of it (see `innovation_filter`), and the probability of a fault is the sum over all levels. So a boom that
+is shaken is not taken for a faulty one, nor a faulty one for one that is shaken.
+
+(Gaussian model comparison; MacKay, Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best
+explanation leaves is compared with what noise leaves; where it is more, all logarithms are divided by the ratio, so that a
+model that is not quite right is not quite sure.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 
 import numpy as np
 
 from ...types import Array
-from .fault_catalogue import Form, Parameter, variances
+from .fault_catalogue import Parameter, variances
 
-UNKNOWN, UNKNOWN_PRIOR = "unknown", 0.01
-SLOWEST = 6.0  # s
+STEADY, GROWING = 0, 1
+GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
+CRUDE = 0.003  # see above
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What some blocks say.
+    """What some blocks say, of coefficients of faults.
 
     Attributes
     ----------
-    matrix, vector : ndarray, shape (parameters, parameters), (parameters,)
+    matrix, vector : ndarray, shape (coefficients, coefficients), (coefficients,)
         L and l.
     squares : float
-        Sum of the squares of the innovations, all parameters 0.
-    rows : int
-        Their number.
-    log, unknown : float
-        Logarithm of their probability with all parameters 0, and with an unknown fault.
+        Sum of the squares of the innovations, all coefficients 0.
+    rows : float
+        Their number; less where they count less.
+    log : float
+        Logarithm of their probability with all coefficients 0.
     """
 
     matrix: Array
     vector: Array
     squares: float
-    rows: int
+    rows: float
     log: float
-    unknown: float
 
     @staticmethod
-    def none(parameters: int) -> Evidence:
+    def none(coefficients: int) -> Evidence:
         """Of no blocks."""
-        return Evidence(np.zeros((parameters, parameters)), np.zeros(parameters), 0.0, 0, 0.0, 0.0)
+        return Evidence(np.zeros((coefficients, coefficients)), np.zeros(coefficients), 0.0, 0, 0.0)
 
     @staticmethod
-    def of(white: Array, log: float, unknown: float) -> Evidence:
-        """Of one block, from whitened innovations, shape (rows, 1 + parameters)."""
+    def of(white: Array, log: float) -> Evidence:
+        """Of one block, from whitened innovations, shape (rows, 1 + coefficients)."""
         left, signature = white[:, 0], white[:, 1:]
         matrix, vector = np.asarray(signature.T @ signature), np.asarray(signature.T @ left)
-        return Evidence(matrix, vector, float(left @ left), len(left), log, unknown)
+        return Evidence(matrix, vector, float(left @ left), len(left), log)
+
+    def weighted(self, weight: float) -> Evidence:
+        """Counting `weight` times as much."""
+        matrix, vector = weight * self.matrix, weight * self.vector
+        return Evidence(matrix, vector, weight * self.squares, weight * self.rows, weight * self.log)
 
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(
             self.matrix + other.matrix, self.vector + other.vector, self.squares + other.squares, self.rows + other.rows,
-            self.log + other.log, self.unknown + other.unknown,
-        )  # fmt: skip
-
-    def turned(self, turn: Array) -> Evidence:
-        """Of other parameters, of which these are `turn` times."""
-        return Evidence(
-            turn.T @ self.matrix @ turn, turn.T @ self.vector, self.squares, self.rows, self.log, self.unknown
+            self.log + other.log,
         )  # fmt: skip
 
     def given(self, mean: Array, covariance: Array) -> Evidence:
-        """With healthy deviations of all parameters integrated out: L', l', squares and logarithm that are then left."""
-        vector = self.vector - self.matrix @ mean
-        spread = np.eye(len(mean)) + self.matrix @ covariance
-        solved = np.linalg.solve(spread, np.column_stack([self.matrix, vector]))
-        matrix, reduced = solved[:, :-1], solved[:, -1]
+        """With healthy deviations of the first coefficients integrated out: L', l', squares and logarithm that are then left.
+
+        Parameters
+        ----------
+        mean, covariance : ndarray, shape (k,), (k, k)
+            Of the first k coefficients; the others have none.
+        """
+        k = len(mean)
+        vector = self.vector - self.matrix[:, :k] @ mean
+        spread = np.eye(k) + self.matrix[:k, :k] @ covariance
+        solved = np.linalg.solve(spread, np.column_stack([self.matrix[:k], vector[:k]]))
         _, log_det = np.linalg.slogdet(spread)
-        fitted = 2.0 * float(self.vector @ mean) - float(mean @ self.matrix @ mean) + float(vector @ covariance @ reduced)
+        way = self.matrix[:, :k] @ covariance
+        matrix, reduced = self.matrix - way @ solved[:, :-1], vector - way @ solved[:, -1]
+        fitted = float((self.vector + vector)[:k] @ mean) + float(vector[:k] @ covariance @ solved[:, -1])
         log = self.log + 0.5 * (fitted - float(log_det))
-        symmetric: Array = np.asarray(0.5 * (matrix + matrix.T))
-        return Evidence(symmetric, np.asarray(reduced), self.squares - fitted, self.rows, log, self.unknown)
+        return Evidence(np.asarray(0.5 * (matrix + matrix.T)), np.asarray(reduced), self.squares - fitted, self.rows, log)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +109,30 @@ class Explanation:
 
     Attributes
     ----------
-    place : int or None
-        Its parameter; None for a fault that is unknown.
+    place : int
+        Its parameter.
+    level : int
+        Of the load at the tip, from 0, that goes best with it.
     log_factor : float
-        ln of how much more probable the measurements are than without a fault.
+        ln of how much more probable the measurements are than without a fault, each with the load that goes best with it.
     value, sigma : float
-        Estimate and deviation of the parameter.
+        Estimate and deviation of the parameter, now.
+    rate, rate_sigma : float
+        Of its growth, per s; 0 where it is steady.
     """
 
-    place: int | None
+    place: int
+    level: int
     log_factor: float
-    value: float = 0.0
-    sigma: float = 0.0
+    value: float
+    sigma: float
+    rate: float = 0.0
+    rate_sigma: float = 0.0
+
+    @property
+    def is_growing(self) -> bool:
+        """Whether it has that shape, and it shows."""
+        return abs(self.rate) > 4.0 * self.rate_sigma
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +153,13 @@ class Verdict:
     causes : tuple of Cause
     excess : float
         Squares that the best explanation leaves over those that noise leaves, at least 1.
+    level : int
+        Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
     """
 
     causes: tuple[Cause, ...]
     excess: float
+    level: int
 
     @property
     def best(self) -> Explanation:
@@ -139,12 +168,12 @@ class Verdict:
 
     @property
     def strength(self) -> float:
-        """ln of how much more probable the best explanation is than no fault, with the excess taken into account."""
-        return self.best.log_factor / self.excess
+        """ln of how much more probable a fault is than none, with the excess taken into account."""
+        return max(part.log_factor for cause in self.causes for part in cause.parts) / self.excess
 
 
 class HypothesisTest:
-    """Explains evidence.
+    """Explains evidence. Coefficients: of every parameter what it is at the beginning, then of every one its rate.
 
     Parameters
     ----------
@@ -156,56 +185,107 @@ class HypothesisTest:
         self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
         self._faulty = variances(known, "faulty")[self._places]
         self._one_sided = np.array([known[i].one_sided for i in self._places])
-        self._drifts = np.array([known[i].form is Form.DRIFT for i in self._places])
-        self._priors = np.log([*(known[i].prior for i in self._places), UNKNOWN_PRIOR])
+        self._priors = np.log([known[i].prior for i in self._places])
 
-    def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float) -> Verdict:
+    def explain(
+        self, evidence: Sequence[Evidence], mean: Array, covariance: Array, span: float, carried: Mapping[str, float]
+    ) -> Verdict:
         """Weigh all faults.
 
         Parameters
         ----------
-        evidence : Evidence
+        evidence : sequence of Evidence
+            By level of the load at the tip.
         mean, covariance : ndarray
             Of the parameters while all was well.
         span : float
-            Time (s) that the evidence has taken: what changes within less than `SLOWEST` is no drift.
+            Time (s) that the evidence has taken.
+        carried : mapping of str to float
+            ln of how probable causes were before this evidence; 0 for others.
 
         Returns
         -------
         Verdict
             How well each fault explains the evidence, and how large it would be.
         """
-        from scipy.special import log_ndtr  # a twin that is well need not wait for it
+        healthy = [each.given(mean, covariance) for each in evidence]
+        logs = np.array([each.log for each in healthy])
+        steady = np.array([self._steady(each) for each in healthy])
+        growing = np.array([self._growing(each, span) for each in healthy])
+        fits = np.concatenate([steady, growing], axis=2)  # (levels, numbers, shapes * places)
+        factors = fits[:, 0] + (logs - logs.max())[:, None]
+        squares = np.array([each.squares for each in healthy])[:, None] - fits[:, 1]
+        best = np.unravel_index(int(np.argmax(factors)), factors.shape)
+        excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1.0))
+        priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
+        weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
+        shares = np.exp(weights - weights.max())
+        shares = shares.sum(axis=0) / shares.sum()
+        levels = np.argmax(factors, axis=0)
+        found = [
+            Explanation(int(place), level, float(factors[level, i]), *fits[level, 2:, i].tolist())
+            for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
+        ]
+        is_faulty = float(factors[best]) > 0.0
+        return Verdict(self._grouped(found, shares), excess, int(best[0]) if is_faulty else int(np.argmax(logs)))
 
-        healthy = evidence.given(mean, covariance)
+    def _steady(self, healthy: Evidence) -> Array:
+        """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (6, places)."""
         matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
         spread = self._faulty / (1.0 + self._faulty * matrix)
         values, sigmas = spread * vector, np.sqrt(spread)
-        fitted = vector * values
-        factors = 0.5 * fitted - 0.5 * np.log1p(self._faulty * matrix)
-        factors += np.where(self._one_sided, log_ndtr(values / sigmas) + log(2.0), 0.0)
-        excess = max(1.0, (healthy.squares - float(fitted.max())) / max(healthy.rows, 1))
-        weights = np.append(factors, healthy.unknown - healthy.log) / excess + self._priors
-        weights[:-1][self._drifts & (span < SLOWEST)] = -np.inf
-        shares = np.exp(weights - weights.max())
-        found = [Explanation(int(p), *each) for p, *each in zip(self._places, factors, values, sigmas, strict=True)]
-        found.append(Explanation(None, healthy.unknown - healthy.log))
-        return Verdict(self._grouped(found, shares / shares.sum()), excess)
+        factors = 0.5 * vector * values - 0.5 * np.log1p(self._faulty * matrix) + self._sided(values, sigmas)
+        none = np.zeros_like(values)
+        return np.stack([factors, vector * values, values, sigmas, none, none])
+
+    def _growing(self, healthy: Evidence, span: float) -> Array:
+        """Likewise of faults that grow; values are those at the end of `span` (s)."""
+        count = len(self.known)
+        pairs = np.stack([self._places, self._places + count], axis=1)
+        vector = healthy.vector[pairs]
+        prior = np.stack([self._faulty, self._faulty / GROWN**2], axis=1)
+        matrix = healthy.matrix[pairs[:, :, None], pairs[:, None, :]]
+        scaled = np.eye(2) + np.sqrt(prior)[:, :, None] * matrix * np.sqrt(prior)[:, None, :]
+        spread = np.sqrt(prior)[:, :, None] * np.linalg.inv(scaled) * np.sqrt(prior)[:, None, :]
+        found = (spread @ vector[:, :, None])[:, :, 0]
+        explained = (vector * found).sum(axis=1)
+        now = np.array([1.0, span])
+        values, sigmas = found @ now, np.sqrt(np.einsum("i,pij,j->p", now, spread, now))
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + log(GROWING_PRIOR)
+        return np.stack([factors, explained, values, sigmas, found[:, 1], np.sqrt(spread[:, 1, 1])])
+
+    def _sided(self, values: Array, sigmas: Array) -> Array:
+        """What it adds to the log factor that some faults are positive."""
+        from scipy.special import log_ndtr  # a twin that is well need not wait for it
+
+        return np.where(self._one_sided, log_ndtr(values / sigmas) + log(2.0), 0.0)
 
     def _grouped(self, found: list[Explanation], shares: Array) -> tuple[Cause, ...]:
         groups: dict[str, list[int]] = {}
-        for i in np.argsort(-shares).tolist():
-            place = found[i].place
-            groups.setdefault(UNKNOWN if place is None else self.known[place].cause, []).append(i)
+        for i in np.argsort(-shares, kind="stable").tolist():
+            groups.setdefault(self.known[found[i].place].cause, []).append(i)
         causes = [Cause(name, float(shares[at].sum()), tuple(found[i] for i in at)) for name, at in groups.items()]
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
-    def support(self, evidence: Evidence, each: Explanation, mean: Array, covariance: Array) -> float:
-        """ln of how much more probable `evidence` is with that fault, of the size that is estimated, than without any."""
-        healthy = evidence.given(mean, covariance)
-        if each.place is None:
-            return healthy.unknown - healthy.log
-        return float(each.value * (healthy.vector[each.place] - 0.5 * each.value * healthy.matrix[each.place, each.place]))
+    def fit(self, evidence: Sequence[Evidence], coefficients: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
+        """How well faults of known coefficients, shape (2 * parameters,), go with evidence.
+
+        Returns
+        -------
+        logs, squares : ndarray, shape (levels,)
+            By level of the load: ln of how probable the measurements are, and squares left over those that noise leaves.
+        """
+        healthy = [level.given(mean, covariance) for level in evidence]
+        fitted = np.array([2.0 * each.vector @ coefficients - coefficients @ each.matrix @ coefficients for each in healthy])
+        logs = np.array([each.log for each in healthy]) + 0.5 * fitted
+        squares = np.array([each.squares for each in healthy]) - fitted
+        return logs, squares / max(healthy[0].rows, 1.0)
+
+    def coefficients(self, each: Explanation, span: float) -> Array:
+        """Of the fault alone, `span` (s) after its evidence began; shape (2 * parameters,)."""
+        found = np.zeros(2 * len(self.known))
+        found[[each.place, each.place + len(self.known)]] = each.value - each.rate * span, each.rate
+        return found
 
 
 GATE = 4.5  # deviations

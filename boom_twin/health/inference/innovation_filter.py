@@ -14,6 +14,12 @@ vibration.
 And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
 a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
 
+A third one is a force at the tip that the model does not know, by a pump or the wind: a Gauss-Markov process of a given level
+(N, standard deviation of each component) and correlation time `LOAD_TIME`, about a mean that is not known either, as a pump's
+thrust has one, of `MEAN` times that level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
+How large the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured
+tells.
+
 A Kalman filter on all these turns the means of residuals in blocks into innovations: white and of unit variance while all is
 well, but for what parameters add. Its gains do not depend on what is measured, so the same filter run over the signature of a
 parameter tells how that parameter shows in the innovations (Willsky and Jones 1976).
@@ -39,6 +45,10 @@ LEAST_DAMPING = 2e-4  # of omega, so that every mode has a finite variance
 SHAPE = 0.5  # see above
 REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
+LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
+ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
+MEAN = 1.0  # see above
+LOAD = 4  # states of the load: x and y about the mean, and the mean's
 
 
 class ModalStates(NamedTuple):
@@ -57,6 +67,10 @@ class ModalStates(NamedTuple):
         How the means of the channels read them.
     shaken : ndarray, shape (c,)
         Mean square of what they read while the mean square of the tip's acceleration is 1 (m/s^2)^2.
+    pushed : ndarray, shape (2 m, 2)
+        What a force of 1 N at the tip along x and y makes of coordinates and rates within a block.
+    lifted : ndarray, shape (c, 2)
+        What the channels read of it at once: the acceleration of these modes, the deflection of the others.
     """
 
     frequencies: Array
@@ -66,28 +80,38 @@ class ModalStates(NamedTuple):
     rest: Array
     shown: Array
     shaken: Array
+    pushed: Array
+    lifted: Array
 
 
 def modes_of(
     noise: StrokeNoise, plan: Plan, state: State, work: Work, reading: Reading, block: float, before: ModalStates | None
 ) -> ModalStates:
     """The modes of a posture, where the boom is at rest in `state`, for blocks of `block` s; of the signs of those `before`."""
-    kept = [j for j, mode in enumerate(noise.modes) if mode.frequency < HIGHEST]
-    size, n, tip, h = len(kept), plan.joints, plan.tables.tip, block
+    size, n, tip, h = sum(mode.frequency < HIGHEST for mode in noise.modes), plan.joints, plan.tables.tip, block
     turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
-    shown, shaken = np.zeros((n + 2, 2 * size)), np.zeros(n + 2)
-    for k, j in enumerate(kept):
-        mode, omega, at = noise.modes[j], 2.0 * math.pi * noise.modes[j].frequency, slice(2 * k, 2 * k + 2)
-        turn[at, at] = own = oscillation(omega, max(noise.decay[j], LEAST_DAMPING * omega), h)
-        rest[at, at] = noise.collected[j] * np.diag([1.0, omega * omega])
+    shown, shaken, pushed, lifted = np.zeros((n + 2, 2 * size)), np.zeros(n + 2), np.zeros((2 * size, 2)), np.zeros((n + 2, 2))
+    for k, mode in enumerate(noise.modes):
+        omega, motion = 2.0 * math.pi * mode.frequency, mode.motion[tip : tip + 2]
+        still, felt = _read(plan, state, work, mode, reading)
+        if k >= size:
+            lifted += np.outer(still, motion) / omega**2
+            continue
+        at, swing = slice(2 * k, 2 * k + 2), max(float(np.hypot(*motion)), 1e-12)
+        turn[at, at] = own = oscillation(omega, max(noise.decay[k], LEAST_DAMPING * omega), h)
+        rest[at, at] = noise.collected[k] * np.diag([1.0, omega * omega])
         least[at, at] = rest[at, at] - own @ rest[at, at] @ own.T
-        swing = max(float(np.hypot(*mode.motion[tip : tip + 2])), 1e-12)
         driven[at, at] = KEEPS_STEP / swing**2 * np.array([[h**3 / 3.0, h * h / 2.0], [h * h / 2.0, h]])
-        shown[:, 2 * k] = np.sinc(mode.frequency * h) * _shown(plan, state, work, mode, reading)
+        swinging, passed = still - omega**2 * felt, float(np.sinc(mode.frequency * h))
+        shown[:, 2 * k] = passed * swinging
+        pushed[at] = np.outer([(1.0 - own[0, 0]) / omega**2, -own[1, 0] / omega**2], motion)
+        lifted += np.outer(felt + (1.0 - passed) * swinging / omega**2, motion)  # no mean of a block lessens what rests
         if before is not None and 2 * k < before.shown.shape[1] and shown[:, 2 * k] @ before.shown[:, 2 * k] < 0.0:
             shown[:, 2 * k] *= -1.0
+            pushed[at] *= -1.0
         shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
-    return ModalStates(np.array([noise.modes[j].frequency for j in kept]), turn, least, driven, rest, shown, shaken)
+    frequencies = np.array([mode.frequency for mode in noise.modes[:size]])
+    return ModalStates(frequencies, turn, least, driven, rest, shown, shaken, pushed, lifted)
 
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
@@ -95,15 +119,13 @@ def oscillation(omega: float, decay: float, h: float) -> Array:
     return np.array(oscillate(omega, decay, h)).reshape(2, 2)
 
 
-def _shown(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> Array:
-    """How the sensors read a unit of a mode's coordinate, shape (n + 2,): angles, and the IMU's axes with the acceleration."""
-    n, omega = plan.joints, 2.0 * math.pi * mode.frequency
-    angle = float(state.frames[-1, FRAME_ANGLE])
-    shown = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
-    ax, ay = -omega * omega * mode.motion[plan.tables.tip : plan.tables.tip + 2]
-    c, s = math.cos(angle), math.sin(angle)
-    shown[n:] += np.array(specific_force(ax, ay, c, s))
-    return shown
+def _read(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> tuple[Array, Array]:
+    """How the sensors read a mode's coordinate that rests at 1, and its acceleration of 1; shape (n + 2,) each."""
+    n, angle = plan.joints, float(state.frames[-1, FRAME_ANGLE])
+    still = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
+    felt = np.zeros(n + 2)
+    felt[n:] = specific_force(*mode.motion[plan.tables.tip : plan.tables.tip + 2], math.cos(angle), math.sin(angle))
+    return still, felt
 
 
 class Innovations(NamedTuple):
@@ -131,11 +153,16 @@ class InnovationFilter:
         Length of a block, s.
     detuning : float
         Share by which natural frequencies may be wrong.
+    level : float
+        Of the unknown load, N.
     """
 
-    def __init__(self, channels: int, columns: int, block: float, detuning: float) -> None:
-        self._block, self._detuning2, self._channels = block, detuning**2, channels
-        self._x, self._p = np.zeros((channels, columns)), np.zeros((channels, channels))
+    def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float = 0.0) -> None:
+        self._block, self._detuning2, self._channels, self._level2 = block, detuning**2, channels, level**2
+        self._x, self._p = np.zeros((LOAD + channels, columns)), np.zeros((LOAD + channels, LOAD + channels))
+        self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
+        self._p[:LOAD, :LOAD] = np.diag(self._stationary)
+        self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
         self._posture: ModalStates | None = None
 
@@ -143,18 +170,26 @@ class InnovationFilter:
         """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
         if modes is self._posture:
             return
-        self._posture = modes
-        size, old, c = len(modes.turn), self._size, self._channels
+        is_first, self._posture = self._posture is None, modes
+        size, old, others = len(modes.turn), self._size, LOAD + self._channels
         kept = min(size, old)
-        places = [*range(kept), *range(old, old + c)]
-        at = [*range(kept), *range(size, size + c)]
-        x, p = np.zeros((size + c, self._x.shape[1])), np.zeros((size + c, size + c))
+        places = [*range(kept), *range(old, old + others)]
+        at = [*range(kept), *range(size, size + others)]
+        x, p = np.zeros((size + others, self._x.shape[1])), np.zeros((size + others, size + others))
         p[:size, :size] = modes.rest
         x[at], p[np.ix_(at, at)] = self._x[places], self._p[np.ix_(places, places)]
         self._x, self._p, self._size = x, p, size
-        self._turn, self._least, self._driven = modes.turn, modes.least, self._detuning2 * modes.driven
+        self._least, self._driven = modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
-        self._shown = np.hstack([modes.shown, np.eye(c)])
+        at_once = self._level2 * (modes.lifted**2).sum(axis=1)
+        self._rough, self._pushed = ROUGH**2 * at_once, float(at_once[-2:].sum())
+        self._turn = np.eye(size + LOAD)
+        self._turn[:size, :size] = modes.turn
+        self._turn[:size, size:] = np.hstack([modes.pushed, modes.pushed])
+        self._turn[size:, size:] = np.diag(self._kept)
+        self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
+        if is_first:
+            self._p[:size, :size] += _swung(modes, self._level2)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
         """Innovations of one block.
@@ -177,13 +212,14 @@ class InnovationFilter:
         Innovations
             Of the channels that were measured, and the probability of the residuals among them.
         """
+        shaking += self._pushed
         self._go_on(errors2, shaking, travel)
         rows = np.isfinite(table[:, 0])
         if not rows.any():
             return Innovations(table[:0], 0.0)
         shown = self._shown[rows]
         cross = self._p @ shown.T
-        own = (noise + np.diag(shaking * self._shaken))[np.ix_(rows, rows)]
+        own = (noise + np.diag(shaking * self._shaken + self._rough))[np.ix_(rows, rows)]
         root = np.linalg.cholesky(shown @ cross + own)
         white = np.linalg.solve(root, np.hstack([table[rows] - shown @ self._x, cross.T]))
         innovation, cross = white[:, : table.shape[1]], white[:, table.shape[1] :]
@@ -194,14 +230,25 @@ class InnovationFilter:
 
     def _go_on(self, errors2: Array, shaking: float, travel: float) -> None:
         """To the next block, before it is measured."""
-        m = self._size
+        m, at = self._size, self._size + LOAD
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
-        self._x[:m] = self._turn @ self._x[:m]
-        self._x[m:] *= kept
-        self._p[:m] = self._turn @ self._p[:m]
-        self._p[:, :m] = self._p[:, :m] @ self._turn.T
-        self._p[m:] *= kept
-        self._p[:, m:] *= kept
+        self._x[:at] = self._turn @ self._x[:at]
+        self._x[at:] *= kept
+        self._p[:at] = self._turn @ self._p[:at]
+        self._p[:, :at] = self._p[:, :at] @ self._turn.T
+        self._p[at:] *= kept
+        self._p[:, at:] *= kept
         self._p[:m, :m] += self._least + shaking * self._driven
-        self._p[m:, m:] += np.diag((1.0 - kept * kept) * errors2)
+        self._p[m:at, m:at] += np.diag((1.0 - self._kept**2) * self._stationary)
+        self._p[at:, at:] += np.diag((1.0 - kept * kept) * errors2)
+
+
+def _swung(modes: ModalStates, level2: float) -> Array:
+    """Covariance of the modes' coordinates, shape (2 m, 2 m), that a load of this level has brought about before the start."""
+    turn, pushed = modes.turn, modes.pushed
+    still = np.linalg.solve(np.eye(len(turn)) - turn, pushed) if len(turn) else pushed
+    omegas = 2.0 * math.pi * np.repeat(modes.frequencies, 2)
+    spread = (1.0 + MEAN**2) * level2 * (still**2).sum(axis=1)
+    spread[1::2] = spread[0::2] * omegas[0::2] ** 2
+    return np.diag(spread)

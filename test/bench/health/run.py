@@ -1,10 +1,11 @@
-"""The benchmark of health: sessions of the virtual rig with and without faults through the twin, all cores.
+"""The benchmark of health: sessions of the virtual rig, drawn at random, through the twin.
 
-    python test/bench/health/sessions.py --out out/health/sessions      # makes the sessions, an hour or two
+    python test/bench/health/sessions.py --out out/health/sessions --count 200   # makes them
     python test/bench/health/run.py --sessions out/health/sessions --out out/health
+    python test/bench/health/table.py out/health/outcomes.jsonl
 
-Learns a baseline for every rig from its learning sessions, replays all others, and keeps what was told of each in
-``outcomes.json``; what is there already is not done again. `table.py` makes the tables.
+Learns a baseline for every rig that is not the scene's own, replays all other sessions, and keeps what was told of each as a
+row of ``outcomes.jsonl``; what is there already is not done again. Sessions that are held out need ``--held-out``.
 """
 
 from __future__ import annotations
@@ -17,79 +18,73 @@ from pathlib import Path
 from typing import Any
 
 import stored
-from tqdm import tqdm
+from scenarios import RIGS, Scenario, learning, scenario
 
 from boom_twin import Twin, load_scene
 from boom_twin.calibration.baseline import learn_baseline
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.types import Alarm
+from boom_twin.twin.blocks import ReportBlock, block_of
+from boom_twin.types import NANO, Alarm, Health, Sample
 
-NANO = 1e-9
-CALM, LOAD = 1.0, 0.25  # s over which a force is averaged; share of it that counts as a change of load
+AT_ONCE = 400  # samples
 
 
 def main(args: Namespace) -> None:
     """Learn, replay, keep."""
-    out = args.out
-    out.mkdir(parents=True, exist_ok=True)
-    entries = [entry for entry in stored.entries(args.sessions) if (args.sessions / entry["file"]).is_file()]
-    _learn(args, entries)
-    kept = out / "outcomes.json"
-    outcomes = json.loads(kept.read_text()) if kept.is_file() else {}
-    wanted = [e for e in entries if e["group"] != "learn" and e["file"] not in outcomes and args.only in e["file"]]
-    wanted = [e for e in wanted if e["group"] != "physical" or int(e["file"][-6:-4]) < args.most]
-    wanted = [e for e in wanted if e["group"] != "sensor" or int(e["file"][-6:-4]) < args.most]
-    with Pool(args.cores, maxtasksperchild=20) as pool:
-        for entry, outcome in tqdm(pool.imap_unordered(partial(_outcome, args.sessions, out), wanted), total=len(wanted)):
-            outcomes[entry["file"]] = entry | outcome
-            stored.save_json(kept, outcomes)
+    args.out.mkdir(parents=True, exist_ok=True)
+    for rig in range(1, RIGS):
+        _learn(rig, args.sessions, args.out)
+    kept = args.out / "outcomes.jsonl"
+    done = {json.loads(line)["number"] for line in kept.read_text().splitlines()} if kept.is_file() else set()
+    numbers = sorted(int(path.stem[-4:]) for path in args.sessions.glob("session_*.npz"))
+    wanted = [each for each in map(scenario, numbers) if each.number not in done and each.is_held_out == args.held_out]
+    if args.only:
+        wanted = [each for each in wanted if each.number in args.only]
+    with Pool(args.jobs, maxtasksperchild=20) as pool, kept.open("a") as file:
+        for row in pool.imap_unordered(partial(outcome, args.sessions, args.out), wanted):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
 
 
-def _learn(args: Namespace, entries: list[dict[str, Any]]) -> None:
-    """One baseline for each rig; that of the right model is the package's own."""
-    for instance in sorted({entry["instance"] for entry in entries} - {0}):
-        path = args.out / f"baseline_{instance}.json"
-        if not path.is_file():
-            files = [entry["file"] for entry in entries if entry["group"] == "learn" and entry["instance"] == instance]
-            sessions = [stored.samples(stored.load(args.sessions / file)) for file in files]
-            learnt = learn_baseline(load_scene(), Settings(), sessions, [Path(file).name for file in files])
-            path.write_text(learnt.model_dump_json())
+def baseline_file(out: Path, rig: int) -> Path:
+    """Where the baseline of a rig is kept."""
+    return out / f"baseline_{rig}.json"
 
 
-def _outcome(sessions: Path, out: Path, entry: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Everything that was told of one session: each alarm at each of its changes."""
-    path = out / f"baseline_{entry['instance']}.json"
-    twin = Twin(load_scene(), baseline=load_baseline(path) if entry["instance"] else Baseline())
-    arrays = stored.load(sessions / entry["file"])
+def _learn(rig: int, sessions: Path, out: Path) -> None:
+    path = baseline_file(out, rig)
+    if not path.is_file():
+        own = [each for each in learning() if each.rig == rig]
+        names = [stored.path_of(sessions, each).name for each in own]
+        learnt = learn_baseline(load_scene(), Settings(), [stored.load_samples(sessions, each) for each in own], names)
+        path.write_text(learnt.model_dump_json())
+
+
+def outcome(sessions: Path, out: Path, each: Scenario) -> dict[str, Any]:
+    """What is true of a session and everything that was told of it: each alarm at each of its changes."""
+    twin = Twin(load_scene(), baseline=load_baseline(baseline_file(out, each.rig)) if each.rig else Baseline())
     told: list[dict[str, Any]] = []
-    last: dict[tuple[str, int], tuple[Any, ...]] = {}
-    for sample in stored.samples(arrays):
-        health = twin.update(sample).health
-        for alarm in () if health is None else health.alarms:
-            state = (alarm.cause, alarm.kind, alarm.until, tuple(each.cause for each in alarm.ranked[:2]))
-            if last.get((alarm.channel, alarm.since)) != state:
-                last[alarm.channel, alarm.since] = state
-                told.append(_told(alarm, sample.stamp))
-    seconds = float(arrays["stamps"][-1] - stored.EPOCH) * NANO
-    return entry, {"told": told, "telling_move_end": _telling_move(entry, arrays), "seconds": seconds}
+    last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
+    samples = stored.load_samples(sessions, each)
+    for first in range(0, len(samples), AT_ONCE):
+        for health in _health(twin, samples[first : first + AT_ONCE]):
+            for alarm in health.alarms:
+                key = alarm.channel, alarm.since, alarm.kind if alarm.cause is None else alarm.cause
+                state = alarm.until, tuple(rank.cause for rank in alarm.ranked[:2])
+                if last.get(key) != state:
+                    last[key] = state
+                    told.append(_told(alarm, health.stamp))
+    return each.row | {"told": told}
 
 
-def _telling_move(entry: dict[str, Any], arrays: Any) -> float | None:
-    """End (s) of the first move after the fault began that changes the load: of the soft cylinder, by a quarter at least."""
-    moves, times = arrays["moves"], (arrays["stamps"] - stored.EPOCH) * NANO
-    begin = entry["onset"] or 0.0
-    forces = arrays["true_forces"]
-    for end in sorted(end for end in (moves[:, 1] + moves[:, 2]).tolist() if end > begin):
-        cause = entry["cause"] or ""
-        if not (cause.startswith("cylinder_") and cause.endswith(".k")):
-            return float(end)
-        force = forces[:, int(cause[9]) - 1]
-        before = force[(times >= begin) & (times <= begin + CALM)].mean()
-        after = force[(times >= end) & (times <= end + CALM)].mean()
-        if abs(after - before) > LOAD * abs(before):
-            return float(end)
-    return None
+def _health(twin: Twin, samples: list[Sample]) -> list[Health]:
+    """What the twin tells of its health while it takes these samples."""
+    found: list[Health] = []
+    for report in twin.update_block(block_of(samples, len(twin.scene.joints))):
+        each = report.health.values() if isinstance(report, ReportBlock) else [report.health]
+        found += [health for health in each if health is not None]
+    return found
 
 
 def _told(alarm: Alarm, stamp: int) -> dict[str, Any]:
@@ -101,7 +96,7 @@ def _told(alarm: Alarm, stamp: int) -> dict[str, Any]:
         "until": None if alarm.until is None else (alarm.until - stored.EPOCH) * NANO,
         "cause": alarm.cause,
         "told": alarm.told,
-        "ranked": [[each.cause, each.probability, list(each.parts)] for each in alarm.ranked],
+        "ranked": [[rank.cause, rank.probability, list(rank.parts)] for rank in alarm.ranked],
     }
 
 
@@ -109,7 +104,7 @@ if __name__ == "__main__":
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--only", default="", help="sessions whose file has this in its name")
-    parser.add_argument("--most", type=int, default=20, help="sessions of each fault and size")
-    parser.add_argument("--cores", type=int, default=None)
+    parser.add_argument("--held-out", action="store_true", help="only the sessions that are held out")
+    parser.add_argument("--only", type=int, nargs="*", help="numbers")
+    parser.add_argument("--jobs", type=int, default=None)
     main(parser.parse_args())

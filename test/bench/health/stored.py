@@ -1,46 +1,37 @@
 """Sessions of the health benchmark as they lie on disk; needs no Exudyn.
 
-A file holds ``stamps``, ``angle_stamps`` (m,) ns; ``strokes``, ``joints`` (m, n) and ``imu`` (m, 2) as read, NaN where a
-reading is missing; the truth at the same instants as ``true_strokes``, ``true_joints``, ``true_forces`` (m, n), ``true_tip``,
-``true_tip_acc`` (m, 2), ``true_tip_angle`` (m,); and the programme as ``first`` (n,) strokes and ``moves`` (k, 4): cylinder
-from 0, start, duration, target. SI.
-
-``index.json`` beside the files has an entry for each: ``file``, ``group``, ``instance`` (0 is the right model), ``cause``,
-``kind``, ``size``, ``onset`` (s), which are null of healthy ones, ``seed``, ``duration`` (s), and ``posture``, or ``base``: the
-healthy file that a sensor fault was put on. ``instances.json`` has the parameters of every instance by name.
+A file holds ``stamps``, ``angle_stamps`` (m,) ns, and ``strokes``, ``joints``, ``forces`` (m, n) and ``imu`` (m, 2) as read,
+NaN where a reading is missing. SI.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scenarios import Scenario
 
 from boom_twin.bag.session_files import samples_of
 from boom_twin.types import Sample
 
 EPOCH = 1_700_000_000_000_000_000  # ns, the start of every session
-INDEX = "index.json"
+ARRAYS = ("stamps", "strokes", "joints", "imu", "angle_stamps", "forces")
+STREAMS = {"angles": "joints", "imu": "imu", "forces": "forces"}
 
 
-def entries(folder: Path) -> list[dict[str, Any]]:
-    """The index: one entry per finished session, most wanted first."""
-    return list(json.loads((folder / INDEX).read_text()))
+def path_of(folder: Path, each: Scenario) -> Path:
+    """Its file."""
+    return folder / (f"learn_{-each.number:02d}.npz" if each.number < 0 else f"session_{each.number:04d}.npz")
 
 
-def load(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of a file."""
-    with np.load(path) as file:
-        return {name: file[name] for name in file.files}
-
-
-def samples(arrays: Mapping[str, np.ndarray]) -> list[Sample]:
-    """What the twin takes, in the order of stamps; messages that were lost are not there."""
-    return samples_of(*(arrays[name] for name in ("stamps", "strokes", "joints", "imu", "angle_stamps")))
+def load_samples(folder: Path, each: Scenario) -> list[Sample]:
+    """What the twin takes, in the order of stamps; streams that are not recorded and messages that were lost are not there."""
+    with np.load(path_of(folder, each)) as file:
+        arrays = {name: file[name] for name in ARRAYS}
+    left_out = [name for stream, name in STREAMS.items() if stream not in each.streams]
+    return samples_of(*(None if name in left_out else arrays[name] for name in ARRAYS))
 
 
 def save(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -49,11 +40,4 @@ def save(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     draft = path.with_suffix(f".{os.getpid()}.part")
     with draft.open("wb") as file:
         np.savez_compressed(file, **arrays)
-    draft.replace(path)
-
-
-def save_json(path: Path, content: Any) -> None:
-    """Write a file whole or not at all."""
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(content, indent=1))
     draft.replace(path)

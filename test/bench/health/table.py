@@ -1,156 +1,150 @@
 """Tables of the health benchmark, from what `run.py` kept.
 
-    python test/bench/health/table.py out/health/outcomes.json
+    python test/bench/health/table.py out/health/outcomes.jsonl [--each]
 
-A fault is detected by an alarm that began no earlier than half a second before it; alarms before that, and in healthy sessions,
-are false. `first`: the cause that is named half a second after the first move that changes the load (sessions
-without one do not count); `end`: the
-one named last, if one still is; `ranked`: the cause stands first, or among the first two, at the end. Intervals are
-Wilson's, 95 %.
+A name is right if it is the cause of a fault that has begun when it is told; any other name is wrong, and every alarm of a
+healthy session is a false one. `alarm`: one was told of after the fault's onset, named or not. Intervals are Wilson's, 95 %;
+rates of false alarms those of a Poisson process.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import sys
-from collections import defaultdict
+from argparse import ArgumentParser
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from scipy.stats import chi2
 
-EARLY, AFTER = 0.5, 0.5  # s
-Outcome = dict[str, Any]
+from boom_twin.validation.rig.faults import RigFault, parse
+
+EARLY = 0.5  # s by which an alarm may seem to begin before its fault
+Row = dict[str, Any]
 
 
-def main(path: Path) -> None:
-    """Print both tables as Markdown."""
-    outcomes = list(json.loads(path.read_text()).values())
-    print("\n".join([*healthy(outcomes), "", *faulty(outcomes)]))
+def faults_of(row: Row) -> list[RigFault]:
+    """That the session has."""
+    return [parse(text) for text in row["faults"]]
 
 
-def healthy(outcomes: list[Outcome]) -> list[str]:
-    """False alarms per group."""
-    lines = ["| sessions | hours | false alarms | per day, 95 % |", "|---|---|---|---|"]
-    for group, name in (("test", "healthy, wrong by 2 %, learnt baseline"), ("right", "healthy, right model, own baseline")):
-        own = [outcome for outcome in outcomes if outcome["group"] == group]
-        hours = sum(outcome["seconds"] for outcome in own) / 3600.0
-        count = sum(len(alarms(outcome)) for outcome in own)
-        if own:
-            low, high = (0.5 * chi2.ppf(0.025, 2 * count) if count else 0.0), 0.5 * chi2.ppf(0.975, 2 * count + 2)
-            lines.append(f"| {len(own)} {name} | {hours:.2f} | {count} | {24 * low / hours:.1f} to {24 * high / hours:.1f} |")
-    return lines
-
-
-def faulty(outcomes: list[Outcome]) -> list[str]:
-    """A line for each fault and size."""
-    groups: dict[tuple[str, str, float, str], list[Outcome]] = defaultdict(list)
-    for outcome in outcomes:
-        if outcome["cause"] is not None:
-            groups[kind_of(outcome)].append(outcome)
-    lines = [
-        "| fault | size | sessions | detected | within s, median / worst | false before | first: right / wrong / open | "
-        "end: right / wrong / open | ranked 1 / 2 | estimate, median error / worst |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for (cause, kind, size, start), own in sorted(groups.items()):
-        judged = [judge(outcome) for outcome in own]
-        found = [each for each in judged if each["after"] is not None]
-        times = sorted(each["after"] for each in found)
-        told = f"{np.median(times):.2f} / {times[-1]:.2f}" if times else "-"
-        errors = sorted(abs(each["error"]) for each in found if each["error"] is not None)
-        error = f"{100 * np.median(errors):.1f} / {100 * errors[-1]:.1f} %" if errors else "-"
-        lines.append(
-            f"| {cause} {kind}{start} | {size:.4g} | {len(own)} | {interval(len(found), len(own))} | {told} | "
-            f"{sum(each['false'] for each in judged)} | {split(judged, 'first')} | {split(judged, 'end')} | "
-            f"{sum(each['rank'] == 1 for each in judged)} / {sum(each['rank'] in (1, 2) for each in judged)} | {error} |"
-        )
-    return lines
-
-
-def kind_of(outcome: Outcome) -> tuple[str, str, float, str]:
-    """Cause without its number, kind, size, and whether it is there from the start of a sensor's session."""
-    cause = outcome["cause"]
-    alone = cause if outcome["group"] == "physical" else "".join(c for c in cause if not c.isdigit()).replace("_.", ".")
-    start = ", from the start" if outcome["group"] == "sensor" and outcome["onset"] == 0.0 else ""
-    return alone, outcome["kind"], outcome["size"], start
-
-
-def alarms(outcome: Outcome) -> dict[tuple[str, float], list[Outcome]]:
-    """What was told of each alarm, in order."""
-    found: dict[tuple[str, float], list[Outcome]] = defaultdict(list)
-    for each in outcome["told"]:
-        found[each["channel"], each["since"]].append(each)
+def names(row: Row) -> list[tuple[float, str, float]]:
+    """Every name that was told: when, the cause, and its probability then."""
+    found = []
+    for told in row["told"]:
+        if told["cause"] is not None:
+            share = next((p for cause, p, _ in told["ranked"] if cause == told["cause"]), 1.0)
+            found.append((told["at"], told["cause"], share))
     return found
 
 
-def judge(outcome: Outcome) -> dict[str, Any]:
-    """How one faulty session went."""
-    onset, cause = outcome["onset"], wanted(outcome["cause"])
-    every = alarms(outcome)
-    own = [told for (_, since), told in every.items() if since >= onset - EARLY]
-    told = sorted((each for alarm in own for each in alarm), key=lambda each: each["at"])
-    move = outcome["telling_move_end"]
-    early = [each for each in told if move is not None and each["at"] <= max(move, onset) + AFTER]
-    last = told[-1] if told else None
-    named = [each["cause"] for each in told if each["cause"] is not None]
-    return {
-        "after": told[0]["at"] - onset if told else None,
-        "false": len(every) - len(own),
-        "first": "none" if move is None else verdict(early[-1]["cause"] if early else None, cause),
-        "end": verdict(named[-1] if named and last is not None and last["cause"] is not None else None, cause),
-        "rank": rank(last, cause),
-        "error": error_of(outcome, told, cause),
-    }
+def is_right(row: Row, at: float, cause: str) -> bool:
+    """Whether a fault of that cause has begun."""
+    return any(fault.cause == cause and fault.onset - EARLY <= at for fault in faults_of(row))
 
 
-def wanted(cause: str) -> tuple[str, ...]:
-    """Names that count as right: a whole stream that falls silent shows in each of its sensors."""
-    if cause.endswith(".dropout"):
-        kind = "joint" if cause.startswith("joint") else "cylinder"
-        return tuple(f"{kind}_{i}.sensor" for i in range(1, 5))
-    return (cause,)
+def wrong_names(row: Row) -> list[str]:
+    """Causes that were named and are not."""
+    return sorted({cause for at, cause, _ in names(row) if not is_right(row, at, cause)})
 
 
-def verdict(cause: str | None, right: tuple[str, ...]) -> str:
-    """Right, wrong, or open."""
-    return "open" if cause is None else "right" if cause in right else "wrong"
+def named(row: Row, number: int = 0) -> bool:
+    """Whether the fault of this number was named."""
+    return any(cause == row["causes"][number] and is_right(row, at, cause) for at, cause, _ in names(row))
 
 
-def rank(last: Outcome | None, right: tuple[str, ...]) -> int | None:
-    """Place of the cause at the end, from 1."""
-    if last is None:
-        return None
-    causes = [each[0] for each in last["ranked"]] or [last["cause"]]
-    return next((i + 1 for i, cause in enumerate(causes) if cause in right), None)
+def told_after(row: Row, number: int = 0) -> float | None:
+    """Time (s) from half of the fault to the first alarm since its onset; None without one."""
+    fault = faults_of(row)[number]
+    times = [told["at"] for told in row["told"] if told["at"] >= fault.onset and told["since"] >= fault.onset - 10.0]
+    return min(times) - fault.onset - 0.5 * fault.ramp if times else None
 
 
-def error_of(outcome: Outcome, told: list[Outcome], right: tuple[str, ...]) -> float | None:
-    """Estimate less size over size, by the last alarm that has one; stiffnesses by what is left of them."""
-    for each in reversed(told):
-        for cause, _, parts in each["ranked"]:
-            if cause in right and parts:
-                value, size = parts[0][1], outcome["size"]
-                if outcome["kind"] == "softer":
-                    return float((1.0 / (1.0 + value)) / (1.0 - size) - 1.0)
-                return float(abs(value) / size - 1.0) if outcome["kind"] in ("more", "bias", "late", "grown") and size else None
-    return None
+def ended(row: Row) -> bool:
+    """Whether, 8 s after the fault's end, no alarm lasts."""
+    over = faults_of(row)[0].end + min(faults_of(row)[0].ramp, 5.0) + 8.0
+    last: dict[tuple[str, float], Row] = {}
+    for told in row["told"]:
+        if told["at"] <= over:
+            last[told["channel"], told["since"]] = told
+    return bool(last) and all(told["until"] is not None for told in last.values())
 
 
-def split(judged: list[dict[str, Any]], key: str) -> str:
-    """Counts of right, wrong, open."""
-    return " / ".join(str(sum(each[key] == word for each in judged)) for word in ("right", "wrong", "open"))
+def share(hits: int, of: int) -> str:
+    """A share with Wilson's interval."""
+    if of == 0:
+        return "-"
+    z, p = 1.96, hits / of
+    centre, width = p + z * z / (2 * of), z * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
+    low, high = (centre - width) / (1 + z * z / of), (centre + width) / (1 + z * z / of)
+    return f"{hits} of {of} ({100 * max(low, 0):.0f}-{100 * min(high, 1):.0f} %)"
 
 
-def interval(count: int, total: int) -> str:
-    """Share with Wilson's interval, in percent."""
-    z, p = 1.96, count / total
-    middle, half = p + z * z / (2 * total), z * math.sqrt(p * (1 - p) / total + z * z / (4 * total * total))
-    low, high = (middle - half) / (1 + z * z / total), (middle + half) / (1 + z * z / total)
-    return f"{100 * p:.0f} % ({100 * low:.0f}-{100 * high:.0f})"
+def healthy(rows: list[Row]) -> list[str]:
+    """Alarms of sessions without a fault."""
+    lines = ["| healthy | sessions | hours | alarms | with a name | alarms a day, 95 % |", "|---|---|---|---|---|---|"]
+    for name, own in (("quiet", [r for r in rows if not r["loads"]]), ("pump or wind", [r for r in rows if r["loads"]])):
+        hours = sum(row["duration"] for row in own) / 3600.0
+        alarms = sum(len({(told["channel"], told["since"]) for told in row["told"]}) for row in own)
+        wrong = sum(len(wrong_names(row)) for row in own)
+        if own:
+            low, high = (0.5 * chi2.ppf(0.025, 2 * alarms) if alarms else 0.0), 0.5 * chi2.ppf(0.975, 2 * alarms + 2)
+            rate = f"{24 * low / hours:.0f}-{24 * high / hours:.0f}"
+            lines.append(f"| {name} | {len(own)} | {hours:.2f} | {alarms} | {wrong} | {rate} |")
+    return lines
+
+
+def kind_of(row: Row) -> str:
+    """Of its first fault, without number."""
+    fault = faults_of(row)[0]
+    cause = "".join("i" if char.isdigit() else char for char in fault.cause)
+    return f"{cause} {fault.kind}"
+
+
+def faulty(rows: list[Row], key: Callable[[Row], str]) -> list[str]:
+    """A line for every group of sessions with a fault."""
+    lines = ["| fault | sessions | alarm | named | a wrong name at any time |", "|---|---|---|---|---|"]
+    for group in sorted({key(row) for row in rows}):
+        own = [row for row in rows if key(row) == group]
+        alarm = sum(told_after(row) is not None for row in own)
+        right, wrong = sum(named(row) for row in own), sum(bool(wrong_names(row)) for row in own)
+        shares = " | ".join(share(hits, len(own)) for hits in (alarm, right, wrong))
+        lines.append(f"| {group} | {len(own)} | {shares} |")
+    return lines
+
+
+def summary(rows: list[Row]) -> list[str]:
+    """Calibration, second faults, recovery."""
+    sure = {(row["number"], cause): is_right(row, at, cause) for row in rows for at, cause, p in names(row) if p >= 0.9}
+    two, recovery = ([row for row in rows if row["group"] == group] for group in ("two", "recovery"))
+    return [
+        f"- of causes named with 0.9 and more, right: {share(sum(sure.values()), len(sure))}",
+        f"- two faults, both named: {share(sum(named(row, 0) and named(row, 1) for row in two), len(two))}",
+        f"- recovery, no alarm 8 s after it: {share(sum(ended(row) for row in recovery), len(recovery))}",
+    ]
+
+
+def main() -> None:
+    """Print the tables as Markdown."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("outcomes", type=Path)
+    parser.add_argument("--each", action="store_true", help="every session, too")
+    args = parser.parse_args()
+    rows = sorted(map(json.loads, args.outcomes.read_text().splitlines()), key=lambda row: row["number"])
+    well, ill = [row for row in rows if not row["faults"]], [row for row in rows if row["faults"]]
+    one = [row for row in ill if row["group"] != "two"]
+    tables = [healthy(well), faulty(one, lambda row: "pump or wind" if row["loads"] else "quiet")]
+    print("\n\n".join("\n".join(table) for table in [*tables, faulty(one, kind_of), summary(ill)]))
+    for row in rows if args.each else []:
+        seen = f"rig {row['rig']} {row['rate']:g} Hz x{row['noise']:g} {row['streams']}"
+        print(f"\n{row['number']} {row['faults']} {row['loads']} {seen}")
+        for told in row["told"]:
+            cause = told["cause"] or "-"
+            until = "" if told["until"] is None else f"..{told['until']:.1f}"
+            ranks = " ".join(f"{name}:{p:.2f}" for name, p, _ in told["ranked"][:3])
+            print(f"  {told['at']:5.1f} {told['channel']} @{told['since']:.1f}{until} {told['kind']} {cause} [{ranks}]")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -1,0 +1,113 @@
+"""A suspicion: the evidence of the blocks since something began to deviate, under several levels of load at the tip."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..types import NANO, Array
+from .inference.block_problem import BLOCK, BlockProblem
+from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
+from .inference.innovation_filter import InnovationFilter
+
+LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
+"""Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
+DETUNING = 0.15  # share by which a fault may change natural frequencies
+SHAKEN = 0.3  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
+CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
+LEVEL = 2.0  # s, over which the size of a deviation is taken for that
+RECENT = 20  # blocks that must go with what explains all of them
+MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
+EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
+LONGEST = 900  # blocks of one suspicion
+CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
+
+
+class Suspicion:
+    """Weighs faults.
+
+    Parameters
+    ----------
+    bank : HypothesisTest
+    start : int
+        Stamp (ns) of its first block.
+    mean, covariance : ndarray
+        Of the parameters while all was well.
+    errors2, noise2 : ndarray, shape (channels,)
+        Variance of the model's error in one posture, and factor on the variance of the sensors' noise, while all is well.
+    levels : ndarray
+        Of the load, N; the first is 0.
+    carried : mapping of str to float
+        See `HypothesisTest.explain`.
+    """
+
+    def __init__(
+        self, bank: HypothesisTest, start: int, mean: Array, covariance: Array, errors2: Array, noise2: Array, levels: Array,
+        carried: Mapping[str, float],
+    ) -> None:  # fmt: skip
+        self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
+        self._errors2, self._noise2, self._carried = errors2, noise2, carried
+        channels, coefficients = len(errors2), 2 * len(mean)
+        self._filters = [InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, float(each)) for each in levels]
+        self.size, self.blocks = np.zeros(channels), 0
+        self._evidence = [Evidence.none(coefficients) for _ in levels]
+        self._calm = self._evidence
+        self._recent: deque[list[Evidence]] = deque(maxlen=RECENT)
+
+    @property
+    def span(self) -> float:
+        """Time (s) that the evidence has taken."""
+        return self.blocks * BLOCK * NANO
+
+    def take(self, problem: BlockProblem) -> None:
+        """Take one block."""
+        left = problem.table[:, 0]
+        measured = np.isfinite(left)
+        self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
+        noise, crude = problem.noise(self._noise2), self._errors2 + (CRUDE * self.size) ** 2
+        table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
+        found, weight = [], 1.0 / (1.0 + problem.shaking / SHAKEN**2)
+        for each in self._filters:
+            each.tune(problem.modes)
+            innovations = each.step(table, noise, crude, problem.shaking, problem.travel)
+            found.append(Evidence.of(innovations.white, innovations.log))
+        self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
+        self._calm = [before + new.weighted(weight) for before, new in zip(self._calm, found, strict=True)]
+        self._recent.append(found)
+        self.blocks += 1
+
+    def explain(self) -> Verdict:
+        """Weigh all hypotheses."""
+        return self._bank.explain(self._evidence, self.mean, self.covariance, self.span, self._carried)
+
+    def explain_calmly(self) -> Verdict:
+        """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
+        return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
+
+    def is_outdated(self, verdict: Verdict) -> bool:
+        """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
+        if self.blocks <= RECENT:
+            return False
+        if self.blocks > LONGEST or verdict.excess > WHOLE_MISFIT:
+            return True
+        recent = [sum(column, Evidence.none(2 * len(self.mean))) for column in zip(*self._recent, strict=True)]
+        best = verdict.best if verdict.strength > 0.0 else None
+        logs, squares = self._bank.fit(recent, self._coefficients(best), self.mean, self.covariance)
+        return bool(squares[verdict.level] > MISFIT or logs.max() - logs[verdict.level] > EXCITED)
+
+    def _coefficients(self, each: Explanation | None) -> Array:
+        return np.zeros(2 * len(self.mean)) if each is None else self._bank.coefficients(each, self.span)
+
+    def log_factor(self, each: Explanation) -> float:
+        """ln of how much more probable a steady fault of exactly this value is than none."""
+        logs, _ = self._bank.fit(self._evidence, self._bank.coefficients(each, 0.0), self.mean, self.covariance)
+        none, _ = self._bank.fit(self._evidence, self._coefficients(None), self.mean, self.covariance)
+        return float(logs.max() - none.max())
+
+
+def carried_on(verdict: Verdict) -> dict[str, float]:
+    """What a suspicion that follows this verdict is to begin with; see `HypothesisTest.explain`."""
+    return {cause.name: math.log(max(cause.probability, CARRIED)) for cause in verdict.causes}

@@ -1,0 +1,144 @@
+"""Which sessions the health benchmark has: each drawn from its number alone, so that more can be added at any time.
+
+What is drawn: whether there is a fault, its cause, size, onset, ramp and end, a second one; pump and wind; noise, rate and
+sensors; the rig, whose parameters are right or 2 % wrong. A fifth of all numbers is held out: see `Scenario.is_held_out`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from boom_twin.scene import load_scene
+from boom_twin.scene.schema import Scene
+from boom_twin.validation.rig import Sensors
+from boom_twin.validation.rig.faults import RigFault
+from boom_twin.validation.rig.faulty_boom import wrong_by
+from boom_twin.validation.rig.loads import PumpLoad, RigLoad, WindLoad
+
+WRONG, RIGS = 0.02, 3  # rig 0 has the scene's own parameters
+DURATION, LEARNING = 80.0, 60.0  # s
+LEARN_EACH = 3  # healthy sessions that a baseline is learnt from, of each rig that is wrong
+DEGREE = math.radians(1.0)
+SIZES: dict[str, tuple[float, ...]] = {
+    "k": (0.3, 0.4), "EI": (0.2, 0.3, 0.4), "payload": (20.0,), "line_fill": (5.0,),
+    "joint bias": (0.1 * DEGREE, 0.5 * DEGREE), "joint drift": (0.005 * DEGREE, 0.02 * DEGREE), "joint stuck": (0.0,),
+    "cylinder bias": (5e-4, 2e-3), "cylinder drift": (5e-5,), "cylinder scale": (0.01,),
+}  # fmt: skip
+"""Of each kind of fault, SI; all kinds are drawn alike, cylinders twice as often."""
+GROUPS = {"healthy": 0.4, "one": 0.42, "recovery": 0.08, "two": 0.1}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One session; `number` < 0 are those that baselines are learnt from."""
+
+    number: int
+    group: str
+    rig: int
+    posture: str
+    duration: float
+    faults: tuple[RigFault, ...]
+    loads: tuple[RigLoad, ...]
+    noise: float
+    rate: float
+    streams: tuple[str, ...]
+
+    @property
+    def seed(self) -> int:
+        """Of the moves, the wind, the noise, and what a fault draws."""
+        return 5000 + self.number
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether it is not to be looked at while health is being worked on."""
+        return self.number % 5 == 4
+
+    @property
+    def sensors(self) -> Sensors:
+        """As they are, not as stated."""
+        own = Sensors(self.rate)
+        names = ("stroke_sigma", "angle_sigma", "imu_sigma", "force_sigma")
+        return replace(own, **{name: self.noise * getattr(own, name) for name in names})
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """What is true of it, as a row of the results."""
+        return {
+            "number": self.number, "group": self.group, "rig": self.rig, "posture": self.posture, "duration": self.duration,
+            "faults": [str(fault) for fault in self.faults], "causes": [fault.cause for fault in self.faults],
+            "loads": [str(load) for load in self.loads], "noise": self.noise, "rate": self.rate, "streams": self.streams,
+        }  # fmt: skip
+
+
+@lru_cache
+def boom(rig: int) -> Scene:
+    """The boom that is simulated, without its faults."""
+    return wrong_by(load_scene(), WRONG, rig) if rig else load_scene()
+
+
+def learning() -> list[Scenario]:
+    """Healthy sessions of the rigs that are wrong."""
+    streams = ("angles", "imu")
+    names = sorted(load_scene().postures)
+    pairs = [(rig, k) for rig in range(1, RIGS) for k in range(LEARN_EACH)]
+    return [
+        Scenario(-1 - i, "learn", rig, names[k % len(names)], LEARNING, (), (), 1.0, 200.0, streams)
+        for i, (rig, k) in enumerate(pairs)
+    ]
+
+
+def scenario(number: int) -> Scenario:
+    """The session of a number, from 0."""
+    rng = np.random.default_rng([number, 17])
+    group = str(rng.choice(list(GROUPS), p=list(GROUPS.values())))
+    streams = ("angles", *(["imu"] if rng.random() < 0.8 else []), *(["forces"] if rng.random() < 0.2 else []))
+    noise = float(rng.choice([0.5, 1.0, 2.0], p=[0.15, 0.7, 0.15]))
+    rate = float(rng.choice([50.0, 100.0, 200.0, 500.0], p=[0.1, 0.2, 0.6, 0.1]))
+    posture = str(rng.choice(sorted(load_scene().postures)))
+    return Scenario(
+        number, group, int(rng.integers(RIGS)), posture, DURATION, _faults(group, rng), _loads(rng), noise, rate, streams
+    )
+
+
+def _loads(rng: np.random.Generator) -> tuple[RigLoad, ...]:
+    """None in half of the sessions, else a pump, a wind, or both."""
+    kind = rng.choice(["none", "pump", "wind", "both"], p=[0.5, 0.2, 0.1, 0.2])
+    onset = float(rng.choice([0.0, 5.0]))
+    height = float(np.exp(rng.uniform(np.log(30.0), np.log(300.0))))
+    pump = PumpLoad(round(float(rng.uniform(0.2, 0.6)), 3), round(height, 1), onset=onset)
+    wind = WindLoad(round(float(rng.uniform(10.0, 60.0)), 1))
+    return {"none": (), "pump": (pump,), "wind": (wind,), "both": (pump, wind)}[str(kind)]
+
+
+def _faults(group: str, rng: np.random.Generator) -> tuple[RigFault, ...]:
+    if group == "healthy":
+        return ()
+    ramp = float(rng.choice([0.0, 0.05, 2.0, 5.0, 15.0, 30.0]))
+    first = _fault(rng, float(rng.choice([0.0, rng.uniform(5.0, 15.0)])), ramp)
+    if group == "recovery":
+        ramp = min(first.ramp, 5.0)
+        return (replace(first, ramp=ramp, end=max(50.0, first.onset + ramp + 30.0)),)
+    if group == "one":
+        return (first,)
+    while (second := _fault(rng, float(rng.uniform(35.0, 45.0)), 0.05)).cause == first.cause:
+        pass
+    return first, second
+
+
+def _fault(rng: np.random.Generator, onset: float, ramp: float) -> RigFault:
+    kind = str(rng.choice([*SIZES, "k", "k", "payload"]))
+    size, i = float(rng.choice(SIZES[kind])), int(rng.integers(1, 5))
+    if kind == "k":
+        return RigFault(f"cylinder_{i}.k", "softer", 0.4 if i == 4 else 0.3, onset, ramp)
+    if kind == "EI":
+        return RigFault(f"section_{i}.EI", "softer", size, onset, ramp)
+    if kind in ("payload", "line_fill"):
+        return RigFault("tip.payload" if kind == "payload" else kind, "more", size, onset, ramp)
+    owner, what = kind.split()
+    ramp = 0.0 if what in ("drift", "stuck") else ramp
+    return RigFault(f"{owner}_{i}.sensor", what, size, onset, ramp)
