@@ -71,9 +71,7 @@ class HealthMonitor:
             for stream in CHECKED
         }
         self._ended += self.residuals.close(self._told)
-        self._noise2 = {
-            stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED
-        }
+        self._noise2 = {stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED}
         self.residuals.begin()
 
     def predicted(self, followed: PredictionRows) -> None:

@@ -159,10 +159,7 @@ def test_a_slow_fault_is_not_another():
 
 def test_twice_the_stated_noise_gives_no_spikes():
     rng, sigma = np.random.default_rng(5), math.sqrt(3.0) * Settings().angle_sigma
-    noisy = [
-        replace(s, values=s.values + rng.normal(0.0, sigma, 4)) if s.stream is Stream.ANGLES else s
-        for s in session(18.0)
-    ]
+    noisy = [replace(s, values=s.values + rng.normal(0.0, sigma, 4)) if s.stream is Stream.ANGLES else s for s in session(18.0)]
     assert run(noisy).states() == []
 
 
