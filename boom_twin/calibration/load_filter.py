@@ -132,6 +132,7 @@ def _readings(modes: ModesAlong, boom: int, gravity: Array, rates: Array) -> Arr
     joints = modes.joints.swapaxes(1, 2)
     read = np.zeros((k, n + 2, rates.shape[1]))
     read[:, :n, q[0] : rate[0]] = joints
+    read[:, :n, 0:2] = read[:, :n, 2:STROKES] = modes.follow
     read[:, :n, STROKES : STROKES + n] = -joints @ np.linalg.solve(modes.stiffness[:, boom], modes.forces[:, boom])
     read[:, np.arange(n), error] += 1.0 / modes.slopes  # at rest a stroke turns its own joint, and no other
     swing = modes.tip[..., :2].swapaxes(1, 2) @ rates[:, rate[0] :]

@@ -35,7 +35,8 @@ from .sessions import SessionCourse
 
 TRAVEL, PIECES = 0.05, 4  # rad that a section turns from one knot to the next, and interpolated postures for each knot
 EVERY = 20  # instants, at which the turns are looked at
-MODES, HIGHEST = 6, 25.0  # at most; Hz
+HIGHEST = 25.0  # Hz; faster modes follow a force without vibration of their own
+MODES = 9  # most that are looked for, of both kinds
 WIDTH = 1e-6  # relative accuracy of frequencies
 
 
@@ -51,6 +52,8 @@ class ModesAlong(NamedTuple):
         Motion of the tip: x, y, angle.
     joints : ndarray, shape (k, m, n)
         Joint angles.
+    follow : ndarray, shape (k, n, 2)
+        Joint angles by modes that follow a force at once, rad/N.
     slopes : ndarray, shape (k, n)
         Change of stroke with joint angle, m.
     heading : ndarray, shape (k,)
@@ -63,6 +66,7 @@ class ModesAlong(NamedTuple):
     forces: Array
     tip: Array
     joints: Array
+    follow: Array
     slopes: Array
     heading: Array
 
@@ -106,7 +110,7 @@ def _at_knots(scenes: Sequence[Scene], strokes: Array) -> ModesAlong:
     """The models at strokes (k, n), in as many modes as there are at all of them."""
     plans = [compile_scene(scene) for scene in scenes]
     knots = _knots(scenes[0], plans[0], strokes)
-    count = min(len(knot.modes) for knot in knots)
+    count, at = min(sum(mode.frequency < HIGHEST for mode in knot.modes) for knot in knots), plans[0].tables.tip
     rows, before = [], None
     for knot in knots:
         modes = knot.modes[:count]
@@ -120,9 +124,11 @@ def _at_knots(scenes: Sequence[Scene], strokes: Array) -> ModesAlong:
             np.array, zip(*[_matrices(plan, plans[0], before, turn @ increments) for plan in plans], strict=True)
         )
         square = turn * np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2 @ turn.T
-        tip = before[:, plans[0].tables.tip : plans[0].tables.tip + 3]
+        tip = before[:, at : at + 3]
+        quick = np.array([mode.motion[at : at + 2] / (2.0 * math.pi * mode.frequency) ** 2 for mode in knot.modes[count:]])
+        follow = knot.joints[count:].T @ quick.reshape(-1, 2)
         mass, stiffness = mass - mass[0] + np.eye(count), stiffness - stiffness[0] + square
-        rows.append((mass, damping, stiffness, forces, tip, turn @ knot.joints[:count], knot.slopes, knot.heading))
+        rows.append((mass, damping, stiffness, forces, tip, turn @ knot.joints[:count], follow, knot.slopes, knot.heading))
     return ModesAlong(*(np.array(each) for each in zip(*rows, strict=True)))
 
 
@@ -131,7 +137,7 @@ def _knots(scene: Scene, plan: Plan, strokes: Array) -> list[_Knot]:
     for at in strokes:
         angles = joint_angles_of_strokes(scene, at)
         settle(plan, state, work, at, angles)
-        modes = natural_modes(plan, state, work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
+        modes = natural_modes(plan, state, work, MODES, WIDTH)
         joints = np.array([joint_increments(plan, state, work, mode) for mode in modes])
         slopes = np.array([cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)])
         found.append(_Knot(modes, joints, slopes, float(state.frames[-1, FRAME_ANGLE])))

@@ -162,7 +162,7 @@ def calibrate(
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
         better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, sessions, mounts) + _worse(before, after)),
+        tuple(_remarks(problem, fit, sessions, mounts) + ([] if fit.load else _worse(before, after))),
     )  # fmt: skip
 
 
@@ -295,7 +295,7 @@ def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredS
     if fit.load is not None:
         found.append(
             f"A load of about {fit.load.rms:.0f} N rms at the tip, which the scene does not know, was taken into account: "
-            f"{fit.load.text}."
+            f"{fit.load.text}. The residuals on what was held out hold it, too."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")
