@@ -52,10 +52,12 @@ class ResidualBlocks:
         return np.array([np.concatenate(parts, axis=1) for parts in rows])
 
 
-def block_length(sessions: Sequence[MeasuredSession], streams: Sequence[Stream]) -> float:
-    """Time (s) that holds samples of every one of the streams of every session."""
+def block_length(
+    sessions: Sequence[MeasuredSession], streams: Sequence[Stream], shortest: float = SHORTEST, least: float = 2.0
+) -> float:
+    """Time (s) that holds `least` samples, on average, of every one of the streams of every session; `shortest` or more."""
     intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in streams]
-    return max(SHORTEST, 2.0 * float(max(intervals)))
+    return max(shortest, least * float(max(intervals)))
 
 
 def channel_names(joints: int, streams: Sequence[Stream]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from .forward_model import READINGS, CalibrationProblem
 from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
 from .noise_model import ResidualBlocks, block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
-from .unknown_load import LENGTH, fitted_under_load
+from .unknown_load import LENGTH, SAMPLES, fitted_under_load
 from .unknowns import Unknown, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
 
@@ -179,7 +179,7 @@ def _fitted(
     quiet = fitted(problem, tell)
     if quiet.misfit <= LOADED:
         return problem, quiet
-    finer = CalibrationProblem(scene, unknowns, parts.in_blocks(LENGTH, 0.5), parts.channels, settings)
+    finer = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.loaded_length, 0.5), parts.channels, settings)
     loaded = fitted_under_load(finer, quiet, tell)
     return problem, loaded if loaded.misfit <= LOADED else quiet
 
@@ -202,10 +202,11 @@ def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> 
 
 @dataclass(frozen=True)
 class FittedParts:
-    """What of the sessions is fitted: their usual blocks (s), the streams that are compared, how their sensors are mounted."""
+    """What of the sessions is fitted: blocks (s) with and without a load, streams compared, how their sensors are mounted."""
 
     sessions: tuple[tuple[MeasuredSession, SessionCourse], ...]
     length: float
+    loaded_length: float
     streams: tuple[Stream, ...]
     mounts: tuple[Mount | None, ...]
 
@@ -243,8 +244,8 @@ def _parts(
             f"{', '.join(session.name for session, _ in fitting)}: no stroke moves by more than {1e3 * MOVED:g} mm, so loads "
             "do not change and stiffness looks like a zero. Record moves of every cylinder, with holds between them."
         )
-    length = block_length(sessions, streams)
-    return FittedParts(tuple(fitting), length, streams, tuple(mapped.topics.mounts(joints))), kept_from
+    lengths = block_length(sessions, streams), block_length(sessions, streams, LENGTH, SAMPLES)
+    return FittedParts(tuple(fitting), *lengths, streams, tuple(mapped.topics.mounts(joints))), kept_from
 
 
 def _compared(sessions: Sequence[MeasuredSession]) -> tuple[Stream, ...]:
@@ -295,7 +296,7 @@ def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredS
     if fit.load is not None:
         found.append(
             f"A load of about {fit.load.rms:.0f} N rms at the tip, which the scene does not know, was taken into account: "
-            f"{fit.load.text}. The residuals on what was held out hold it, too."
+            f"{fit.load.text}. The residuals on what was held out hold it, too; take intervals half as wide again."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")

@@ -33,7 +33,7 @@ from .load_modes import modes_along
 from .noise_model import ResidualBlocks
 from .sessions import SessionCourse
 
-LENGTH = 0.01  # s, of the blocks
+LENGTH, SAMPLES = 0.01, 1.5  # s, of the blocks at least, and samples in them on average
 FREE, QUIET = 0.031, 0.0008  # standard deviations of the load over the boom's weight: let free, and between its jumps
 FLANK = 0.1  # s, over which changes of the load are looked at
 JUMP = 4.0  # of these changes' usual size: a jump
@@ -59,7 +59,7 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
     Parameters
     ----------
     problem : CalibrationProblem
-        With blocks of `LENGTH`.
+        With blocks of `LENGTH` or little longer.
     quiet : Fit
         That without.
     tell : callable
