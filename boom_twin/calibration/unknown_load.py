@@ -128,10 +128,10 @@ def _jumps(loads: Array, length: float, free: float) -> Array:
 
 
 def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None:
-    """Size and frequency of the load, from the sessions on end."""
+    """Size and frequency of what varies of the load, from the sessions on end; what stays is not told from weight and zeros."""
     finder = TipLoadFinder()
     for (course, blocks), each in zip(problem.parts, passes, strict=True):
-        finder.add(course.start + np.round(blocks.times / NANO).astype(np.int64), each.loads)
+        finder.add(course.start + np.round(blocks.times / NANO).astype(np.int64), each.loads - each.loads.mean(axis=0))
     return finder.load
 
 

@@ -39,7 +39,7 @@ def test_two_sections_under_pump_and_wind(two_sections, tmp_path):
     truth = off(two_sections, 0.92, 1.1)
     found = calibrate([shaken(tmp_path / "bag", truth, "arch", 30.0, 4)], two_sections, Choice(zeros="angles"))
     assert found.misfit < 1.2
-    assert any("at the tip, which the scene does not know, was taken into account" in remark for remark in found.remarks)
+    assert any("load at the tip that the scene does not know was taken into account: " in remark for remark in found.remarks)
     assert not any("do not use" in remark or "times what noise explains" in remark for remark in found.remarks)
     for estimate in found.estimates:
         if estimate.unknown.name.endswith(".k"):
