@@ -295,8 +295,8 @@ def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredS
         )
     if fit.load is not None:
         found.append(
-            f"A load at the tip that the scene does not know was taken into account: {fit.load.text}. The residuals on what was "
-            "held out hold it, too; take intervals half as wide again."
+            f"A load at the tip that the scene does not know was taken into account: {fit.load.text}. The residuals on "
+            "what was held out hold it, too; take intervals half as wide again."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")

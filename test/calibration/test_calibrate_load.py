@@ -35,6 +35,7 @@ def values_of(found):
     return {each.unknown.name: each.value for each in found.estimates}
 
 
+@pytest.mark.slow
 def test_two_sections_under_pump_and_wind(two_sections, tmp_path):
     truth = off(two_sections, 0.92, 1.1)
     found = calibrate([shaken(tmp_path / "bag", truth, "arch", 30.0, 4)], two_sections, Choice(zeros="angles"))
