@@ -27,6 +27,11 @@ Values = Mapping[str, float]
 Readings = dict[Stream, Array]
 
 
+def boom_of(scene: Scene, trial: Values) -> Scene:
+    """The scene with values (SI) of its parameters by name; zeros of sensors are passed over."""
+    return with_parameters(scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
+
+
 def _specific_force(results: Results, gravity: Array) -> Array:
     felt, angle = results.tip[..., 2, :2] - gravity, results.tip[..., 0, 2]
     return np.stack(specific_force(felt[..., 0], felt[..., 1], np.cos(angle), np.sin(angle)), axis=-1)
@@ -52,8 +57,7 @@ class ForwardModel:
 
     def __init__(self, scene: Scene, trials: Sequence[Values]) -> None:
         self._scene, self._gravity = scene, gravity_in_base(scene)
-        own = [{name: value for name, value in trial.items() if not name.endswith(".zero")} for trial in trials]
-        self._batch = Batch([compile_scene(with_parameters(scene, values)) for values in own])
+        self._batch = Batch([compile_scene(boom_of(scene, trial)) for trial in trials])
         strokes = channels_of(len(scene.joints))[Stream.STROKES]
         self._zeros = np.array([[trial.get(f"{name}.zero", 0.0) for name in strokes] for trial in trials])
 
@@ -127,6 +131,8 @@ class CalibrationProblem:
         Of a single sample of each of them.
     length : float
         Of a block, s.
+    stroke_variance : float
+        Of a reading of the strokes, m^2.
 
     Raises
     ------
@@ -146,7 +152,7 @@ class CalibrationProblem:
         self.deviations = np.sqrt([settings.variance(sensor_kind(name)) for name in self.channels])
         self._direct = [self._effect(unknown) for unknown in unknowns]
         self.length = float(np.diff(parts[0][1].times[:2])[0])
-        self._stroke_deviation = float(np.sqrt(settings.stroke_variance))
+        self.stroke_variance = settings.stroke_variance
 
     @property
     def start(self) -> Array:
@@ -159,11 +165,11 @@ class CalibrationProblem:
 
     def moving(self, deviations: Array, whitening: NoiseModel) -> tuple[Array, Array]:
         """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
-        forward = ForwardModel(self.scene, self._trials(deviations))
+        forward = ForwardModel(self.scene, self.trials(deviations))
         residuals, slopes = [], []
         for course, blocks in self.parts:
             means = blocks.averaged(forward.move(course))
-            predicted, slope = self._with_slopes(means, deviations)
+            predicted, slope = self.with_slopes(means, deviations)
             left = blocks.measured[:, self.used] - predicted
             gaps = np.where(np.isfinite(left), 0.0, np.nan)
             residuals.append(whitening(left).ravel())
@@ -172,10 +178,10 @@ class CalibrationProblem:
 
     def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
         """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
-        forward = ForwardModel(self.scene, self._trials(deviations))
+        forward = ForwardModel(self.scene, self.trials(deviations))
         streams = self.parts[0][1].means
         rows = [np.concatenate([readings[stream] for stream in streams], axis=2) for readings in map(forward.rest, strokes)]
-        return self._with_slopes(np.concatenate(rows, axis=1), deviations)
+        return self.with_slopes(np.concatenate(rows, axis=1), deviations)
 
     def noise(self, deviations: Array) -> list[Array]:
         """Realisations of the noise of block means, one array (k, b, c) for every session.
@@ -188,14 +194,20 @@ class CalibrationProblem:
         found = []
         for course, blocks in self.parts:
             noise = np.zeros((len(course.stamps), count + 1, course.strokes.shape[1]))
-            noise[:, 1:] = self._stroke_deviation * rng.standard_normal(noise[:, 1:].shape)
+            noise[:, 1:] = np.sqrt(self.stroke_variance) * rng.standard_normal(noise[:, 1:].shape)
             readings = forward.move(course, course.smoothed(noise).swapaxes(0, 1))
             means = blocks.averaged(readings)[..., self.used]
             own = self.deviations / np.sqrt(np.maximum(blocks.counts[:, self.used], 1.0))
             found.append(means[1:] - means[0] + own * rng.standard_normal(means[1:].shape))
         return found
 
-    def _trials(self, deviations: Array) -> list[dict[str, float]]:
+    def booms(self, deviations: Array, step: float) -> list[tuple[int | None, Scene]]:
+        """The boom itself, with None, and those with one of the boom's unknowns moved by `step`, with its number."""
+        moved: list[int | None] = [i for i, unknown in enumerate(self.unknowns) if unknown.channel is None]
+        every = np.arange(len(deviations))
+        return [(i, boom_of(self.scene, self.values(deviations + step * (every == i)))) for i in [None, *moved]]
+
+    def trials(self, deviations: Array) -> list[dict[str, float]]:
         """The values themselves, and with every unknown moved that acts through the boom."""
         moved = [deviations]
         for i, direct in enumerate(self._direct):
@@ -204,7 +216,7 @@ class CalibrationProblem:
                 moved[-1][i] += DIFFERENCE
         return [self.values(each) for each in moved]
 
-    def _with_slopes(self, readings: Array, deviations: Array) -> tuple[Array, Array]:
+    def with_slopes(self, readings: Array, deviations: Array) -> tuple[Array, Array]:
         """From readings (trials, b, channels) those of the channels used, (b, c), and their derivatives (p, b, c)."""
         readings = readings[..., self.used]
         acting = iter((readings[1:] - readings[0]) / DIFFERENCE)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..errors import BoomTwinError
+from ..estimation.load_spectrum import TipLoad
 from ..scene.kinematics import strokes_of_posture
 from ..types import Array
 from .forward_model import CalibrationProblem
@@ -41,6 +42,8 @@ class Fit:
         Root mean square of the white residuals, 1 where noise alone is left; what is above 1 counts as noise.
     passes : int
     whitening : NoiseModel
+    load : TipLoad or None
+        The unknown load at the tip that was taken into account.
     """
 
     deviations: Array
@@ -49,6 +52,7 @@ class Fit:
     misfit: float
     passes: int
     whitening: NoiseModel
+    load: TipLoad | None = None
 
     def covariance(self, more: Array | float = 0.0) -> Array:
         """Of the deviations, with the priors, and with `more` information.
@@ -70,8 +74,7 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     rings at the boom's frequencies, too: it is made anew at the first estimate of the swinging boom, and the fit repeated.
     """
     least = np.array([unknown.least for unknown in problem.unknowns])
-    deviations, _ = _minimised(_in_holds(problem), problem.start, least)
-    passes = 0
+    deviations, passes = fitted_in_holds(problem), 0
     for _ in range(ROUNDS):
         noise = problem.noise(deviations)
         whitening = whitening_of([each[::2] for each in noise], problem.length)
@@ -86,6 +89,12 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     freedom = max(int(np.count_nonzero(residuals)) - len(deviations), 1)
     misfit = float(np.sqrt(np.sum(residuals**2) / freedom))
     return Fit(deviations, slopes.T @ slopes, _scatter(noise, whitening, slopes), misfit, passes, whitening)
+
+
+def fitted_in_holds(problem: CalibrationProblem) -> Array:
+    """Deviations that fit the means over holds."""
+    least = np.array([unknown.least for unknown in problem.unknowns])
+    return _minimised(_in_holds(problem), problem.start, least)[0]
 
 
 def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:

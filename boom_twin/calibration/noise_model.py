@@ -52,10 +52,12 @@ class ResidualBlocks:
         return np.array([np.concatenate(parts, axis=1) for parts in rows])
 
 
-def block_length(sessions: Sequence[MeasuredSession], streams: Sequence[Stream]) -> float:
-    """Time (s) that holds samples of every one of the streams of every session."""
+def block_length(
+    sessions: Sequence[MeasuredSession], streams: Sequence[Stream], shortest: float = SHORTEST, least: float = 2.0
+) -> float:
+    """Time (s) that holds `least` samples, on average, of every one of the streams of every session; `shortest` or more."""
     intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in streams]
-    return max(SHORTEST, 2.0 * float(max(intervals)))
+    return max(shortest, least * float(max(intervals)))
 
 
 def channel_names(joints: int, streams: Sequence[Stream]) -> tuple[str, ...]:
@@ -70,8 +72,12 @@ def blocks_of(
     length: float,
     streams: Sequence[Stream],
     mounts: Sequence[Mount | None],
+    lead: float = 0.0,
 ) -> ResidualBlocks:
-    """Average a session over blocks of `length` (s); the angles of inclinometers are left out."""
+    """Average a session over blocks of `length` (s), the first of which begins `lead` (s) before the course.
+
+    The angles of inclinometers are left out.
+    """
     count = int((course.duration - END) / length)
     measured, counts, means = [], [], {}
     for stream in streams:
@@ -79,18 +85,18 @@ def blocks_of(
         values = series.values.copy()
         if stream is Stream.ANGLES:
             values[:, [mount is not None for mount in mounts]] = np.nan
-        found, number, mean = _averages(Series(series.stamps, values), course, length, count)
+        found, number, mean = _averages(Series(series.stamps, values), course, length, count, lead)
         measured.append(found)
         counts.append(number)
         means[stream] = mean
-    times: Array = np.asarray(length * (0.5 + np.arange(count)))
+    times: Array = np.asarray(length * (0.5 + np.arange(count)) - lead)
     return ResidualBlocks(times, np.concatenate(measured, axis=1), np.concatenate(counts, axis=1), means)
 
 
-def _averages(series: Series, course: SessionCourse, length: float, count: int) -> tuple[Array, Array, csr_array]:
+def _averages(series: Series, course: SessionCourse, length: float, count: int, lead: float) -> tuple[Array, Array, csr_array]:
     """Means (count, channels), numbers of values in them, and the average of linear interpolations on the course's grid."""
     times: Array = np.asarray((series.stamps - course.start) * NANO)
-    block = np.minimum((times / length).astype(np.int64), count - 1)
+    block = np.minimum(((times + lead) / length).astype(np.int64), count - 1)
     there = np.isfinite(series.values)
     total = np.bincount(block, minlength=count)
     mean = csr_array((1.0 / total[block], (block, np.arange(len(block)))), shape=(count, len(block)))

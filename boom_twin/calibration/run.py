@@ -14,16 +14,18 @@ from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Stream
+from ..types import NANO, SENSORS, Mount, Stream
 from .forward_model import READINGS, CalibrationProblem
 from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
-from .noise_model import block_length, blocks_of, channel_names
+from .noise_model import ResidualBlocks, block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
+from .unknown_load import LENGTH, SAMPLES, fitted_under_load
 from .unknowns import Unknown, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
 
 KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 MOVED = 0.01  # m, least travel of some stroke
+LOADED = 1.2  # misfit from which on an unknown load is looked for, and up to which it explains the residuals
 MISFIT = 1.5  # from which on the fit is remarked on
 GROWN = 1.1  # of residuals on what was held out, likewise
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
@@ -144,10 +146,9 @@ def calibrate(
     streams = (Stream.STROKES, *_compared(sessions))
     names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
     unknowns = unknowns_of(scene, names)
-    problem, kept_from = _problem(scene, unknowns, sessions, mapped, settings)
+    parts, kept_from = _parts(scene, sessions, mapped, settings)
     progress(0.1, "fit, holds")
-    passes = iter(range(1, 1000))
-    fit = fitted(problem, lambda: _tell_pass(progress, next(passes)))
+    problem, fit = _fitted(scene, unknowns, parts, settings, progress)
     progress(0.75, "what can be told apart")
     groups = groups_of(problem, fit)
     estimates = _estimates(problem, fit, groups)
@@ -165,8 +166,26 @@ def calibrate(
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
         better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, sessions, mounts) + _worse(before, after)),
+        tuple(_remarks(problem, fit, sessions, mounts) + ([] if fit.load else _worse(before, after))),
     )  # fmt: skip
+
+
+def _fitted(
+    scene: Scene, unknowns: Sequence[Unknown], parts: FittedParts, settings: Settings, progress: Progress
+) -> tuple[CalibrationProblem, Fit]:
+    """The problem and its fit; where more than noise is left, with an unknown load at the tip, if that explains it."""
+    passes = iter(range(1, 1000))
+
+    def tell() -> None:
+        _tell_pass(progress, next(passes))
+
+    problem = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.length), parts.channels, settings)
+    quiet = fitted(problem, tell)
+    if quiet.misfit <= LOADED:
+        return problem, quiet
+    finer = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.loaded_length, 0.5), parts.channels, settings)
+    loaded = fitted_under_load(finer, quiet, tell)
+    return problem, loaded if loaded.misfit <= LOADED else quiet
 
 
 def _tell_pass(progress: Progress, number: int) -> None:
@@ -185,9 +204,30 @@ def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> 
     return found[0]
 
 
-def _problem(
-    scene: Scene, unknowns: Sequence[Unknown], sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings
-) -> tuple[CalibrationProblem, int]:
+@dataclass(frozen=True)
+class FittedParts:
+    """What of the sessions is fitted: blocks (s) with and without a load, streams compared, how their sensors are mounted."""
+
+    sessions: tuple[tuple[MeasuredSession, SessionCourse], ...]
+    length: float
+    loaded_length: float
+    streams: tuple[Stream, ...]
+    mounts: tuple[Mount | None, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Those of the streams."""
+        return channel_names(self.sessions[0][1].strokes.shape[1], self.streams)
+
+    def in_blocks(self, length: float, lead: float = 0.0) -> list[tuple[SessionCourse, ResidualBlocks]]:
+        """Averaged over blocks of `length` (s), which begin by the share `lead` of the time between samples before these."""
+        return [
+            (course, blocks_of(session, course, length, self.streams, self.mounts, lead * course.interval))
+            for session, course in self.sessions
+        ]
+
+
+def _parts(scene: Scene, sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings) -> tuple[FittedParts, int]:
     """What is fitted, and the stamp from which on the last session is held out."""
     joints, streams = len(scene.joints), _compared(sessions)
     courses = [course_of(session, settings) for session in sessions]
@@ -206,10 +246,8 @@ def _problem(
             f"{', '.join(session.name for session, _ in fitting)}: no stroke moves by more than {1e3 * MOVED:g} mm, so loads "
             "do not change and stiffness looks like a zero. Record moves of every cylinder, with holds between them."
         )
-    length = block_length(sessions, streams)
-    mounts = mapped.topics.mounts(joints)
-    parts = [(course, blocks_of(session, course, length, streams, mounts)) for session, course in fitting]
-    return CalibrationProblem(scene, unknowns, parts, channel_names(joints, streams), settings), kept_from
+    lengths = block_length(sessions, streams), block_length(sessions, streams, LENGTH, SAMPLES)
+    return FittedParts(tuple(fitting), *lengths, streams, tuple(mapped.topics.mounts(joints))), kept_from
 
 
 def _compared(sessions: Sequence[MeasuredSession]) -> tuple[Stream, ...]:
@@ -256,6 +294,11 @@ def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredS
         found.append(
             f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "
             "parameters cannot make (a fault, another boom, a load that changed). Intervals are widened by it."
+        )
+    if fit.load is not None:
+        found.append(
+            f"A load at the tip that the scene does not know was taken into account: {fit.load.text}. The residuals on "
+            "what was held out hold it, too."
         )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")

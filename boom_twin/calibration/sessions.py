@@ -182,6 +182,11 @@ class SessionCourse:
         return np.asarray(self.step * np.arange(len(self.strokes)))
 
     @property
+    def interval(self) -> float:
+        """Usual time between samples, s."""
+        return float(np.median(np.diff(self.stamps))) * NANO
+
+    @property
     def duration(self) -> float:
         """From the first to the last instant, s."""
         return self.step * (len(self.strokes) - 1)

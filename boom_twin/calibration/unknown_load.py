@@ -1,0 +1,185 @@
+"""Calibration under an unknown load at the tip: prediction-error estimates with the load as a nuisance.
+
+The innovations v of the filter in `load_filter` depend on the parameters, by the prediction and by the modes alike. They are
+uncorrelated with what came before, so their derivatives by the parameters, which are functions of what came before, have no
+part in them where the parameters are right: sum v dv / s = 0 (Ljung, System Identification, 1999, ch. 7), solved by
+Gauss-Newton steps. Variances s are not fitted: the load is no Gaussian process.
+
+A payload m and a load f push alike: m a and -f. What tells them apart is that the load is steady, so nothing may be taken to be
+known of the load while it changes: a pump's flanks keep step with the swings that the pump has made before. Where the load,
+first estimated by a filter that lets it move freely, jumps, it is set free (`LoadPrior.jumps`), and is taken for quiet between.
+
+Covariances are those of the sums over spans of `SPAN`, so that they hold for errors that are not white, too (White, 1982).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from ..estimation.load_spectrum import TipLoad, TipLoadFinder
+from ..scene.kinematics import gravity_in_base
+from ..scene.schema import Scene
+from ..scene.summary import explain
+from ..types import NANO, Array
+from .forward_model import CalibrationProblem, ForwardModel
+from .least_squares import Fit, Tell, fitted_in_holds
+from .load_filter import Innovations, LoadPrior, filter_model, innovations, stroke_error
+from .load_modes import modes_along
+from .noise_model import ResidualBlocks
+from .sessions import SessionCourse
+
+LENGTH, SAMPLES = 0.01, 1.5  # s, of the blocks at least, and samples in them on average
+FREE, QUIET = 0.031, 0.0008  # standard deviations of the load over the boom's weight: let free, and between its jumps
+FLANK = 0.1  # s, over which changes of the load are looked at
+JUMP = 4.0  # of these changes' usual size: a jump
+TRIAL = 0.02  # of a prior deviation, for derivatives
+FURTHEST = 0.7  # prior deviations in one step
+FIRST, NEAR = 4, 1.0  # most steps with the load let free, and the step (in deviations of the estimate) that is the last one
+ROUNDS = 3  # of looking for the load's jumps, a step each
+LAST, SMALL = 5, 0.05  # likewise of the steps after these
+SPAN = 1.0  # s
+WIDER = 1.5  # by which intervals are wider than that: what swings longer is not seen in spans, see docs/calibrate.md
+
+
+class Pass(NamedTuple):
+    """One session at a trial: white residuals (b, c), their derivatives (p, b, c), and the load (b, 2), N."""
+
+    white: Array
+    slopes: Array
+    loads: Array
+
+
+def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fit:
+    """The fit with an unknown load.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        With blocks of `LENGTH` or little longer.
+    quiet : Fit
+        That without.
+    tell : callable
+        Called before every pass over the sessions.
+    """
+    weight = explain(problem.scene).mass * float(np.hypot(*problem.scene.gravity))
+    count = 0
+
+    def stepped(deviations: Array, priors: Sequence[LoadPrior], most: int, enough: float) -> tuple[Array, list[Pass]]:
+        nonlocal count
+        for _ in range(most):
+            tell()
+            passes, count = _passes(problem, deviations, priors), count + 1
+            deviations, size = _after_step(problem, passes, deviations)
+            if size < enough:
+                break
+        return deviations, passes
+
+    free = [LoadPrior(FREE * weight, np.zeros(len(blocks.times))) for _, blocks in problem.parts]
+    deviations, passes = stepped(fitted_in_holds(problem), free, FIRST, NEAR)
+    for _ in range(ROUNDS):
+        priors = [LoadPrior(QUIET * weight, _jumps(each.loads, problem.length, FREE * weight)) for each in passes]
+        deviations, passes = stepped(deviations, priors, 1, 0.0)
+    deviations, passes = stepped(deviations, priors, LAST, SMALL)
+    measured = sum(int(np.count_nonzero(each.white)) for each in passes)
+    misfit = float(np.sqrt(sum(np.sum(each.white**2) for each in passes) / max(measured - len(deviations), 1)))
+    return Fit(
+        deviations, _information(passes), WIDER**2 * _scatter(passes, round(SPAN / problem.length)), misfit, quiet.passes + count,
+        quiet.whitening, _load(problem, passes),
+    )  # fmt: skip
+
+
+def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:
+    """Deviations after a step of Gauss and Newton, and how long it would be at its full length, in those of the estimate."""
+    least = np.array([unknown.least for unknown in problem.unknowns])
+    information = _information(passes) + np.eye(len(deviations))
+    pull = -deviations - sum(np.einsum("pbc,bc->p", each.slopes, each.white) for each in passes)
+    step = np.linalg.solve(information, pull)
+    size = float(np.sqrt(step @ information @ step / len(step)))
+    shorter = min(1.0, FURTHEST / max(float(np.abs(step).max()), 1e-12))
+    return np.maximum(deviations + shorter * step, least), size
+
+
+def _information(passes: Sequence[Pass]) -> Array:
+    return np.asarray(sum(np.einsum("pbc,qbc->pq", each.slopes, each.slopes) for each in passes))
+
+
+def _scatter(passes: Sequence[Pass], span: int) -> Array:
+    """Covariance of the sums that are to vanish, from those over spans of so many blocks."""
+    found = np.zeros((len(passes[0].slopes),) * 2)
+    for each in passes:
+        pulls = np.einsum("pbc,bc->bp", each.slopes, each.white)
+        sums = np.add.reduceat(pulls, np.arange(0, len(pulls), span))
+        found += sums.T @ sums
+    return found
+
+
+def _jumps(loads: Array, length: float, free: float) -> Array:
+    """Variance that the load gains at every block, shape (b,), N^2: `free` squared within `FLANK` where it jumps, else 0."""
+    half = round(0.5 * FLANK / length)
+    change = np.zeros(loads.shape)
+    change[half:-half] = np.abs(loads[2 * half :] - loads[: -2 * half])
+    is_jump = (change > JUMP * 1.4826 * np.median(change, axis=0)).any(axis=1)
+    near = np.convolve(is_jump, np.ones(2 * half + 1), "same") > 0.5
+    return np.where(near, free**2 * length / FLANK, 0.0)
+
+
+def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None:
+    """Size and frequency of what varies of the load, from the sessions on end; what stays is not told from weight and zeros."""
+    finder = TipLoadFinder()
+    for (course, blocks), each in zip(problem.parts, passes, strict=True):
+        finder.add(course.start + np.round(blocks.times / NANO).astype(np.int64), each.loads - each.loads.mean(axis=0))
+    return finder.load
+
+
+def _passes(problem: CalibrationProblem, deviations: Array, priors: Sequence[LoadPrior]) -> list[Pass]:
+    """Every session at a trial."""
+    forward = ForwardModel(problem.scene, problem.trials(deviations))
+    booms = dict(problem.booms(deviations, TRIAL))
+    parts = zip(problem.parts, priors, strict=True)
+    return [_pass(problem, forward, booms, deviations, *part, prior) for part, prior in parts]
+
+
+def _pass(
+    problem: CalibrationProblem,
+    forward: ForwardModel,
+    booms: Mapping[int | None, Scene],
+    deviations: Array,
+    course: SessionCourse,
+    blocks: ResidualBlocks,
+    prior: LoadPrior,
+) -> Pass:
+    """One session at a trial.
+
+    Parameters
+    ----------
+    booms : mapping of int or None to Scene
+        See `CalibrationProblem.booms`.
+    """
+    predicted, slopes = problem.with_slopes(blocks.averaged(forward.move(course)), deviations)
+    left = blocks.measured[:, problem.used] - predicted
+    modes, along = modes_along(list(booms.values()), course)
+    places = along[np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(along) - 1)]
+    noise = problem.deviations**2 / np.maximum(blocks.counts[:, problem.used], 1.0)
+    strokes = stroke_error(problem.stroke_variance, course)
+    gravity, others = gravity_in_base(problem.scene), [i for i in range(len(slopes)) if i not in booms]
+
+    def run(number: int, moved: int | None) -> Innovations:
+        model = filter_model(modes, number, gravity, problem.used, strokes, prior.level, problem.length)
+        columns = [left, *-slopes[others]] if moved is None else [left - TRIAL * slopes[moved]]
+        return innovations(model, places, noise, prior, np.stack(columns, axis=1))
+
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        found = dict(zip(booms, pool.map(run, range(len(booms)), booms), strict=True))
+    values, variances, loads = found[None]
+    white = np.empty(slopes.shape)
+    white[others] = values[:, 1:].swapaxes(0, 1)
+    for i, other in found.items():
+        if i is not None:
+            white[i] = (other.values[:, 0] - values[:, 0]) / TRIAL
+    root = np.sqrt(variances)
+    return Pass(values[:, 0] / root, white / root, loads)
