@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
 from ..estimation.sensor_model import specific_force
-from ..estimation.tip_estimate import LOAD_TIME
 from ..kernels.jit import kernel
 from ..types import Array
 from .load_modes import ModesAlong
 from .sessions import SessionCourse
 
+LOAD_TIME = 1.0  # s
 CONSTANT_TIME = 1000.0  # s; the load that stays is a Gauss-Markov process, too
 CONSTANT = 2.0  # its standard deviation over that of the load
 CORNER = 0.786  # of a second-order filter over that of the strokes' smoother, at which both pass the same variance of noise

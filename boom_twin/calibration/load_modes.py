@@ -121,10 +121,8 @@ def _at_knots(scenes: Sequence[Scene], strokes: Array) -> ModesAlong:
             left, _, right = np.linalg.svd((before * plans[0].masses) @ motions.T)
             turn = left @ right
         before = turn @ motions
-        mass, damping, stiffness, forces = map(
-            np.array,
-            zip(*[_matrices(plan, plans[0], before, turn @ increments, modes[0].drives) for plan in plans], strict=True),
-        )
+        matrices = [_matrices(plan, plans[0], before, turn @ increments, modes[0].drives) for plan in plans]
+        mass, damping, stiffness, forces = map(np.array, zip(*matrices, strict=True))
         square = turn * np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2 @ turn.T
         tip = before[:, at : at + 3]
         quick = np.array([mode.motion[at : at + 2] / (2.0 * math.pi * mode.frequency) ** 2 for mode in knot.modes[count:]])

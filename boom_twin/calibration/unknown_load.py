@@ -87,10 +87,9 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
     deviations, passes = stepped(deviations, priors, LAST, SMALL)
     measured = sum(int(np.count_nonzero(each.white)) for each in passes)
     misfit = float(np.sqrt(sum(np.sum(each.white**2) for each in passes) / max(measured - len(deviations), 1)))
-    return Fit(
-        deviations, _information(passes), WIDER**2 * _scatter(passes, round(SPAN / problem.length)), misfit, quiet.passes + count,
-        quiet.whitening, _load(problem, passes),
-    )  # fmt: skip
+    scatter = WIDER**2 * _scatter(passes, round(SPAN / problem.length))
+    passed, load = quiet.passes + count, _load(problem, passes)
+    return Fit(deviations, _information(passes), scatter, misfit, passed, quiet.whitening, load)
 
 
 def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:
