@@ -15,7 +15,8 @@ import numpy as np
 
 from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
-from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, complex_scratch
+from ..kernels.elements.cylinder import compliance_and_lag
+from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Tables, complex_scratch
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, strokes_of_posture
@@ -74,6 +75,36 @@ class FrequencyResponse:
         return found
 
 
+def with_oil_at_rest(plan: Plan, drives: Array, stretches: Array) -> tuple[Tables, Array, Array]:
+    """Tables whose cylinders keep the oil's compliance at rest, and how much more a drive does than it would with that.
+
+    A drive on its way changes the stiffness k(s) of its oil, too. The force k(s) (l - s) + d (l' - s') therefore changes by
+    -(k - k' (l - s)) ds - d ds'; with k kept it would by -k ds - d ds'.
+
+    Parameters
+    ----------
+    drives, stretches : ndarray, shape (n,)
+        Lengths of the drives, and of the springs l - s, at rest, m.
+
+    Returns
+    -------
+    tables : Tables
+    gains : ndarray, shape (n,)
+        1 - k' (l - s) / k; 1 of a cylinder without `oil`.
+    lags : ndarray, shape (n,)
+        d / k, s.
+    """
+    rows, step = plan.tables.cylinders.copy(), 1e-6
+    found = [compliance_and_lag(row, plan.tables.oils, drive) for row, drive in zip(rows, drives, strict=True)]
+    rows.compliance, rows.lag = (np.array(column) for column in zip(*found, strict=True))
+    change = (plan.compliances(drives + step) - plan.compliances(drives - step)) / (2.0 * step)  # k' / k is -c' / c
+    gains = np.ones(len(rows))
+    of_oil = rows.oil >= 0
+    gains[of_oil] += change[of_oil] / rows.compliance[of_oil] * stretches[of_oil]
+    rows.oil = -1
+    return plan.tables._replace(cylinders=rows), gains, rows.lag.copy()
+
+
 class LinearisedBoom:
     """A boom at rest, for harmonic loads small enough that it answers in proportion.
 
@@ -97,6 +128,8 @@ class LinearisedBoom:
         self.stations = stations(scene)
         place(self.plan.tables, self._state, work)
         self._drive = drive_at_rest(self.plan, self._state, work)
+        stretches = work.position[self.plan.tables.cylinders.history] - self._drive
+        self._tables, self._gains, self._lags = with_oil_at_rest(self.plan, self._drive, stretches)
         self._work = complex_scratch(work)
         self._joints, self._moments = joint_angles_by_unknowns(self.plan), moments_by_unknowns(self.plan)
 
@@ -116,12 +149,13 @@ class LinearisedBoom:
             The equations are singular at a frequency.
         """
         count = len(frequencies)
-        every = np.ascontiguousarray(np.broadcast_to(LARGE * np.asarray(loads, complex), (count, self.load().size)))
+        every = np.array(np.broadcast_to(LARGE * np.asarray(loads, complex), (count, self.load().size)))
         increments = np.zeros((count, len(self.plan.names)), complex)
         tip = np.zeros((count, 3), complex)
         rates = 2j * math.pi * np.asarray(frequencies, float)
-        tables, state, work = self.plan.tables, self._state, self._work
-        status, row = harmonic_response(tables, state, work, self._drive, rates, every, increments, tip)
+        damped = np.outer(rates, self._lags)
+        every[:, TIP_FORCE:] = every[:, TIP_FORCE:] * (self._gains + damped) / (1.0 + damped)
+        status, row = harmonic_response(self._tables, self._state, self._work, self._drive, rates, every, increments, tip)
         if status != OK:
             raise SolverError(f"the response at {frequencies[row]:g} Hz cannot be computed: {SENTENCES[int(status)]}.")
         increments /= LARGE

@@ -28,6 +28,7 @@ from .tip_estimate import (
     ACCELERATION_COVARIANCE,
     FORCE_VARIANCE,
     TIP_COVARIANCE,
+    USUAL_LOAD,
     VARIANCES,
     WIDTH,
     advance_estimate,
@@ -118,4 +119,5 @@ def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, ze
             take_imu(f, zeros, size[0], k * span)
         for _ in range(counts[3]):
             take_forces(f, zeros, size[0] + 2, k * span)
+        f.level[0] = f.loads[USUAL_LOAD]  # readings without noise would let it fall
     write_estimate(f, results, estimates, out)

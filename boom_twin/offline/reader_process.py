@@ -144,7 +144,7 @@ class SampleReader:
 
 
 def items_of(
-    path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow
+    path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE
 ) -> Iterator[SampleBlock | Change | int | Counter[str]]:
     """What goes up the pipe, as `SampleReader` is to give it; a whole number is that of the None, the last are the oddities.
 

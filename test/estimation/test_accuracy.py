@@ -30,7 +30,7 @@ def test_more_sensors_are_never_worse(found: list[TipAccuracy]) -> None:
         for before, after in zip(fewer, more, strict=True):
             assert (after <= before * (1.0 + 1e-9)).all()
     assert np.hypot(*found[1].tip[:2]) < 0.2 * np.hypot(*found[0].tip[:2]), "angles tell where the tip is"
-    assert np.hypot(*found[2].acceleration) < 0.2 * np.hypot(*found[1].acceleration), "an IMU tells how it accelerates"
+    assert np.hypot(*found[2].acceleration) < 0.25 * np.hypot(*found[1].acceleration), "an IMU tells how it accelerates"
 
 
 def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,11 +79,11 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
     n, count, size = len(f.softness), int(f.status[tip.COUNT]), int(tip.states_of(f))
     a, q = np.zeros((size, size)), np.zeros((size, size))
     for k in (0, 1):
-        for place, time, variance in (
-            (tip.LOAD + k, tip.LOAD_TIME, f.level[0] ** 2),
-            (tip.ERROR + k, tip.JERK_TIME, f.pushes[k]),
-        ):
-            a[place, place], q[place, place] = -1.0 / time, 2.0 * variance / time
+        load, change, error = tip.LOAD + k, tip.LOAD_CHANGE + k, tip.ERROR + k
+        a[load, change], a[change, load], a[change, change] = 1.0, -(tip.LOAD_RATE**2), -2.0 * tip.LOAD_RATE
+        q[change, change] = 4.0 * tip.LOAD_RATE**3 * f.level[0] ** 2
+        a[error, error], q[error, error] = -1.0 / tip.JERK_TIME, 2.0 * f.pushes[k] / tip.JERK_TIME
+        q[tip.BIAS + k, tip.BIAS + k] = tip.BIAS_DRIFT**2
     for i in range(n):
         q[tip.SHARES + i, tip.SHARES + i] = tip.SOFTENING**2
     places = [0, 1, *range(tip.SHARES, tip.SHARES + 2 * n)]
@@ -315,7 +315,7 @@ def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
     for seed in range(8):
         rng = np.random.default_rng(100 + seed)
 
-        values = {f"cylinder_{i + 1}.k": parameter(scene, f"cylinder_{i + 1}.k") / (1.0 + 0.1 * rng.normal()) for i in range(4)}
+        values = {f"cylinder_{i + 1}.k": parameter(scene, f"cylinder_{i + 1}.k") / (1.0 + 0.25 * rng.uniform(-1.0, 2.0)) for i in range(4)}
         samples, truth = pseudo_session(scene, with_parameters(scene, values), 3.0, seed)
         twin, estimates = Twin(scene), []
         for sample in samples:

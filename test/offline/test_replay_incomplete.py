@@ -199,7 +199,7 @@ def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path,
     from boom_twin.messages.topic_table import load_topics
 
     pipe = Pipe(behind.__name__, str(tmp_path / "bag"))
-    pipe.send(({}, load_topics().outputs, load_scene(), Settings()))
+    pipe.send(({}, load_topics(), load_scene(), Settings()))
     pipe.wait_ready()
     if is_told:
         pipe.send(END)

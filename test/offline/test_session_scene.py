@@ -158,7 +158,7 @@ def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, c
 
 
 def test_an_encoder_five_degrees_off_is_a_fault_to_be_found(tmp_path):
-    bag = session(tmp_path / "bag", scene_text(4), keep=False, bias=np.radians(5.0))
+    bag = session(tmp_path / "bag", scene_text(4), keep=False, rows=1000, bias=np.radians(5.0))
     alarms = replay(bag, load_scene(), tmp_path / "out").summary["alarms"]
     assert {alarm["channel"] for alarm in alarms} == {"joint_1"}
 

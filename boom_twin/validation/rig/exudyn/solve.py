@@ -106,14 +106,14 @@ def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[
     boom = build(scene, strokes, elements)
     probes = attach(boom)
     settle(boom, strokes)
-    found = {key: values[-1] for key, values in read(boom, probes, at_rest=True).items()}
+    found = read(boom, probes, at_rest=True)
     rigid = section_frames(scene, strokes)[-1].point((scene.sections[-1].length, 0.0))
     return {
         "stroke_m": strokes.tolist(),
         "tip_rigid_m": rigid.tolist(),
-        "tip_m": found["tip"].tolist(),
-        "joint_rad": found["joints"].tolist(),
-        "cylinder_force_N": found["forces"].tolist(),
+        "tip_m": found["tip"][-1].tolist(),
+        "joint_rad": found["joints"][-1].tolist(),
+        "cylinder_force_N": found["forces"][-1].tolist(),
     }
 
 
