@@ -315,7 +315,10 @@ def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
     for seed in range(8):
         rng = np.random.default_rng(100 + seed)
 
-        values = {f"cylinder_{i + 1}.k": parameter(scene, f"cylinder_{i + 1}.k") / (1.0 + 0.25 * rng.uniform(-1.0, 2.0)) for i in range(4)}
+        values = {
+            f"cylinder_{i + 1}.k": parameter(scene, f"cylinder_{i + 1}.k") / (1.0 + 0.25 * rng.uniform(-1.0, 2.0))
+            for i in range(4)
+        }
         samples, truth = pseudo_session(scene, with_parameters(scene, values), 3.0, seed)
         twin, estimates = Twin(scene), []
         for sample in samples:

@@ -6,7 +6,9 @@ import numpy as np
 from kernels.dense import Dense, slopes
 from oracle import segments
 
+from boom_twin.kernels.elements.cylinder import compliance_and_lag
 from boom_twin.kernels.tables import Motion
+from boom_twin.validation.reference.segments.geometry import oil_stiffness
 
 
 class SegmentResponse:
@@ -18,7 +20,11 @@ class SegmentResponse:
         _, boom, _, self.stiffness = segments.equilibrium(model, drive, angles)
         n = len(self.stiffness)
         self.closures, self.lengths = np.array([c.g for c in boom.closures]).reshape(-1, n), [c.g for c in boom.lengths]
-        self.rigid = [i for i, joint in enumerate(scene.joints) if joint.cylinder.k is None]
+        self.rigid = [i for i, joint in enumerate(scene.joints) if not joint.cylinder.is_compressible]
+        self.k = np.array([oil_stiffness(joint.cylinder, at) for joint, at in zip(scene.joints, drive, strict=True)])
+        beyond = np.array([oil_stiffness(joint.cylinder, at + 1e-6) for joint, at in zip(scene.joints, drive, strict=True)])
+        stretch = np.array([length.v for length in boom.lengths]) - drive
+        self.by_drive = self.k - (beyond - self.k) / 1e-6 * stretch  # of k(s) (l - s)
         self.constraints = np.vstack([self.closures, *(self.lengths[i] for i in self.rigid)])
         self.mass, self.damping = segments.mass_matrix(boom), np.zeros((n, n))
         for _, d, elongation in boom.springs:
@@ -32,20 +38,20 @@ class SegmentResponse:
         return np.array([self._row(2j * np.pi * f, np.asarray(load)) for f in frequencies])
 
     def _row(self, s, load):
-        n, g, laws = len(self.stiffness), self.constraints, [joint.cylinder for joint in self.scene.joints]
+        n, g, dampers = len(self.stiffness), self.constraints, [joint.cylinder.d or 0.0 for joint in self.scene.joints]
         right = np.zeros(n + len(g), complex)
         right[:n] = load[:2] @ self.tip
-        for i, (law, moved) in enumerate(zip(laws, load[2:], strict=True)):
-            if law.k is None:
+        for i, (d, moved) in enumerate(zip(dampers, load[2:], strict=True)):
+            if i in self.rigid:
                 right[n + len(self.closures) + self.rigid.index(i)] = moved
             else:
-                right[:n] += (law.k + s * (law.d or 0.0)) * moved * self.lengths[i]
+                right[:n] += (self.by_drive[i] + s * d) * moved * self.lengths[i]
         matrix = np.block([[self.stiffness + s * self.damping + s**2 * self.mass, g.T], [g, np.zeros((len(g),) * 2)]])
         found = np.linalg.solve(matrix, right)
         q, multiplier = found[:n], iter(found[n + len(self.closures) :])
         forces = [
-            next(multiplier) if law.k is None else (law.k + s * (law.d or 0.0)) * (length @ q - moved)
-            for law, length, moved in zip(laws, self.lengths, load[2:], strict=True)
+            next(multiplier) if i in self.rigid else (self.k[i] + s * d) * (length @ q) - (self.by_drive[i] + s * d) * moved
+            for i, (d, length, moved) in enumerate(zip(dampers, self.lengths, load[2:], strict=True))
         ]
         return np.concatenate([self.tip @ q, self.joints @ q, forces])
 
@@ -62,7 +68,15 @@ class DenseModel:
     GAIN, RATE = 1e4, 1e2  # 1/s^2, 1/s; about those of the highest frequency
 
     def __init__(self, plan, z, drive):
-        self.plan, still = plan, np.zeros(plan.joints)
+        self.plan, still, at_rest = plan, np.zeros(plan.joints), Motion(0.0, 0.0, *np.zeros((2, len(plan.masses))))
+        rows = plan.tables.cylinders
+        self.lags = np.array([compliance_and_lag(row, plan.tables.oils, at)[1] for row, at in zip(rows, drive, strict=True)])
+
+        def of_drive(drives):
+            return np.asarray(Dense(plan, at_rest, drives, still).residual(z), float)
+
+        steps = 1e-6 * np.eye(plan.joints)
+        self.by_drive = np.array([(of_drive(drive - h) - of_drive(drive + h)) / 2e-6 for h in steps])
         dense = Dense(plan, Motion(0.0, 0.0, np.zeros(len(plan.masses)), np.zeros(len(plan.masses))), drive, still)
         position = dense.positions(z)[: len(plan.masses)].copy()
 
@@ -77,9 +91,10 @@ class DenseModel:
 
     def unknowns(self, frequencies, load):
         """Amplitudes (k, unknowns) under a `load` (2 + n,): force at the tip, drives."""
-        cylinders, found = self.plan.tables.cylinders, []
+        cylinders, found, load = self.plan.tables.cylinders, [], np.asarray(load)
         for s in 2j * np.pi * np.asarray(frequencies):
             right = self.tip.T.astype(complex) @ load[:2]
-            right[cylinders.z] += (1.0 + cylinders.lag * s) * load[2:]
+            right += load[2:] @ self.by_drive
+            right[cylinders.z] += self.lags * s * load[2:]
             found.append(np.linalg.solve(self.stiffness + s * self.damping + s**2 * self.mass, right))
         return np.array(found)

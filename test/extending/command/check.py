@@ -13,7 +13,9 @@ def run(*words):
 
 
 assert "reach how far the boom reaches" in " ".join(run("--help")[1].split())
-assert run("reach", "--help")[1].startswith("usage: boom_twin reach [-h] [--quiet] [--scene SCENE] [--json] [SCENE]\n\nHow far the boom reaches.")
+assert run("reach", "--help")[1].startswith(
+    "usage: boom_twin reach [-h] [--quiet] [--scene SCENE] [--json] [SCENE]\n\nHow far the boom reaches."
+)
 code, printed, _ = run("reach", "--json")
 assert code == 0 and json.loads(printed) == {"reach_m": load_scene().reach}
 code, _, told = run("reach", "nowhere.yaml")

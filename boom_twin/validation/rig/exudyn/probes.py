@@ -48,7 +48,7 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     -------
     dict
         ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
-        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``pins`` (k, m, 2) m, offsets of
+        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``pins`` (m, k, 2) m, offsets of
         the journals that have play.
     """
     data = partial(_data, boom, at_rest=at_rest)
@@ -64,7 +64,9 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
         "tip_rate_dot": data(probes.head[1])[:, 3],
         "joints": roots - before,
         "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
-        "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins]),
+        "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins])
+        .reshape(len(probes.pins), len(heads), 2)
+        .swapaxes(0, 1),
     }
 
 

@@ -106,14 +106,14 @@ def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[
     boom = build(scene, strokes, elements)
     probes = attach(boom)
     settle(boom, strokes)
-    found = read(boom, probes, at_rest=True)
+    found = {key: values[-1] for key, values in read(boom, probes, at_rest=True).items()}
     rigid = section_frames(scene, strokes)[-1].point((scene.sections[-1].length, 0.0))
     return {
         "stroke_m": strokes.tolist(),
         "tip_rigid_m": rigid.tolist(),
-        "tip_m": found["tip"][-1].tolist(),
-        "joint_rad": found["joints"][-1].tolist(),
-        "cylinder_force_N": found["forces"][-1].tolist(),
+        "tip_m": found["tip"].tolist(),
+        "joint_rad": found["joints"].tolist(),
+        "cylinder_force_N": found["forces"].tolist(),
     }
 
 
@@ -242,5 +242,5 @@ def _columns(found: dict[str, Array], strokes: Array, times: Array, pins: Sequen
         "tip_angle_rad": found["tip_angle"],
         "tip_angular_velocity_rad_s": found["tip_rate"],
         "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
-        **{f"{pin}_d{axis}_m": found["pins"][k][:, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
+        **{f"{pin}_d{axis}_m": found["pins"][:, k, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
     }
