@@ -44,6 +44,7 @@ SHORT = 2e-5  # s, step that accelerations are found with
 HALF = math.sqrt(2.0) - 0.5  # gamma of Newmark's method with beta = 1/2
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 OPEN = 1e-6  # m, and m/s: by which a loop may be open
+FAR = 1e-3  # m, by which a drive may begin away from where the state was taken
 STENCIL = ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0))  # of the fourth-order difference, over 12
 
 
@@ -152,6 +153,7 @@ def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -
     state.drives[0], state.drives[1] = length, rate
     _place_moving(plan, state, work, initial)
     _check_loops(plan, state, work, initial, length, rate)
+    _check_drives(plan, state, work, length)
     ends = []
     for step in (SHORT, 0.5 * SHORT):
         trial = State(*(array.copy() for array in state))
@@ -231,6 +233,19 @@ def _check_loops(plan: Plan, state: State, work: Work, initial: InitialState, le
                 "and rates that close the loops, as those of an earlier run do, and an incompressible cylinder the rate of its "
                 "drive."
             )
+
+
+def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
+    """UsageError if springs are not as long as the state's own forces make them: the drives begin somewhere else."""
+    cylinders = plan.tables.cylinders
+    forces = state.z[cylinders.z]
+    began = work.position[cylinders.history] - plan.compliances(length) * forces
+    for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FAR)):
+        own, given = began[i] - plan.closed_lengths[i], length[i] - plan.closed_lengths[i]
+        raise UsageError(
+            f"stroke_{i + 1}_m = {given:.5g} m in the first row: the initial state is of a stroke of {own:.5g} m; "
+            f"{1e3 * FAR:g} mm is let pass. Begin the drive where the state was taken."
+        )
 
 
 def _incompressible(plan: Plan) -> NDArray[np.bool_]:

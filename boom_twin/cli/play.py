@@ -85,12 +85,20 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         nonlocal is_paused
         if keys.pressed().count(" ") % 2:
             is_paused = not is_paused
-            bar.set_description("paused" if is_paused else "playing", refresh=True)
+            tell("paused" if is_paused else "playing")
         return is_paused
+
+    def tell(word: str) -> None:
+        if bar.disable:  # no terminal
+            print(f"{word}, {bar.n:.1f} of {length:.1f} s", file=sys.stderr, flush=True)
+        else:
+            bar.set_description(word, refresh=True)
 
     with Keys() as keys:
         if keys.are_read:
             print("space: pause and go on; Ctrl-C: end", file=sys.stderr)
+        if not sys.stderr.isatty():
+            print(f"playing {length:.1f} s", file=sys.stderr, flush=True)
         while True:
             with tqdm(total=length, disable=None, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):

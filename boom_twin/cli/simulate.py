@@ -83,6 +83,8 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
     if args.start == "rest":
         return None
     if args.start != "undeflected":
+        if not Path(args.start).exists():
+            raise UsageError(f"--start {args.start}: no such file. Give rest, undeflected, or a file of --save-state.")
         return read_state(Path(args.start))
     try:
         rates = None if args.joint_rates is None else np.array([float(rate) for rate in args.joint_rates.split(",")])

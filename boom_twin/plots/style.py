@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UsageError
 from ..system.atomic_files import write_atomic
 from ..system.terminal_text import printable
 from ..types import Array
@@ -63,12 +64,14 @@ SMALL: dict[str, Any] = {"fontsize": 13, "color": GREY, "va": "top", "ha": "righ
 def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
     """A figure of `size` (hundreds of pixels), titled, written to `path` as PNG when the block is left.
 
-    The same arrays give the same bytes: the file holds no time and no version.
+    The same arrays give the same bytes: the file holds no time and no version. UsageError if the name is of another kind.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    if path.suffix.lower() != ".png":
+        raise UsageError(f"{path}: a picture is a PNG file. Give a name that ends with .png.")
     with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK}):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)

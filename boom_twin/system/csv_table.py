@@ -51,7 +51,12 @@ class CsvTable:
             )
 
     def _number(self, row: list[str], place: int, line: int, blank: float | None) -> float:
-        text = row[place].strip() if place < len(row) else ""
+        if place >= len(row):
+            raise self.error(
+                f"{self.path}, line {line}: {len(row)} of {len(self.names)} cells, {self.names[place]} is missing. "
+                "If the file was cut off there, remove the line."
+            )
+        text = row[place].strip()
         if not text and blank is not None:
             return blank
         try:

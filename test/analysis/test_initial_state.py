@@ -122,7 +122,10 @@ def test_the_command_starts_undeflected_saves_and_goes_on(tmp_path, capsys):
     far = table[:, 1:] + np.array([0.02, 0.0, 0.0, 0.0])  # of no posture's strokes, as where a move was interrupted
     np.savetxt(tmp_path / "far.csv", np.column_stack([times, far]), delimiter=",", comments="", header=HEADER)
     bare = ["simulate", "--drive", str(tmp_path / "far.csv"), "--no-error-estimate", "--out", str(tmp_path / "d.csv")]
-    assert main([*bare, "--start", str(end)]) == 0
+    assert main([*bare, "--start", str(end)]) == 1
+    assert "Begin the drive where the state was taken" in capsys.readouterr().err
+    assert main([*bare, "--start", "undeflectd"]) == 1
+    assert "no such file. Give rest, undeflected" in capsys.readouterr().err
     assert main(bare) == 0  # at rest in its first row
     assert main([*common, "--out", str(tmp_path / "b.csv"), "--start", str(end)]) == 0
     first, second = (np.genfromtxt(tmp_path / name, delimiter=",", names=True) for name in ("a.csv", "b.csv"))

@@ -132,6 +132,7 @@ CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"
         (CSV.replace("joint_1_rad", "joint1_rad"), "unknown column 'joint1_rad' in its first line. Did you mean joint_1_rad?"),
         (CSV.replace("joint_1_rad", "stroke_2_m"), "column stroke_2_m is there twice"),
         (CSV.replace("0.1,0.1", "0.1,x"), "line 3: stroke_1_m = 'x' is not a number"),
+        (CSV.replace("0.1,0.2,\n", "0.1,0."), "line 3: 3 of 4 cells, joint_1_rad is missing. If the file was cut off there"),
         (CSV.replace("\n0.1,", "\n0,"), "line 3: t_s = 0 is not after the row before"),
         (CSV.replace("\n0.1,", "\n1700000000000,"), "not in seconds"),
         (CSV.replace(",", ";"), "no column t_s, stroke_1_m"),
