@@ -15,7 +15,7 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i
   would be drawn to what explains noise by noise.
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
-  moment, M_j the mode's, w Simpson's weights.
+  moment, slow likewise, M_j the mode's, w Simpson's weights.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
 - e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
   Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke.
@@ -50,7 +50,7 @@ from ..types import NANO, Array
 
 MODES = 6  # at most
 LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
-SLOW = 0.5  # s, over which the forces are taken that a is learnt from
+SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
@@ -268,9 +268,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
         c = f.coupling[j]
         c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
         for i in range(n):
-            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], 0.0
+            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], kept * c[2 + n + i]
         for k in range(moments.shape[0]):
-            c[2 + n + f.sections[k]] += f.bending[j, k] * moments[k]
+            c[2 + n + f.sections[k]] += (1.0 - kept) * f.bending[j, k] * moments[k]
     f.now[ANGLE] = results.tip[0, 2]
     f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from boom_twin.cli.main import main
 Capture = pytest.CaptureFixture[str]
 
 
-def answer(capsys: Capture, *given: str) -> dict[str, object]:
+def answer(capsys: Capture, *given: str) -> dict[str, Any]:
     assert main(["response", *given, "--json"]) == 0
     return dict(json.loads(capsys.readouterr().out))
 
@@ -49,7 +50,7 @@ def test_steady_state_of_pump_and_of_its_rows(capsys: Capture, tmp_path: Path) -
     out, rows = tmp_path / "out", tmp_path / "load.csv"
     found = answer(capsys, "--posture", "arch", "--pump", "0.43:130", "--out", str(out))
     columns = table(out / "steady_state.csv")
-    assert np.ptp(columns["tip_y_m"]) == pytest.approx(found["tip_peak_to_peak_m"][1])  # type: ignore[index]
+    assert np.ptp(columns["tip_y_m"]) == pytest.approx(found["tip_peak_to_peak_m"][1])
     assert (out / "steady_state.png").is_file()
     force = np.column_stack([columns[name] for name in ("t_s", "fx_N", "fy_N")])
     force = np.vstack([force, [1.0 / 0.43, *force[0, 1:]]])
@@ -64,8 +65,8 @@ def test_map_on_a_way(capsys: Capture, tmp_path: Path) -> None:
     found = answer(capsys, *given)
     assert found["postures"] == ["horizontal", "horizontal to arch 50 %", "arch"]
     assert np.array(found["swing_m"]).shape == (3, 15)
-    assert set(found["avoid_posture"]) == set(found["postures"]) and set(found["avoid_harmonic"]) == {3}  # type: ignore[call-overload]
-    assert list(table(out / "resonance_map.csv")) == ["rate_Hz", *(f"swing_m_{name}" for name in found["postures"])]  # type: ignore[attr-defined]
+    assert set(found["avoid_posture"]) == set(found["postures"]) and set(found["avoid_harmonic"]) == {3}
+    assert list(table(out / "resonance_map.csv")) == ["rate_Hz", *(f"swing_m_{name}" for name in found["postures"])]
     assert main(["response", *given]) == 0  # an earlier response is replaced
     assert "harmonic" in capsys.readouterr().out
 

@@ -172,12 +172,19 @@ def _numbers(found: PapersStudy) -> dict[str, object]:
         "bases": found.bases,
         "low_speed": {"tip_m_s": found.speeds[:, 0], "error_max_m": found.speeds[:, 1], "error_rms_m": found.speeds[:, 2]},
         "stops": [
-            {"posture": s.own.posture, "pins": s.own.pins, "until_s": s.flight, "tip_rms_m": s.tip, "tip_rms_throughout_m":
-            s.tip_throughout, "forces": s.forces,
-             "acceleration": s.acceleration, "penetration": s.penetration}
+            {
+                "posture": s.own.posture,
+                "pins": s.own.pins,
+                "until_s": s.flight,
+                "tip_rms_m": s.tip,
+                "tip_rms_throughout_m": s.tip_throughout,
+                "forces": s.forces,
+                "acceleration": s.acceleration,
+                "penetration": s.penetration,
+            }
             for s in found.stops
         ],
-    }  # fmt: skip
+    }
 
 
 def slope(found: PapersStudy) -> float:
