@@ -1,5 +1,4 @@
-"""Bending moments and stresses at the stations of a boom with what the sensors know beyond the prediction, and how sure that
-is.
+"""Bending moments and stresses at the stations of a boom, with what sensors know beyond the prediction, and their deviation.
 
 The prediction's moment at a station is EI times curvature. The force at the tip that only sensors know of (pump, wind, load)
 adds its static share, moment = influence times force, with the deviation that the estimate gives that force; the boom's

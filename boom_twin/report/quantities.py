@@ -293,8 +293,7 @@ class SectionLoads:
                 self._largest[section] = _Largest(column, moment, *about)
 
     def loads(self, heights: Array | None) -> list[Load]:
-        """One for every flexible section; `heights` (n,) of the sections in m, or None for the scene's, or thin-walled "
-        "boxes'."""
+        """One for every flexible section; `heights` (n,) of the sections, m, or None for the scene's or thin-walled boxes'."""
         if not self._largest:
             return []
         model, found = BendingStressModel(self._scene, heights), []
