@@ -48,8 +48,8 @@ class Twin:
 
     Parameters
     ----------
-    scene : Scene, path or mapping
-        The boom; as for `boom_twin.statics`.
+    scene : SceneSource
+        The boom: a scene, a path or a mapping, as for `boom_twin.statics`.
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
     mounts : sequence of Mount or None, optional
