@@ -91,7 +91,8 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
         seen["boom_twin_player"] |= access(graph, "boom_twin_player")
         time.sleep(0.2)
     assert [player.end() for player in players] == [0, 0], [player.said() for player in players]
-    assert all("\r" not in player.said() and player.said().count("playing") == 1 for player in players)  # a bar is for terminals
+    told = [player.said() for player in players]
+    assert all("\r" not in said and said.count("playing") == 1 for said in told), told  # a bar is for terminals
     for name, player in zip(BOOMS, players, strict=True):
         sent = re.search(r"cylinder_strokes (\d+)", player.said())[1]  # type: ignore[index]
         wait_for_all(graph, name, sent)
