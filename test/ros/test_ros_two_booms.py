@@ -38,6 +38,9 @@ from boom_twin.types import Stream
 BOOMS = {"front": "0.0", "rear": "1.0"}
 """Their namespaces, and from when on the session is played to each, s."""
 COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)]
+ORDERED = (Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD, Output.TIP_UNCERTAINTY)
+"""What depends on the order in which samples of several streams are taken. Where DDS sends a lost packet again, to the recorder or
+to the node, the two have not seen the same order; that their bits are equal where they have is for `test_ros_live`."""
 RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.SHAPE)
 CONFIG = Path(boom_twin.__file__).parent / "msg_config"
 OPTIONAL = {"/front/cylinder_forces", "/clock", "/front/boom_twin/baseline"}
@@ -184,7 +187,7 @@ def published(path: Path, topics: Topics, key: Output) -> list[tuple[int, bytes]
 
 @pytest.mark.parametrize("name", BOOMS)
 def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, Any], name: str, tmp_path: Path) -> None:
-    """Bit for bit, of the strokes that the node answered."""
+    """Bit for bit, of the strokes that the node answered; what depends on the order of arrival has its stamps."""
     path = recorded[name][0]
     topics = mapping_of(path).topics
     answered = {stamp for stamp, _ in published(path, topics, Output.TIP_POSITION)}
@@ -199,7 +202,11 @@ def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, An
     for key in COMPARED:
         live = published(path, topics, key)
         assert len(live) > (0 if key in RARE else 100)
-        assert live == published(tmp_path / "out" / "bag", topics, key), key
+        replayed = published(tmp_path / "out" / "bag", topics, key)
+        if key in ORDERED:
+            assert [stamp for stamp, _ in live] == [stamp for stamp, _ in replayed], key
+        else:
+            assert live == replayed, key
 
 
 @pytest.mark.parametrize("name", BOOMS)
