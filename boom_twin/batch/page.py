@@ -31,7 +31,7 @@ body { max-width: 1400px } svg { width: 100%; height: 130px }
 table.sorted th { cursor: pointer } tr.failed td { background: #fff0e6 }
 </style>"""
 
-_TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_")
+_TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """What figures begin with whose course over time is shown."""
 _MOST_TRENDS = 24
 _WIDTH, _HEIGHT, _EDGE = 900.0, 120.0, 14.0

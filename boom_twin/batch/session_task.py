@@ -8,12 +8,17 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BoomTwinError
 from ..system.child_process import python_command
 from .supervised_process import Limits, end_with_caller, run_supervised
+
+if TYPE_CHECKING:
+    from ..bag.time_window import TimeWindow
+    from ..config.settings import Settings
+    from ..scene.schema import Scene
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
@@ -44,6 +49,8 @@ class SessionTask:
         How often a session that fails is tried again.
     start, duration : float, float or None
         The window of the session, see `boom_twin.bag.time_window.TimeWindow`.
+    calibrate : bool
+        Whether to estimate the scene's parameters from it as well, which takes it to be healthy.
     """
 
     key: str
@@ -61,6 +68,7 @@ class SessionTask:
     retries: int
     start: float = 0.0
     duration: float | None = None
+    calibrate: bool = False
 
 
 def run_task(task: SessionTask) -> Row:
@@ -139,6 +147,22 @@ def row_of(task: SessionTask) -> Row:
     }
     for each in quantities:
         row |= {each.name: each.value, f"{each.name}_sigma": each.sigma}
+    return row | (_calibrated(task, scene.scene, settings, window) if task.calibrate else {})
+
+
+def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: TimeWindow) -> Row:
+    """What `boom_twin.calibration.run.calibrate` makes of a session alone; why, if it makes nothing of it."""
+    from ..calibration.run import BETWEEN, calibrate
+
+    try:
+        found = calibrate([task.session], scene, None, settings, task.mapping, window=window)
+    except BoomTwinError as error:
+        return {"calibration_reason": str(error).replace("\n", " ")}
+    row: Row = {"calibration_misfit": found.misfit, "calibration_remarks": "; ".join(found.remarks)}
+    for estimate in found.estimates:
+        if estimate.told:
+            name = f"calibrated_{estimate.unknown.name}"
+            row |= {name: estimate.value, f"{name}_sigma": (estimate.high - estimate.low) / (2.0 * BETWEEN)}
     return row
 
 

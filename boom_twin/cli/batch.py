@@ -38,6 +38,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
+    parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
     parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
     parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
@@ -99,7 +100,8 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping", "baseline")}
     contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
     window = window_of(args)
-    options = "\n".join([__version__, str(args.report), str(args.keep_bags), str(window), *contents])
+    kinds = [str(args.report), str(args.keep_bags), str(args.calibrate)]
+    options = "\n".join([__version__, *kinds, str(window), *contents])
     paths = {name: None if path is None else str(path.resolve()) for name, path in given.items()}
     return [
         SessionTask(
@@ -110,6 +112,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             **paths,
             start=window.start,
             duration=window.duration,
+            calibrate=args.calibrate,
             report=args.report,
             keep_bag=args.keep_bags,
             time=args.timeout,

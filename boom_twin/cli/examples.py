@@ -17,7 +17,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "response": ("response my_boom.yaml --posture arch", "response --posture arch --pump 0.4:130"),
     "envelope": ("envelope my_boom.yaml --out out/envelope",),
     "init": ("init --example-table > boom_table.yaml", "init --table boom_table.yaml --out my_boom.yaml"),
-    "simulate": ("simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",),
+    "simulate": (
+        "simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",
+        "simulate --drive examples/strokes.csv --out spread.csv --samples 100 --vary cylinder_2.k=0.1",
+    ),
     "replay": (
         "replay bags/arch_session --out out/replay --report",
         "replay session.csv --scene my_boom.yaml --out out/replay --start 10 --duration 20 --table csv",

@@ -42,6 +42,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
     parser.add_argument("--save-state", metavar="FILE.json", help="the boom at the last row, for --start of another run")
     parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
+    many = "Monte Carlo: so many booms with parameters drawn at random; OUT.csv has mean, deviation, quantiles"
+    parser.add_argument("--samples", type=int, metavar="N", help=many)
+    what = "a parameter and its standard deviation: a share, of loads kg or kg/m; may be repeated (with --samples)"
+    parser.add_argument("--vary", action="append", metavar="NAME=SIGMA", help=what)
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the samples (0)")
 
 
 def run(args: Namespace) -> int:
@@ -52,6 +57,7 @@ def run(args: Namespace) -> int:
     from ..compiler.compile import compile_scene
 
     scene = open_scene(args.scene)
+    _check_sampling(args)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
@@ -60,6 +66,8 @@ def run(args: Namespace) -> int:
         check_new(Path(picture_or_state), sources)
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
+    if args.samples is not None:
+        return _sample(args, scene, times, strokes, angles)
     start = _start(args, scene, strokes[0], angles)
     result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
     for doubt in result.doubts:
@@ -72,6 +80,53 @@ def run(args: Namespace) -> int:
     if args.orbits:
         _draw_orbits(args, scene, result)
     return 0
+
+
+def _check_sampling(args: Namespace) -> None:
+    """Refuse what does not go with ``--samples``, or only with it."""
+    if args.samples is None:
+        if args.vary:
+            raise UsageError(f"--vary {args.vary[0]}: goes with --samples N. Add it, or leave --vary out.")
+        return
+    single = {"--check": args.check, "--start": args.start != "rest", "--save-state": args.save_state, "--orbits": args.orbits}
+    for option, is_given in single.items():
+        if is_given:
+            raise UsageError(f"{option}: is of one motion, --samples of many. Leave one of them out.")
+
+
+def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
+    """Simulate many booms; write their statistics and the samples."""
+    from ..analysis.monte_carlo import simulate_samples
+    from .progress import progress_of
+
+    out = Path(args.out)
+    table = out.with_name(f"{out.stem}_samples.csv")
+    check_new(table, [Path(path) for path in (args.drive, args.scene) if path is not None])
+    progress = progress_of(args.samples, "samples", "simulate")
+    deviations = dict(map(_deviation, args.vary or ()))
+    found = simulate_samples(scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update)
+    progress.close()
+    for failure in found.failures:
+        print(f"boom_twin simulate: warning: left out: {failure}", file=sys.stderr)
+    if found.doubtful:
+        print(f"boom_twin simulate: warning: {found.doubtful} samples move in a way that simulate doubts.", file=sys.stderr)
+    write_atomic(out, columns_text(found.columns()))
+    write_atomic(table, columns_text(found.samples))
+    spread = {name: np.quantile(values, (0.025, 0.5, 0.975)) for name, values in found.samples.items()}
+    right = args.samples - len(found.failures)
+    told = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
+    lines = [f"{name:28s} {numbers(values)}" for name, values in spread.items()]
+    head = f"{right} samples; 2.5 %, 50 %, 97.5 % of them, SI:"
+    print_result(args.json, told | spread, [head, *lines, args.out, str(table)])
+    return 0
+
+
+def _deviation(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise UsageError(f"--vary {text}: give NAME=SIGMA, as cylinder_2.k=0.1.") from None
 
 
 def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:

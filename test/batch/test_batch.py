@@ -19,7 +19,9 @@ from health.recorded import written
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("distributed")
 
-from boom_twin import replay  # noqa: E402
+from boom_twin import load_scene, replay  # noqa: E402
+from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
+from boom_twin.calibration import calibrate  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
 from boom_twin.system.child_process import python_command  # noqa: E402
 
@@ -170,6 +172,29 @@ def test_no_scheduler_answers(
 def test_numbers_out_of_bounds_are_refused(option: tuple[str, str], tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["batch", "x", "--out", str(tmp_path / "o"), *option])
+
+
+def task_of(session: Path, out: Path) -> SessionTask:
+    return SessionTask("key", str(session), str(out), "", None, None, None, None, False, False, 600.0, 10**9, 0, calibrate=True)
+
+
+def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp_path: Path) -> None:
+    row = row_of(task_of(sessions / "s0", tmp_path / "out"))
+    assert row["status"] == "ok" and row["output_sha256"] and row["calibration_reason"]
+    assert not [name for name in row if name.startswith("calibrated_")]
+
+
+@pytest.mark.slow
+def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> None:
+    bag = Path(__file__).parents[2] / "bags" / "arch_session"
+    row, found = row_of(task_of(bag, tmp_path / "out")), calibrate([bag], load_scene())
+    told = {each.unknown.name: each for each in found.estimates if each.told}
+    names = {name.removeprefix("calibrated_") for name in row if name.startswith("calibrated_") and not name.endswith("_sigma")}
+    assert names == told.keys() >= {f"cylinder_{i}.k" for i in (1, 2, 3, 4)}
+    for name, each in told.items():
+        assert row[f"calibrated_{name}"] == each.value
+        assert each.low < row[f"calibrated_{name}"] < each.high and row[f"calibrated_{name}_sigma"] > 0.0
+    assert "calibration_reason" not in row and row["calibration_misfit"] == found.misfit
 
 
 KILLS = """

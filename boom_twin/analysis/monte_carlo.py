@@ -1,0 +1,196 @@
+"""Monte Carlo simulation: one motion of booms whose parameters are drawn at random about those of a scene."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import BoomTwinError, SolverError, UsageError
+from ..scene.edit import parameter, parameter_names, with_parameters
+from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
+from ..types import Array
+from .simulate import Simulation, simulate
+
+LOADS = ("tip.payload", "line_fill")
+"""Parameters that may be nothing: their deviations have units, those of all others are shares."""
+LOWER, UPPER = 0.025, 0.975
+"""Quantiles that are told."""
+LARGEST = 4e9  # bytes that all motions may take
+
+
+@dataclass(frozen=True, repr=False)
+class SampledMotions:
+    """Motions of sampled booms. c samples that could be computed, of m rows each.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        s.
+    parameters : dict of str to ndarray, shape (c,)
+        What was drawn, SI, by the parameter's name.
+    motions : dict of str to ndarray, shape (c, m)
+        Tip position and acceleration and the cylinders' forces, by their columns in `boom_twin.analysis.simulate.Simulation`.
+    failures : tuple of str
+        Samples that could not be computed: their parameters, and why.
+    doubtful : int
+        Samples whose motion `simulate` doubts.
+    """
+
+    times: Array
+    parameters: dict[str, Array]
+    motions: dict[str, Array]
+    failures: tuple[str, ...]
+    doubtful: int
+
+    def columns(self) -> dict[str, Array]:
+        """Of every quantity mean, standard deviation and the quantiles `LOWER` and `UPPER` over the samples, by row.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (m,)
+            By name with unit.
+        """
+        found = {"t_s": self.times}
+        for name, values in self.motions.items():
+            low, high = np.quantile(values, (LOWER, UPPER), axis=0)
+            found |= {f"{name}_mean": values.mean(axis=0), f"{name}_std": values.std(axis=0, ddof=1)}
+            found |= {f"{name}_p2.5": low, f"{name}_p97.5": high}
+        return found
+
+    @cached_property
+    def samples(self) -> dict[str, Array]:
+        """Of every sample its parameters and its extremes, (c,) each."""
+        motion = self.motions
+        forces = {name: values for name, values in motion.items() if name.startswith("cylinder_force_")}
+        return self.parameters | {
+            "tip_y_min_m": motion["tip_y_m"].min(axis=1),
+            "tip_y_max_m": motion["tip_y_m"].max(axis=1),
+            "tip_acceleration_max_m_s2": np.hypot(motion["tip_ax_m_s2"], motion["tip_ay_m_s2"]).max(axis=1),
+            **{f"{name.removesuffix('_N')}_max_N": np.abs(values).max(axis=1) for name, values in forces.items()},
+        }
+
+
+def drawn(scene: Scene, deviations: Mapping[str, float], count: int, seed: int) -> dict[str, Array]:
+    """Random values of parameters about those of `scene`, independent of each other.
+
+    Shares give a log-normal distribution, so that stiffness and mass stay positive; loads a normal one, cut off at nothing.
+
+    Parameters
+    ----------
+    deviations : dict of str to float
+        Standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
+    count : int
+    seed : int
+
+    Returns
+    -------
+    dict of str to ndarray, shape (count,)
+
+    Raises
+    ------
+    UsageError
+        A parameter that the scene lacks, or a deviation that is not positive; none at all.
+    """
+    names = parameter_names(scene)
+    if not deviations:
+        raise UsageError(f"vary: nothing. Name a parameter with its deviation, of {', '.join(names)}.")
+    noise = np.random.default_rng(seed)
+    found = {}
+    for name, deviation in deviations.items():
+        if name not in names:
+            raise UsageError(f"vary {name}: the scene has no such parameter. It has {', '.join(names)}.")
+        if not 0.0 < deviation < math.inf:
+            raise UsageError(f"vary {name} = {deviation:g}: a standard deviation is positive and finite.")
+        if name not in LOADS and deviation > 1.0:
+            raise UsageError(f"vary {name} = {deviation:g}: a share of the value, 1 at most. For 10 %, give 0.1.")
+        steps, present = deviation * noise.standard_normal(count), parameter(scene, name)
+        found[name] = np.maximum(present + steps, 0.0) if name in LOADS else present * np.exp(steps)
+    return found
+
+
+def simulate_samples(
+    scene: SceneSource,
+    times: Array,
+    strokes: Array,
+    deviations: Mapping[str, float],
+    count: int,
+    seed: int = 0,
+    dt: float = 1e-3,
+    angles: Array | None = None,
+    tell: Callable[[int], object] = lambda done: None,
+) -> SampledMotions:
+    """Follow the strokes with `count` booms that differ in parameters drawn at random, on all cores.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        The boom, of n sections; as for `boom_twin.statics`.
+    times, strokes, dt, angles
+        As for `boom_twin.simulate`; every boom begins at rest.
+    deviations : dict of str to float
+        See `drawn`.
+    count : int
+        Samples, at least 2.
+    seed : int
+        The same seed gives the same samples, whatever the number of cores.
+    tell : callable, optional
+        Called with 1 whenever a sample is done.
+
+    Returns
+    -------
+    SampledMotions
+
+    Raises
+    ------
+    UsageError
+        As `drawn` and `boom_twin.simulate`; motions that take too much memory.
+    SolverError
+        Not one of the samples could be computed.
+    """
+    scene = as_scene(scene)
+    if count < 2:
+        raise UsageError(f"samples = {count}: a spread needs 2 at least. Give 100.")
+    if (size := 8.0 * count * len(times) * (4 + len(scene.joints))) > LARGEST:
+        raise UsageError(f"samples = {count} of {len(times)} rows: {size:.2g} bytes, {LARGEST:.2g} at most. Give fewer rows.")
+    values = drawn(scene, deviations, count, seed)
+    simulate(scene, times[:1], strokes[:1], dt, angles, estimate_errors=False)  # what is wrong for all is told once
+
+    def follow(i: int) -> tuple[dict[str, Array], bool] | str:
+        mine = {name: float(column[i]) for name, column in values.items()}
+        try:
+            found = simulate(with_parameters(scene, mine), times, strokes, dt, angles, estimate_errors=False)
+        except BoomTwinError as error:
+            return f"{', '.join(f'{name} = {value:.6g}' for name, value in mine.items())}: {error}"
+        return _kept(found), bool(found.doubts)
+
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        results = []
+        for each in pool.map(follow, range(count)):
+            results.append(each)
+            tell(1)
+    failures = tuple(each for each in results if isinstance(each, str))
+    right = [i for i, each in enumerate(results) if not isinstance(each, str)]
+    if len(right) < 2:
+        raise SolverError(f"{len(failures)} of {count} samples have no solution; the first: {failures[0]}")
+    done = [each for each in results if not isinstance(each, str)]
+    return SampledMotions(
+        np.asarray(times, dtype=float),
+        {name: column[right] for name, column in values.items()},
+        {name: np.array([motion[name] for motion, _ in done]) for name in done[0][0]},
+        failures,
+        sum(is_doubtful for _, is_doubtful in done),
+    )
+
+
+def _kept(found: Simulation) -> dict[str, Array]:
+    """Copies of what is told of a motion."""
+    columns = found.columns()
+    names = [name for name in columns if name.startswith(("tip_", "cylinder_force_"))]
+    return {name: columns[name].copy() for name in names}
