@@ -14,7 +14,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..compiler.plan import Plan
-from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.pin_contact import (
     CLEARANCE,
     DAMPER,
@@ -81,10 +80,9 @@ class Energies:
 
     def _oil(self, drives: Array) -> tuple[Array, Array]:
         """Stiffnesses (N/m) and dampings (N s/m) of the oil at lengths of the drives (m); 0 if incompressible."""
-        t = self._plan.tables
-        rows = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
-        found = [(1.0 / compliance, lag / compliance) if compliance > 0.0 else (0.0, 0.0) for compliance, lag in rows]
-        return np.array([each[0] for each in found]), np.array([each[1] for each in found])
+        compliances, lags = self._plan.compliances_and_lags(drives)
+        stiffnesses = np.divide(1.0, compliances, out=np.zeros_like(compliances), where=compliances > 0.0)
+        return stiffnesses, lags * stiffnesses
 
     def contact(self, state: State) -> float:
         """Of contacts, J; of linearised pins, their springs.

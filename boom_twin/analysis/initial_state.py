@@ -239,7 +239,7 @@ def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
     """UsageError if springs are not as long as the state's own forces make them: the drives begin somewhere else."""
     cylinders = plan.tables.cylinders
     forces = state.z[cylinders.z]
-    began = work.position[cylinders.history] - plan.compliances(length) * forces
+    began = work.position[cylinders.history] - plan.compliances_and_lags(length)[0] * forces
     for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FAR)):
         own, given = began[i] - plan.closed_lengths[i], length[i] - plan.closed_lengths[i]
         raise UsageError(
