@@ -8,6 +8,7 @@ little, see `numerical_damping`). Coriolis and centrifugal forces do no work, an
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -207,8 +208,7 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
     first, heavy = energies.total(start), energies.weight(start)
     before, sums = energies.powers(start), np.zeros(3)
     gap, left, moved, longest = 0.0, 0.0, energies.kinetic(start), 0.0
-    impacts = bool((course.plan.tables.clearances.linear == 0).any())
-    for step, state in course.states(dt, FINER if impacts else 1):
+    for step, state in states_of(course, dt):
         now = energies.powers(state)
         sums += 0.5 * step * (before + now)
         before, longest = now, max(longest, step)
@@ -217,6 +217,12 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
         moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
     work, damping, lost = sums.tolist()
     return EnergyBalance(work, work - damping - lost - left, damping, lost, gap, left, float(moved), longest)
+
+
+def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
+    """Steps (s) and states of a motion whose powers or forces are to be summed; see `energy_balance` and `DriveCourse.states`."""
+    impacts = bool((course.plan.tables.clearances.linear == 0).any())
+    return course.states(dt, FINER if impacts else 1)
 
 
 def numerical_damping(frequency: float, step: float, rho: float) -> float:
