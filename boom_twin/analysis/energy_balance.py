@@ -220,7 +220,7 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
 
 
 def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
-    """Steps (s) and states of a motion whose powers or forces are to be summed; see `energy_balance` and `DriveCourse.states`."""
+    """Steps (s) and states, as of `DriveCourse.states`, of a motion whose powers or forces are to be summed."""
     impacts = bool((course.plan.tables.clearances.linear == 0).any())
     return course.states(dt, FINER if impacts else 1)
 

@@ -2,8 +2,8 @@
 
 The boom linearised at rest is solved at every frequency by the complex sweeps of `kernels.transfer.frequency_response`; no
 natural mode is left out. A flexible part bends in at least `SHAPES` shapes, however few the scene has `modes`: so many that up
-to 30 Hz more change nothing (see `with_all_shapes`). Pins with clearance are linearised where their journals rest: tangent of the
-contact's force at the static penetration, and its damping.
+to 30 Hz more change nothing (see `with_all_shapes`). Pins with clearance are linearised where their journals rest: tangent of
+the contact's force at the static penetration, and its damping.
 """
 
 from __future__ import annotations
@@ -132,10 +132,15 @@ def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
     Raises
     ------
     UsageError
-        A pin does not answer in proportion: it has friction, or hangs free in its bush.
+        A pin does not answer in proportion: it has friction, or hangs free in its bush. Or it is a spring whose place turns.
     """
     for name, row, memory in zip(plan.pins, plan.tables.clearances, state.contacts, strict=True):
-        if row.friction > 0.0 and not row.linear:
+        if row.linear:
+            raise UsageError(
+                f"clearance.treatment = spring-damper: the spring in {name} turns with the body that it is fixed to, which the "
+                "tangents of a frequency response leave out. Set treatment: contact, which answers in proportion at rest."
+            )
+        if row.friction > 0.0:
             raise UsageError(
                 f"clearance.contact.friction = {row.friction:g} in {name}: a journal that sticks and slides does not answer in "
                 "proportion, so there is no frequency response. Set friction: 0, or simulate."
@@ -244,7 +249,7 @@ class LinearisedBoom:
 def linearised_boom(
     scene: SceneSource = None, strokes: ArrayLike | str | None = None, posture: str | None = None
 ) -> LinearisedBoom:
-    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture of the scene; errors as of `statics`."""
+    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture; takes and raises what `statics` does."""
     scene = as_scene(scene)
     return LinearisedBoom(scene, *strokes_and_angles(scene, strokes, posture))
 
@@ -283,7 +288,7 @@ def frequency_response(
     ------
     UsageError
         As `statics` does; frequencies that are negative or not finite; a force and a drive; a cylinder that is not there; a pin
-        with clearance that has friction, or bears no force.
+        with clearance that has friction, bears no force, or is treated as spring-damper.
     SolverError
         No stable equilibrium was found.
 

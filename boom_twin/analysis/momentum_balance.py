@@ -2,9 +2,9 @@
 
 The base holds a boom in two pins, the pivot of section 1 and the barrel pin of cylinder 1. Their forces are what is left when
 all forces and inertia are swept from the tip to the base. All other pins, drives, beams, oil and contacts act between parts of
-the boom and cancel; a force that had no opposite would show here, though energy may balance. Linear momentum is of all mass points,
-moment of momentum of these about the pivot and of all that turns. What is left over is the error of the trapezoidal rule that
-forces are summed by and of the time integration, which fall with the square of the step.
+the boom and cancel; a force that had no opposite would show here, though energy may balance. Linear momentum is of all mass
+points, moment of momentum of these about the pivot and of all that turns. What is left over is the error of the trapezoidal
+rule that forces are summed by and of the time integration, which fall with the square of the step.
 """
 
 from __future__ import annotations

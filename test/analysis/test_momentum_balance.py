@@ -1,4 +1,4 @@
-"""The balance of momentum that `simulate --check` prints: closed with the square of the step, with clearance and contact too."""
+"""The balance of momentum that `simulate --check` prints: closed with the square of the step, with clearance too."""
 
 from __future__ import annotations
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from boom_twin.monitor.data.analyst import ModeList
+from boom_twin.monitor.data.present_posture import FREQUENCIES as ASKED
+from boom_twin.monitor.data.present_posture import ModeList, ResponseList
 from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
