@@ -1,7 +1,7 @@
 // How the tip answers to a force and to every cylinder's drive in the present posture, and the measured spectrum over it.
 
 import { Chart } from "./chart.js";
-import { markFrequencies, powersOfTen } from "./spectrum.js";
+import { markFrequencies, oneDigit } from "./spectrum.js";
 
 export class ResponseTab {
   constructor(connection) {
@@ -27,8 +27,8 @@ export class ResponseTab {
     this.chart ??= new Chart(document.getElementById("answers"), {
       title: "m/s² of the tip by",
       series: [...this.loads.names.map((label, i) => ({ label, colour: i })), { label: `${this.lines.source || "nothing measured"}, m/s²/√Hz`, colour: "ink", width: 2, dash: [2, 3], scale: "measured" }],
-      scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 }, measured: { distr: 3 } },
-      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: powersOfTen }, { scale: "measured", side: 1, size: 72, grid: { show: false }, values: powersOfTen }],
+      scales: { x: { time: false, auto: false, distr: 3, range: (_, low, high) => [low, high] }, y: { distr: 3 }, measured: { distr: 3 } },
+      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: oneDigit }, { scale: "measured", side: 1, size: 72, grid: { show: false }, values: oneDigit }],
       hooks: { draw: [plot => markFrequencies(plot, this.lines.natural)] },
     });
     const curves = Array.from({ length: columns }, (_, c) => Array.from(values.subarray(c * rows, (c + 1) * rows)));

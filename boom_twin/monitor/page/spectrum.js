@@ -46,7 +46,7 @@ export class SpectrumTab {
       title: `density, ${this.lines.source}, (m/s²)²/Hz`,
       series: this.lines.axes.map((label, i) => ({ label, colour: i })),
       scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 } },
-      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: powersOfTen }],
+      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: oneDigit }],
       hooks: { draw: [plot => this.drawModes(plot)] },
     });
     this.chart.draw(this.density, LOWEST, Math.min(HIGHEST, this.density[0].at(-1)));
@@ -102,7 +102,7 @@ export class SpectrumTab {
 }
 
 // Labels of a logarithmic axis.
-export const powersOfTen = (_, ticks) => ticks.map(tick => tick === null ? null : `1e${Math.round(Math.log10(tick))}`);
+export const oneDigit = (_, ticks) => ticks.map(tick => tick === null ? null : tick.toExponential(0).replace("+", ""));
 
 // Dashed lines over the plot at natural frequencies (Hz), each with the number of its mode.
 export function markFrequencies({ ctx, bbox, valToPos }, frequencies) {
