@@ -114,7 +114,7 @@ def _place(args: Namespace) -> str:
 def _response(scene: Scene, args: Namespace) -> Answer:
     """Frequency response over even points of the logarithm, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
-    from ..analysis.frequency_response import UPWARD, frequency_response
+    from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
     from ..plots.frequency_response import response_picture
 
     if not (0.0 < args.low < args.high < float("inf") and 2 <= args.points <= 1_000_000):
@@ -122,7 +122,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
             f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
             "2 to 1000000 points. Give such."
         )
-    rest = statics(scene, strokes=args.strokes, posture=args.posture, modes=MODES)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural]))
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
