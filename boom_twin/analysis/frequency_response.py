@@ -249,7 +249,7 @@ class LinearisedBoom:
 def linearised_boom(
     scene: SceneSource = None, strokes: ArrayLike | str | None = None, posture: str | None = None
 ) -> LinearisedBoom:
-    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture; takes and raises what `statics` does."""
+    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture; takes and raises as `statics`."""
     scene = as_scene(scene)
     return LinearisedBoom(scene, *strokes_and_angles(scene, strokes, posture))
 
