@@ -253,8 +253,8 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
     """A swing at which the boom does not answer in proportion."""
     if scene.clearance is not None and scene.clearance.pins and swing > FAR_WORN:
-        told = f"the largest swing is {swing:.2g} m; beyond {FAR_WORN:g} m journals may roll in their bushes or leave them, and a "
-        return (f"{told}boom on pins with clearance does not answer in proportion: `simulate` does",)
+        told = f"the largest swing is {swing:.2g} m; beyond {FAR_WORN:g} m journals may roll in their bushes or leave them, and"
+        return (f"{told} a boom on pins with clearance does not answer in proportion. Simulate it",)
     if swing <= FAR * scene.reach:
         return ()
     told = f"the largest swing, {swing:.2g} m, is more than {FAR:g} of the reach, beyond which no boom answers in proportion"
