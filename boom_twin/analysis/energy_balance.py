@@ -8,13 +8,13 @@ little, see `numerical_damping`). Coriolis and centrifugal forces do no work, an
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
 from ..compiler.plan import Plan
-from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.pin_contact import (
     CLEARANCE,
     DAMPER,
@@ -81,10 +81,9 @@ class Energies:
 
     def _oil(self, drives: Array) -> tuple[Array, Array]:
         """Stiffnesses (N/m) and dampings (N s/m) of the oil at lengths of the drives (m); 0 if incompressible."""
-        t = self._plan.tables
-        rows = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
-        found = [(1.0 / compliance, lag / compliance) if compliance > 0.0 else (0.0, 0.0) for compliance, lag in rows]
-        return np.array([each[0] for each in found]), np.array([each[1] for each in found])
+        compliances, lags = self._plan.compliances_and_lags(drives)
+        stiffnesses = np.divide(1.0, compliances, out=np.zeros_like(compliances), where=compliances > 0.0)
+        return stiffnesses, lags * stiffnesses
 
     def contact(self, state: State) -> float:
         """Of contacts, J; of linearised pins, their springs.
@@ -209,8 +208,7 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
     first, heavy = energies.total(start), energies.weight(start)
     before, sums = energies.powers(start), np.zeros(3)
     gap, left, moved, longest = 0.0, 0.0, energies.kinetic(start), 0.0
-    impacts = bool((course.plan.tables.clearances.linear == 0).any())
-    for step, state in course.states(dt, FINER if impacts else 1):
+    for step, state in states_of(course, dt):
         now = energies.powers(state)
         sums += 0.5 * step * (before + now)
         before, longest = now, max(longest, step)
@@ -219,6 +217,12 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
         moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
     work, damping, lost = sums.tolist()
     return EnergyBalance(work, work - damping - lost - left, damping, lost, gap, left, float(moved), longest)
+
+
+def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
+    """Steps (s) and states, as of `DriveCourse.states`, of a motion whose powers or forces are to be summed."""
+    impacts = bool((course.plan.tables.clearances.linear == 0).any())
+    return course.states(dt, FINER if impacts else 1)
 
 
 def numerical_damping(frequency: float, step: float, rho: float) -> float:

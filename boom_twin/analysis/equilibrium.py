@@ -197,16 +197,7 @@ def statics(
         No stable equilibrium was found.
     """
     scene = as_scene(scene)
-    if isinstance(strokes, str):
-        strokes, posture = None, strokes if posture is None else None
-    if (strokes is None) == (posture is None):
-        raise UsageError("give either strokes or a posture, not both and not neither.")
-    if posture is not None:
-        strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    else:
-        assert strokes is not None
-        strokes = checked_strokes(scene, np.asarray(strokes, dtype=float))
-        angles = joint_angles_of_strokes(scene, strokes)
+    strokes, angles = strokes_and_angles(scene, strokes, posture)
     plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
@@ -220,6 +211,26 @@ def statics(
         outline=outline(plan, state, work.position),
         doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),
     )
+
+
+def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
+    """Strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture` of the scene.
+
+    A name given for `strokes` is that of a posture.
+
+    Raises
+    ------
+    UsageError
+        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
+    """
+    if isinstance(strokes, str):
+        strokes, posture = None, strokes if posture is None else None
+    if (strokes is None) == (posture is None):
+        raise UsageError("give either strokes or a posture, not both and not neither.")
+    if posture is not None:
+        return strokes_of_posture(scene, posture), posture_angles(scene, posture)
+    found = checked_strokes(scene, np.asarray(strokes, dtype=float))
+    return found, joint_angles_of_strokes(scene, found)
 
 
 def checked_strokes(scene: Scene, strokes: Array) -> Array:

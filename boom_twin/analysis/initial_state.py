@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
@@ -33,6 +33,7 @@ from ..kernels.transfer.forward_kinematics import link_frame, place
 from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
+from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
 from ..types import Array
@@ -78,14 +79,16 @@ class InitialState:
         return InitialState(self.names, values, rates, self.contacts)
 
 
-def undeflected(scene: Scene, strokes: Array, joint_rates: Array | None = None, angles: Array | None = None) -> InitialState:
+def undeflected(
+    scene: SceneSource, strokes: ArrayLike, joint_rates: Array | None = None, angles: Array | None = None
+) -> InitialState:
     """The boom with straight sections on uncompressed cylinders, held there until the motion begins.
 
     Parameters
     ----------
-    scene : Scene
-        The boom, of n sections.
-    strokes : ndarray, shape (n,)
+    scene : Scene, path or mapping
+        The boom, of n sections; as for `boom_twin.statics`.
+    strokes : array_like, shape (n,)
         m.
     joint_rates : ndarray, shape (n,), optional
         Rates of the joint angles, rad/s; by default none moves.
@@ -97,7 +100,9 @@ def undeflected(scene: Scene, strokes: Array, joint_rates: Array | None = None, 
     InitialState
         To be given to `boom_twin.simulate`.
     """
-    found = joint_angles_of_strokes(scene, checked_strokes(scene, strokes), near=angles)
+    scene = as_scene(scene)
+    strokes = checked_strokes(scene, np.asarray(strokes, float))
+    found = joint_angles_of_strokes(scene, strokes, near=angles)
     rates = np.zeros(len(found)) if joint_rates is None else np.asarray(joint_rates, float)
     if rates.shape != found.shape or not np.isfinite(rates).all():
         raise UsageError(f"joint_rates = {joint_rates}: give {len(found)} finite values, rad/s.")
@@ -110,7 +115,7 @@ def undeflected(scene: Scene, strokes: Array, joint_rates: Array | None = None, 
 
     contacts = state.contacts
     if plan.pins and plan.tables.clearances.linear.any():  # linearised at the preload of the equilibrium
-        contacts = rest_at(scene, np.asarray(strokes, float), found)[1].contacts
+        contacts = rest_at(scene, strokes, found)[1].contacts
     return InitialState(plan.names, at(0.0), _derivative(at, float(np.abs(rates).max())), contacts)
 
 
@@ -239,7 +244,7 @@ def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
     """UsageError if springs are not as long as the state's own forces make them: the drives begin somewhere else."""
     cylinders = plan.tables.cylinders
     forces = state.z[cylinders.z]
-    began = work.position[cylinders.history] - plan.compliances(length) * forces
+    began = work.position[cylinders.history] - plan.compliances_and_lags(length)[0] * forces
     for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FAR)):
         own, given = began[i] - plan.closed_lengths[i], length[i] - plan.closed_lengths[i]
         raise UsageError(

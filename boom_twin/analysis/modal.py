@@ -29,7 +29,6 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
-from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.tables import OK, SENTENCES, Condensed, Motion, State, Work
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
@@ -96,8 +95,8 @@ def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array
 
 def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
     """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
-    cylinders = plan.tables.cylinders
-    return np.asarray(work.position[cylinders.history] - plan.compliances(state.drives[0]) * state.z[cylinders.z])
+    cylinders, (compliances, _) = plan.tables.cylinders, plan.compliances_and_lags(state.drives[0])
+    return np.asarray(work.position[cylinders.history] - compliances * state.z[cylinders.z])
 
 
 def _negative_eigenvalues(blocks: Array) -> int:
@@ -348,10 +347,8 @@ def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum)
 def damping_ratio(plan: Plan, mode: Mode) -> float:
     """Of critical, by the power that oil dampers and beams take from the mode at its own frequency."""
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
-    loss = 0.0
-    for cylinder, drive in zip(t.cylinders, mode.drives, strict=True):
-        compliance, lag = compliance_and_lag(cylinder, t.oils, drive)
-        loss += lag * compliance * mode.increments[cylinder.z] ** 2
+    compliances, lags = plan.compliances_and_lags(mode.drives)
+    loss = sum((lags * compliances * mode.increments[t.cylinders.z] ** 2).tolist())
     for row, beam in enumerate(t.beams):
         q = mode.increments[beam.z : beam.z + beam.bending]
         loss += beam.beta * float(q @ t.stiffness[row, : len(q), : len(q)] @ q)

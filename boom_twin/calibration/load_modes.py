@@ -26,7 +26,6 @@ from ..analysis.equilibrium import settle
 from ..analysis.modal import Mode, joint_increments, natural_modes
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
-from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import FRAME_ANGLE
 from ..scene.kinematics import joint_angles_of_strokes
@@ -153,9 +152,9 @@ def _matrices(other: Plan, plan: Plan, shapes: Array, increments: Array, drives:
     size = len(shapes)
     damping, stiffness = np.zeros((2, size, size))
     forces = increments[:, own.cylinders.z].copy()
-    for i, (cylinder, before) in enumerate(zip(t.cylinders, own.cylinders, strict=True)):
-        compliance, lag = compliance_and_lag(cylinder, t.oils, drives[i])
-        usual, _ = compliance_and_lag(before, own.oils, drives[i])
+    compliances, lags = other.compliances_and_lags(drives)
+    usuals, _ = plan.compliances_and_lags(drives)
+    for i, (compliance, lag, usual) in enumerate(zip(compliances, lags, usuals, strict=True)):
         if usual > 0.0:
             forces[:, i] *= usual / compliance
         work = compliance * np.outer(forces[:, i], forces[:, i])

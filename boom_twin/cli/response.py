@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
 
 FAR = 0.05  # of the reach: swings beyond are not in proportion to the load
+FAR_WORN = 1e-4  # m, the same on pins with clearance
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def _place(args: Namespace) -> str:
 def _response(scene: Scene, args: Namespace) -> Answer:
     """Frequency response over even points of the logarithm, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
-    from ..analysis.frequency_response import UPWARD, frequency_response
+    from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
     from ..plots.frequency_response import response_picture
 
     if not (0.0 < args.low < args.high < float("inf") and 2 <= args.points <= 1_000_000):
@@ -122,7 +123,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
             f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
             "2 to 1000000 points. Give such."
         )
-    rest = statics(scene, strokes=args.strokes, posture=args.posture, modes=MODES)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural]))
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
@@ -251,6 +252,9 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
     """A swing at which the boom does not answer in proportion."""
+    if scene.clearance is not None and scene.clearance.pins and swing > FAR_WORN:
+        told = f"the largest swing is {swing:.2g} m; beyond {FAR_WORN:g} m journals may roll in their bushes or leave them, and"
+        return (f"{told} a boom on pins with clearance does not answer in proportion. Simulate it",)
     if swing <= FAR * scene.reach:
         return ()
     told = f"the largest swing, {swing:.2g} m, is more than {FAR:g} of the reach, beyond which no boom answers in proportion"

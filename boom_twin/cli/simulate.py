@@ -20,7 +20,10 @@ from .main import add_json, add_scene, open_scene, print_result
 if TYPE_CHECKING:
     from ..analysis.energy_balance import EnergyBalance
     from ..analysis.initial_state import InitialState
+    from ..analysis.momentum_balance import MomentumBalance
     from ..analysis.simulate import Simulation
+
+    Balances = tuple[EnergyBalance, MomentumBalance]
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
 
@@ -36,7 +39,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
-    parser.add_argument("--check", action="store_true", help="print the balance of energy along the motion, stepped once more")
+    check = "print the balances of energy and of momentum along the motion, stepped twice more"
+    parser.add_argument("--check", action="store_true", help=check)
     where = "where the boom is at the first row: rest (the default), undeflected, or a file of --save-state"
     parser.add_argument("--start", default="rest", metavar="STATE", help=where)
     parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
@@ -53,6 +57,7 @@ def run(args: Namespace) -> int:
     """Read, simulate, write."""
     from ..analysis.energy_balance import energy_balance
     from ..analysis.initial_state import write_state
+    from ..analysis.momentum_balance import momentum_balance
     from ..analysis.simulate import course_of, simulate
     from ..compiler.compile import compile_scene
 
@@ -75,8 +80,11 @@ def run(args: Namespace) -> int:
     write_atomic(Path(args.out), columns_text(result.columns()))
     if args.save_state:
         write_state(Path(args.save_state), result.end)
-    balance = energy_balance(course_of(scene, times, strokes, args.dt, angles, start=start), args.dt) if args.check else None
-    print_result(args.json, as_json(result, args.out, balance), as_text(result, args.out, args.start, balance))
+    balances = None
+    if args.check:
+        course = course_of(scene, times, strokes, args.dt, angles, start=start)
+        balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
+    print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
     if args.orbits:
         _draw_orbits(args, scene, result)
     return 0
@@ -148,8 +156,8 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
     return undeflected(scene, first, rates, angles)
 
 
-def as_json(result: Simulation, out: str, balance: EnergyBalance | None) -> dict[str, object]:
-    """What was done, and its figures; with the balance of energy where it was asked for."""
+def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
+    """What was done, and its figures; with the balances of energy and momentum where they were asked for."""
     x, y = result.tip[:, 0], result.tip[:, 1]
     told: dict[str, object] = {
         "out": out,
@@ -164,15 +172,18 @@ def as_json(result: Simulation, out: str, balance: EnergyBalance | None) -> dict
         "lost_contacts": [f"{name}: {lost}" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)],
         "warnings": result.doubts,
     }
-    if balance is not None:
+    if balances is not None:
+        energy, momentum = balances
         names = ("work", "change", "damping", "contact", "gap", "left")
-        told |= {f"energy_{name}_J": getattr(balance, name) for name in names} | {"energy_gap_share": balance.share}
+        told |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
+        told |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
+        told |= {"moment_of_momentum_gap_N_m_s": momentum.angular_gap, "moment_of_momentum_gap_share": momentum.angular_share}
     return told
 
 
-def as_text(result: Simulation, out: str, start: str, balance: EnergyBalance | None) -> list[str]:
+def as_text(result: Simulation, out: str, start: str, balances: Balances | None) -> list[str]:
     """The same for people."""
-    told = as_json(result, out, balance)
+    told = as_json(result, out, balances)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
     lines = [
@@ -183,7 +194,7 @@ def as_text(result: Simulation, out: str, start: str, balance: EnergyBalance | N
         f"cylinder forces   {numbers(told['cylinder_force_max_N'], 1e-3)} kN at most",
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
-    return [*lines, *([] if balance is None else [f"{balance}."]), out]
+    return [*lines, *(f"{balance}." for balance in balances or ()), out]
 
 
 def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:

@@ -94,10 +94,11 @@ class Plan:
         """Number of joints, and of sections."""
         return len(self.tables.joints)
 
-    def compliances(self, drives: Array) -> Array:
-        """1/k (m/N; 0 if incompressible) of the cylinders with their `drives` so long (m); both of shape (n,)."""
+    def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
+        """1/k (m/N; 0 if incompressible) and d/k (s) of the cylinders with their `drives` so long (m); all of shape (n,)."""
         t = self.tables
-        return np.array([compliance_and_lag(row, t.oils, drive)[0] for row, drive in zip(t.cylinders, drives, strict=True)])
+        found = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
+        return np.array([compliance for compliance, _ in found]), np.array([lag for _, lag in found])
 
     def state(self, depth: int = DEPTH) -> State:
         """A fresh state, all zero; `depth` rows of history."""

@@ -118,7 +118,7 @@ class DeviationModes:
         for j, mode in enumerate(modes):
             is_turned = j < len(self._motions) and float((plan.masses * mode.motion) @ self._motions[j]) < 0.0
             kept.append(self._put(j, mode, -1.0 if is_turned else 1.0))
-        f.softness[:] = plan.compliances(plan.closed_lengths + strokes)
+        f.softness[:], _ = plan.compliances_and_lags(plan.closed_lengths + strokes)
         f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
         first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
         self._motions, f.status[COUNT] = kept, len(modes)

@@ -2,20 +2,21 @@
 
 A message is a sequence of blocks, each of a multiple of 8 bytes, all numbers little endian:
 
-======  =====================  ==========================================================================
+======  =====================  ========================================================================================
 offset  type                   meaning
-======  =====================  ==========================================================================
-0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram
+======  =====================  ========================================================================================
+0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram, 4 = response
 1       uint8                  number of the table, its place in the newest ``layout`` message
 2       uint16                 columns, c
 4       uint32                 rows, k
-8       float64 x k            kinds 1, 3: seconds since the session's epoch; kind 2: frequencies, Hz
+8       float64 x k            kinds 1, 3: seconds since the session's epoch; kinds 2, 4: frequencies, Hz
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
-======  =====================  ==========================================================================
+======  =====================  ========================================================================================
 
 A spectrum has two columns, for the directions that the message ``lines`` before it names; a spectrogram one for each of
-`boom_twin.monitor.data.spectrum.FREQUENCIES`. All else is JSON in text messages, with a key
-``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``load``, ``answer``.
+`boom_twin.monitor.data.spectrum.FREQUENCIES`; a response one for each load that the message ``loads`` before it names. All
+else is JSON in text messages, with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``,
+``load``, ``loads``, ``answer``.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, wor
 from .data.store import Store
 from .data.topic_rows import RESIDUALS
 
-ROWS, SPECTRUM, SPECTROGRAM = 1, 2, 3
+ROWS, SPECTRUM, SPECTROGRAM, RESPONSE = 1, 2, 3, 4
 HEAD = struct.Struct("<BBHI")
 
 

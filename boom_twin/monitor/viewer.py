@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from .actions import ViewerActions
-from .data.analyst import Analyst
+from .data.analyst import Analyst, response_messages
 from .data.feed import Feed, Playback
+from .data.present_posture import TipResponses
 from .data.session_list import SessionList
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
@@ -73,6 +74,7 @@ class Viewer:
         self._tables = 0
         self._alarms = ""
         self._spectrogram_until = -inf
+        self._response: TipResponses | None = None
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
@@ -183,6 +185,7 @@ class Viewer:
             if (load := await self._analyst.load_at(position)) is not None:
                 await self._send_text(load)
             await self._send_spectrogram(position)
+            await self._send_response(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
@@ -192,6 +195,15 @@ class Viewer:
         if found is not None and generation == self._generation == self._feed.store.generation:
             self._spectrogram_until, block = found
             await self._socket.send_bytes(block)
+
+    async def _send_response(self, position: float) -> None:
+        """The response in the posture shown, where it is another than the page has."""
+        found = await self._analyst.response_at(position)
+        if found is not self._response:
+            self._response, (text, block) = found, response_messages(found)
+            await self._send_text(text)
+            if block:
+                await self._socket.send_bytes(block)
 
     async def _send_text(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(dump(message))

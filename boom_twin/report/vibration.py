@@ -13,7 +13,7 @@ from math import inf, pi
 import numpy as np
 from scipy.signal import decimate
 
-from ..monitor.data.analyst import ModeList
+from ..monitor.data.present_posture import ModeList
 from ..plots import History
 from ..scene.schema import Scene
 from ..types import Array, Stream, stream_of

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms
-from oracle.clearance.scenes import RODS, with_pins
+from oracle.clearance.scenes import PINS, RODS, with_pins
 from oracle.response import DenseModel, extrapolated
 from scipy.optimize import brentq
 
 from boom_twin import frequency_response, load_scene, simulate
 from boom_twin.analysis.equilibrium import rest_at, statics
-from boom_twin.analysis.frequency_response import linearised_boom
+from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
@@ -43,6 +43,7 @@ DENSE = [
 @pytest.mark.parametrize("scene, posture", DENSE)
 def test_sweeps_solve_the_dense_equations(scene, posture):
     """Every unknown under every load, between and at natural frequencies; what is left is of the dense model's differences."""
+    scene = with_all_shapes(scene)
     plan, state, work = rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
     dense = DenseModel(plan, state.z.copy(), drive_at_rest(plan, state, work))
     boom = linearised_boom(scene, posture=posture)
@@ -54,9 +55,9 @@ def test_sweeps_solve_the_dense_equations(scene, posture):
         assert apart(found.cylinder_forces, unknowns[:, plan.tables.cylinders.z]) < 5e-5
 
 
-@pytest.mark.parametrize("modes, bound", [(8, 1e-3), (3, 2e-3)])
-def test_tip_force_against_finite_segments(modes, bound):
-    """An independent model, by energy: 0.1 % up to 30 Hz with 8 shapes a part; 3 shapes leave 0.13 % of a cylinder force."""
+@pytest.mark.parametrize("modes", [1, 3])
+def test_tip_force_against_finite_segments(modes):
+    """An independent model, by energy: 0.05 % up to 30 Hz, however few shapes the scene has for its time steps."""
     scene = load_scene().model_copy(update={"modes": modes})
     load = np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
     expected = extrapolated(scene, posture_angles(scene, "arch"), BAND, load)
@@ -66,12 +67,12 @@ def test_tip_force_against_finite_segments(modes, bound):
         (found.joints, expected[:, 2:6]),
         (found.cylinder_forces, expected[:, 6:]),
     ):
-        assert apart(own, other) < bound
+        assert apart(own, other) < 5e-4
 
 
 def test_drive_against_finite_segments():
     """Of a cylinder with oil, whose stiffness the drive changes, too."""
-    scene = booms.random_boom(2).model_copy(update={"modes": 8})
+    scene = booms.random_boom(2)
     n = len(scene.joints)
     load = np.eye(2 + n)[2 + n // 2]
     expected = extrapolated(scene, posture_angles(scene, "test"), BAND, load)
@@ -83,17 +84,71 @@ def test_drive_against_finite_segments():
 @pytest.mark.parametrize("scene, posture", [(booms.scene_of(undamped(booms.document())), p) for p in ("arch", "horizontal")])
 def test_poles_are_the_natural_frequencies(scene, posture):
     boom = linearised_boom(scene, posture=posture)
-    for natural in statics(scene, posture=posture).frequencies:
+    for natural in statics(with_all_shapes(scene), posture=posture).frequencies:
         gain = [lambda f, load=load: 1.0 / boom.respond(np.array([f]), load).tip[0].real.sum() for load in np.eye(6)[:2]]
         around = natural * np.array([1.0 - 1e-4, 1.0 + 1e-4])
         passing = next(g for g in gain if g(around[0]) * g(around[1]) < 0.0)
         assert brentq(passing, *around, xtol=1e-12) == pytest.approx(natural, rel=1e-8)
 
 
-@pytest.mark.parametrize("treatment", ["contact", "spring-damper"])
-def test_worn_pins_are_refused(treatment):
-    with pytest.raises(UsageError, match="clearance"):
-        frequency_response(with_pins(booms.document(), RODS, 1e-4, treatment), BAND, posture="arch")
+def test_natural_frequencies_of_the_scene_are_those_of_the_poles():
+    """The scene's three shapes give the lowest four within 0.01 %."""
+    of_scene, of_poles = (statics(scene, posture="arch").frequencies for scene in (load_scene(), with_all_shapes(load_scene())))
+    assert of_scene[:4] == pytest.approx(of_poles[:4], rel=1e-4)
+
+
+def test_rigid_parts_stay_rigid():
+    sections = with_all_shapes(booms.scene_of(booms.document() | {"modes": 0})).sections
+    assert all(section.modes is None for section in sections)
+
+
+@pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
+def test_worn_pins_in_contact_through_simulate(pins):
+    """A drive jerked by less than a micron: journals stay on their bushes, and the motion is the response to its spectrum."""
+    scene, dt, span = with_pins(booms.document(), pins, 1e-4), 2e-3, 2.0
+    strokes, times = strokes_of_posture(scene, "arch"), np.arange(0.0, span, dt)
+    jerk = 2e-7 * np.sin(2.0 * np.pi * 2.0 * times) * np.sin(np.pi * np.clip(times / 1.5, 0.0, 1.0)) ** 2
+    moved = simulate(scene, times, strokes + np.outer(jerk, np.eye(4)[1]), dt=dt, estimate_errors=False)
+    assert not moved.lost_contacts.any()
+    count = 64 * len(times)  # until it has died away
+    spectrum, frequencies = np.fft.rfft(jerk, count), np.fft.rfftfreq(count, dt)
+    within = frequencies < 12.0
+    response = frequency_response(scene, frequencies[within], posture="arch", drive=2)
+    ideal = frequency_response(booms.scene_of(booms.document()), frequencies[within], posture="arch", drive=2)
+    seen = moved.tip[:, :2] - moved.tip[0, :2]
+
+    def apart_from(own):
+        whole = np.zeros((len(spectrum), 2), complex)
+        whole[within] = own * spectrum[within, None]
+        expected = np.fft.irfft(whole, count, axis=0)[: len(times)]
+        return np.sqrt(np.mean((seen - expected) ** 2) / np.mean(expected**2))
+
+    assert apart_from(response.tip) < 3e-3 < apart_from(ideal.tip)
+
+
+def test_static_limit_on_worn_pins_is_that_of_statics():
+    scene = with_pins(booms.document(), PINS, 1e-4)
+    strokes, h = strokes_of_posture(scene, "arch"), 2e-6
+    above, below = (statics(scene, strokes=strokes + side * np.eye(4)[1], modes=0).tip for side in (h, -h))
+    found = frequency_response(scene, [0.0], strokes=strokes, drive=2).tip[0]
+    assert found == pytest.approx((above - below) / (2.0 * h), rel=1e-7)
+
+
+def test_pins_that_do_not_answer_in_proportion_are_refused():
+    with pytest.raises(UsageError, match=r"friction = 0.1 in cylinder_1.rod: .* Set friction: 0"):
+        frequency_response(with_pins(booms.document(), RODS, 1e-4, friction=0.1), BAND, posture="arch")
+    with pytest.raises(UsageError, match=r"treatment = spring-damper: .* Set treatment: contact"):
+        frequency_response(with_pins(booms.document(), RODS, 1e-4, "spring-damper"), BAND, posture="arch")
+    weightless = booms.document() | {"gravity": [0.0, 0.0]}
+    with pytest.raises(UsageError, match=r"cylinder_1.rod bears no force here: .* Choose another posture"):
+        frequency_response(with_pins(weightless, RODS, 1e-4), BAND, posture="arch")
+
+
+def test_a_scene_is_taken_as_everywhere():
+    """None, a file's keys or a `Scene`; strokes as a list or the name of a posture."""
+    expected = frequency_response(load_scene(), BAND, posture="arch").tip
+    assert np.array_equal(frequency_response(None, BAND.tolist(), "arch").tip, expected)
+    assert np.array_equal(frequency_response(booms.document(), BAND, posture="arch").tip, expected)
 
 
 def richardson(of, size):

@@ -76,10 +76,15 @@ def test_a_swing_out_of_proportion_is_told(capsys: Capture) -> None:
     assert "no boom answers in proportion" in capsys.readouterr().err
 
 
-def test_worn_pins_are_refused(capsys: Capture, tmp_path: Path) -> None:
+def test_worn_pins_answer_unless_they_rub(capsys: Capture, tmp_path: Path) -> None:
     assert main(["scene", "--clearance"]) == 0
     scene = tmp_path / "worn.yaml"
     scene.write_text(capsys.readouterr().out)
+    assert main(["response", str(scene), "--posture", "arch"]) == 0
+    assert "journals" not in capsys.readouterr().err
+    assert main(["response", str(scene), "--posture", "arch", "--pump", "0.4:130"]) == 0
+    assert "journals may roll in their bushes or leave them" in capsys.readouterr().err
+    scene.write_text(scene.read_text().replace("friction: 0.0", "friction: 0.1"))
     for given in (["--posture", "arch"], ["--posture", "arch", "--pump", "0.4:130"], ["--map", "all", "--pump", "0.4:130"]):
         assert main(["response", str(scene), *given]) == 1
         assert "clearance" in capsys.readouterr().err

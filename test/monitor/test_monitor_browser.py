@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from boom_twin import frequency_response
 from boom_twin.monitor.data.feed import Feed
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
@@ -373,8 +374,23 @@ def test_dark_and_light_by_key_kept_over_a_reload(page: Any) -> None:
     assert page.locator("#theme").inner_text() == ("Light" if after[0] == "dark" else "Dark")
 
 
+def test_the_response_in_this_posture_with_the_measured_spectrum_over_it(page: Any, feed: Feed) -> None:
+    page.keyboard.press("7")
+    wait(page, "twin.response.chart && twin.response.chart.plot.data.length === 7")
+    words = page.locator("#response-words").inner_text()
+    assert words.startswith("amplitude of the tip's acceleration") and "measured by the IMU, last 40 s" in words
+    frequencies, *curves, measured = page.evaluate("twin.response.chart.plot.data.map(row => Array.from(row))")
+    expected = frequency_response(None, np.array(frequencies), strokes=feed.strokes(FAULT), drive=2).tip_acceleration
+    assert np.array(curves[2]) == pytest.approx(1e-3 * np.linalg.norm(expected, axis=1), rel=2e-2)
+    assert len(curves) == 5 and sum(value is not None for value in measured) > 300
+    labels = page.locator("#answers .u-label").all_inner_texts()
+    assert labels[1:3] == ["1 N at the tip, up", "1 mm of cylinder 1"] and "measured by the IMU" in labels[-1]
+    box = page.locator("#answers canvas").bounding_box()
+    assert box["height"] > 300 and box["width"] > 800
+
+
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (1180, 820)])
-@pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5", "6"])
+@pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5", "6", "7"])
 def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: str) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.keyboard.press(tab)

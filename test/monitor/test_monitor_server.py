@@ -25,6 +25,7 @@ from boom_twin.monitor.data.session_list import SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MOST_VIEWERS, Server
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]
 
@@ -82,7 +83,7 @@ async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[An
         else:
             head = struct.unpack_from("<BBHI", message.data)
             times = np.frombuffer(message.data, "<f8", head[3], 8)
-            found = {"kind": ("rows", "density", "past")[head[0] - 1], "head": head, "times": times}
+            found = {"kind": ("rows", "density", "past", "response")[head[0] - 1], "head": head, "times": times}
         if found["kind"] == kind and accept(found):
             return found
 
@@ -111,6 +112,24 @@ def test_a_spectrum_with_the_models_frequencies_comes_too() -> None:
             assert (await until(socket, "density"))["head"][2] == 2
 
     serve(Made(), talk)
+
+
+def test_a_response_comes_once_as_long_as_the_posture_is_the_same() -> None:
+    """And before it why there is none, until the strokes are known."""
+
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
+            strokes = strokes_of_posture(load_scene(), "arch")
+            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
+            loads = await until(socket, "loads")
+            assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
+            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
+            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
+            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
+
+    feed = Made()
+    serve(feed, talk)
 
 
 def test_the_spectrogram_since_before_the_page_was_opened_comes_once_and_then_what_is_new() -> None:

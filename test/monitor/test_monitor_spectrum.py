@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from boom_twin.monitor.data.analyst import ModeList
+from boom_twin import frequency_response
+from boom_twin.monitor.data.present_posture import FREQUENCIES as ASKED
+from boom_twin.monitor.data.present_posture import ModeList, ResponseList
 from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -85,3 +87,22 @@ def test_a_spectrogram_says_where_rows_are_missing_and_where_the_rate_ends() -> 
     found = spectrogram(times, np.random.default_rng(5).normal(size=(len(times), 2)), np.array([9.0, 33.0]))
     assert np.isfinite(found[0][FREQUENCIES < 10.0]).all() and np.isnan(found[0][FREQUENCIES > 10.0]).all()
     assert np.isnan(found[1]).all()
+
+
+def test_responses_follow_the_posture() -> None:
+    """Of the tip's acceleration, both directions: as `frequency_response` gives them for 1 N, and for 1 mm of a drive."""
+    scene = load_scene()
+    responses, strokes = ResponseList(scene), strokes_of_posture(scene, "arch")
+    first = responses.at(strokes)
+    assert first.loads == ("1 N at the tip, up", *(f"1 mm of cylinder {i}" for i in range(1, 5))) and not first.trouble
+    by_force = frequency_response(scene, ASKED, strokes=strokes).tip_acceleration
+    by_drive = frequency_response(scene, ASKED, strokes=strokes, drive=3).tip_acceleration
+    assert first.accelerations[:, 0] == pytest.approx(np.linalg.norm(by_force, axis=1), rel=1e-9)
+    assert first.accelerations[:, 3] == pytest.approx(1e-3 * np.linalg.norm(by_drive, axis=1), rel=1e-9)
+    assert responses.at(strokes + 0.001) is first
+    assert not np.allclose(responses.at(strokes + 0.02).accelerations, first.accelerations, rtol=1e-3)
+
+
+def test_where_there_is_no_response_it_is_said_why() -> None:
+    found = ResponseList(load_scene()).at([9.0, 0.5, 0.5, 0.5])
+    assert found.loads == () and "stroke_1 = 9 m" in found.trouble

@@ -242,6 +242,14 @@ def causes_of(alarm: Alarm) -> str:
     return ", ".join(ranked) or alarm.cause or "not known"
 
 
+def test_the_response_is_of_the_posture_that_the_node_tells(page: Any) -> None:
+    """Curves of all loads, and the spectrum that was measured meanwhile."""
+    page.keyboard.press("7")
+    wait(page, "twin.response.chart?.plot.data.length === 7 && twin.response.chart.plot.data[6].some(v => v > 0)", 60.0)
+    assert page.evaluate("twin.response.chart.plot.data.slice(1, 6).every(row => row.every(v => v > 0))")
+    page.keyboard.press("1")
+
+
 def test_what_is_shown_is_young(page: Any) -> None:
     page.keyboard.press("1")
     found = []

@@ -19,20 +19,22 @@ from ..jit import inner, kernel
 from ..tables import OK, Motion
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-TANGENTS, FORCES = np.bool_(True), np.bool_(False)  # typed, because numba compiles once more for every literal
+TANGENTS = np.bool_(True)  # typed, because numba compiles once more for every literal
 TIP_FORCE = np.int64(2)  # entries of a load that are the force at the tip; those of the drives follow
 
 
 @kernel
-def harmonic_response(t, state, work, drive, rates, loads, increments, tip):
+def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip):
     """Complex amplitudes of all unknowns, and of the tip, under harmonic loads about a state at rest.
 
-    Linear in the load, which may therefore be of any size; a large one keeps the rounding of the static forces out.
+    With ideal pins linear in the load, which may therefore be of any size; a large one keeps the rounding of the static forces
+    out. A sweep of forces alone is for ideal pins only. With clearance the tangents are made once more under the load and
+    hold its forces: there the load must be small against the static forces, and half the difference of the answers to it and
+    to its opposite is what is linear in it.
 
     Parameters
     ----------
     t : Tables
-        Of a boom without clearance: a sweep of forces alone is for ideal pins.
     state : State
         In equilibrium, and placed in `work`.
     work : Work
@@ -43,6 +45,8 @@ def harmonic_response(t, state, work, drive, rates, loads, increments, tip):
         s = i omega, 1/s.
     loads : ndarray of complex, shape (k, 2 + n)
         Amplitudes: force at the tip in x and y (N), then the drive of every cylinder (m).
+    pins : ndarray, shape (2, pins with clearance, HOLD_COLUMNS)
+        What holds their journals at rest (see `Work.hold`), and the derivative of that by s.
     increments : ndarray of complex, shape (k, unknowns)
         Written, in the units of the unknowns.
     tip : ndarray of complex, shape (k, 3)
@@ -54,17 +58,21 @@ def harmonic_response(t, state, work, drive, rates, loads, increments, tip):
         OK, or SINGULAR at `rates[row]`.
     """
     operations = t.operations.shape[0]
+    loaded = np.bool_(pins.shape[1] > 0)
     for k in range(rates.shape[0]):
         rate = rates[k]
         for i in range(work.position.shape[0]):
             work.offset[i] = -rate * work.position[i]
+        for i in range(pins.shape[1]):
+            for j in range(pins.shape[2]):
+                work.hold[i, j] = pins[0, i, j] + rate * pins[1, i, j]
         put_load(work, drive, rate, loads[k], 0.0)
         motion = Motion(rate * rate, rate, work.position, work.offset, TANGENTS)
         status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
         if status != OK:
             return status, k
         put_load(work, drive, rate, loads[k], 1.0)
-        motion = Motion(rate * rate, rate, work.position, work.offset, FORCES)
+        motion = Motion(rate * rate, rate, work.position, work.offset, loaded)
         sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
         sweep_out(t, state, work, work.condensed, ROOT, operations, FREE)
         for i in range(increments.shape[1]):

@@ -1,56 +1,20 @@
-"""Analysis beside the server: spectrum and the model's natural frequencies for what was just shown."""
+"""Analysis beside the server: spectrum, and the model's natural frequencies and response, for what was just shown."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import floor
 from typing import Any
 
 import numpy as np
 
-from ...analysis.equilibrium import settle
-from ...analysis.modal import natural_modes
-from ...compiler.compile import compile_scene
-from ...errors import BoomTwinError
 from ...estimation.load_spectrum import tip_load
-from ...scene.kinematics import joint_angles_of_strokes
-from ...scene.schema import Scene
-from ..protocol import SPECTROGRAM, SPECTRUM, pack
+from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
+from .present_posture import MOVED, ModeList, ResponseList, TipResponses
 from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
 from .topic_rows import ESTIMATE
-
-COUNT = 6
-WIDTH = 1e-4
-"""Relative accuracy of the frequencies."""
-MOVED = 0.005
-"""m of any stroke after which they are worked out anew."""
-
-
-class ModeList:
-    """Frequencies of one boom, worked out anew where it has moved."""
-
-    def __init__(self, scene: Scene) -> None:
-        self._scene, self._plan = scene, compile_scene(scene)
-        self._at: np.ndarray | None = None
-        self._found: list[float] = []
-
-    def at(self, strokes: Sequence[float]) -> list[float]:
-        """The lowest `COUNT` frequencies (Hz) about the equilibrium at `strokes` (m); none where there is no equilibrium."""
-        now = np.asarray(strokes, dtype=np.float64)
-        if self._at is None or np.max(np.abs(now - self._at)) > MOVED:
-            self._found, self._at = self._work_out(now), now
-        return self._found
-
-    def _work_out(self, strokes: np.ndarray) -> list[float]:
-        state, work = self._plan.state(), self._plan.work()
-        try:
-            settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
-        except BoomTwinError:
-            return []
-        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +34,8 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
+UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
+UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
 KNOWN = 0.9
 """Share of the rows of a signal that must have a value."""
 MATCH = 0.2
@@ -87,6 +53,7 @@ class Analyst:
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._modes: ModeList | None = None
+        self._responses: ResponseList | None = None
         self._turn = asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
         self._firsts: dict[int, tuple[float, float]] = {}
@@ -116,6 +83,17 @@ class Analyst:
                 lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
                 self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
+
+    async def response_at(self, time: float) -> TipResponses:
+        """How the tip answers to loads in the posture at `time` (s); the same object while the boom has not moved."""
+        async with self._turn:
+            scene, strokes = self._feed.scene(), self._feed.strokes(time)
+            if scene is None:
+                return UNKNOWN_SCENE
+            if len(strokes) != len(scene.joints):
+                return UNKNOWN_POSTURE
+            self._responses = self._responses or ResponseList(scene)
+            return await asyncio.to_thread(self._responses.at, strokes)
 
     async def load_at(self, time: float) -> dict[str, Any] | None:
         """Text message ``load`` of what the load at the tip was before `time` (s), in words; None without any."""
@@ -175,6 +153,12 @@ class Analyst:
             return []
         self._modes = self._modes or ModeList(scene)
         return self._modes.at(strokes)
+
+
+def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
+    """Text message ``loads`` and binary block of a response; the block is empty where there is none."""
+    text = {"kind": "loads", "names": found.loads, "trouble": found.trouble}
+    return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""
 
 
 def _mode(frequency: float, natural: list[float]) -> int | None:

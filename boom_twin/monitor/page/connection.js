@@ -1,9 +1,10 @@
 // The WebSocket: connected again and again; what comes is handed on.
 
-import { decodeBlocks, ROWS, SPECTRUM } from "./protocol.js";
+import { decodeBlocks, RESPONSE, ROWS, SPECTROGRAM, SPECTRUM } from "./protocol.js";
 import { Table } from "./table.js";
 
 const RETRY = 1000; // ms
+const EVENTS = { [SPECTRUM]: "spectrum", [SPECTROGRAM]: "spectrogram", [RESPONSE]: "response" };
 
 export class Connection extends EventTarget {
   constructor() {
@@ -41,7 +42,7 @@ export class Connection extends EventTarget {
 
   receiveBlocks(buffer) {
     for (const block of decodeBlocks(buffer)) {
-      if (block.kind !== ROWS) { this.emit(block.kind === SPECTRUM ? "spectrum" : "spectrogram", block); continue; }
+      if (block.kind !== ROWS) { this.emit(EVENTS[block.kind], block); continue; }
       if (!this.tables[block.table]) continue;
       this.tables[block.table].add(block.times, block.values);
       this.lastRows = performance.now();

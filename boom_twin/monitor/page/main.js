@@ -4,6 +4,7 @@ import { theme } from "./colours.js";
 import { Lamps } from "./lamps.js";
 import { Connection } from "./connection.js";
 import { Path } from "./path.js";
+import { ResponseTab } from "./response.js";
 import { Shape } from "./shape.js";
 import { HtmlTable } from "./html_table.js";
 import { SpectrumTab } from "./spectrum.js";
@@ -18,8 +19,8 @@ const get = id => document.getElementById(id);
 
 const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
 new Actions(connection, view);
-const spectrum = new SpectrumTab(connection, new HtmlTable("peaks"));
-const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), state: null };
+const spectrum = new SpectrumTab(connection, new HtmlTable("peaks")), response = new ResponseTab(connection);
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), response, state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
@@ -29,7 +30,7 @@ function selectTab(tab) {
   open = tab;
   for (const section of document.querySelectorAll(".tab")) section.classList.toggle("open", section.id === tab);
   for (const button of document.querySelectorAll("#tabs button")) button.setAttribute("aria-selected", button.dataset.tab === tab);
-  spectrum.isNew = true;
+  spectrum.isNew = response.isNew = true;
   view.version++;
   if (tab === "state" && lamps.state) lamps.fillTable(lamps.state);
 }
@@ -40,6 +41,7 @@ function setTheme(name) {
   get("theme").textContent = name === "dark" ? "Light" : "Dark";
   tabs.traces.rebuild();
   spectrum.rebuild();
+  response.rebuild();
   view.version++;
 }
 
@@ -85,7 +87,7 @@ function draw(now) {
   frames++;
   recordDelay();
   if (now - second > 1000) showRate(now);
-  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : connection.lastRows} ${spectrum.isNew}`;
+  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : connection.lastRows} ${tabs[open]?.isNew}`;
   if (now < due || state === drawn || document.hidden) return;
   const began = performance.now();
   tabs[open]?.draw(open);
@@ -115,4 +117,4 @@ setInterval(() => lamps.watch(timeline.isReplay), 500);
 setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 selectTab("traces");
 requestAnimationFrame(draw);
-Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious
+Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, response, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious

@@ -46,7 +46,7 @@ export class SpectrumTab {
       title: `density, ${this.lines.source}, (m/s²)²/Hz`,
       series: this.lines.axes.map((label, i) => ({ label, colour: i })),
       scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 } },
-      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: (_, ticks) => ticks.map(tick => tick === null ? null : `1e${Math.round(Math.log10(tick))}`) }],
+      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: oneDigit }],
       hooks: { draw: [plot => this.drawModes(plot)] },
     });
     this.chart.draw(this.density, LOWEST, Math.min(HIGHEST, this.density[0].at(-1)));
@@ -54,18 +54,9 @@ export class SpectrumTab {
   }
 
   drawModes(plot) {
-    const { ctx, bbox } = plot;
+    markFrequencies(plot, this.lines.natural);
+    const { ctx } = plot;
     ctx.save();
-    ctx.font = `${13 * devicePixelRatio}px system-ui`;
-    ctx.fillStyle = ctx.strokeStyle = themeColour("ink");
-    ctx.setLineDash([6, 4]);
-    this.lines.natural.forEach((frequency, i) => {
-      const x = plot.valToPos(frequency, "x", true);
-      if (x < bbox.left || x > bbox.left + bbox.width) return;
-      ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-      ctx.fillText(`${i + 1}`, x + 4, bbox.top + 14 * devicePixelRatio);
-    });
-    ctx.setLineDash([]);
     ctx.strokeStyle = lineColour(2);
     ctx.lineWidth = 2;
     for (const peak of this.lines.peaks) {
@@ -108,6 +99,24 @@ export class SpectrumTab {
     context.fillText(`${this.history.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
     document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
   }
+}
+
+// Labels of a logarithmic axis.
+export const oneDigit = (_, ticks) => ticks.map(tick => tick === null ? null : tick.toExponential(0).replace("+", ""));
+
+// Dashed lines over the plot at natural frequencies (Hz), each with the number of its mode.
+export function markFrequencies({ ctx, bbox, valToPos }, frequencies) {
+  ctx.save();
+  ctx.font = `${13 * devicePixelRatio}px system-ui`;
+  ctx.fillStyle = ctx.strokeStyle = themeColour("ink");
+  ctx.setLineDash([6, 4]);
+  frequencies.forEach((frequency, i) => {
+    const x = valToPos(frequency, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) return;
+    ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+    ctx.fillText(`${i + 1}`, x + 4, bbox.top + 14 * devicePixelRatio);
+  });
+  ctx.restore();
 }
 
 // Viridis in five steps; grows lighter all the way, so it reads without colour.

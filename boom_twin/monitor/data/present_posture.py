@@ -1,0 +1,111 @@
+"""What the model says of the posture that is shown: natural frequencies, and how the tip answers to loads.
+
+Worked out anew only where the boom has moved, in a thread beside the server and never on a sample's way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from ...analysis.equilibrium import settle
+from ...analysis.frequency_response import UPWARD, linearised_boom
+from ...analysis.modal import natural_modes
+from ...compiler.compile import compile_scene
+from ...errors import BoomTwinError
+from ...scene.kinematics import joint_angles_of_strokes
+from ...scene.schema import Scene
+from ...types import Array
+
+MOVED = 0.005
+"""m of any stroke after which all is worked out anew."""
+
+Found = TypeVar("Found")
+
+
+class PresentPosture(Generic[Found]):
+    """Something of one boom at its strokes, worked out anew where it has moved by `MOVED`."""
+
+    def __init__(self) -> None:
+        self._at: Array | None = None
+        self._found: Found | None = None
+
+    def at(self, strokes: Sequence[float]) -> Found:
+        """What there is at `strokes` (m); the same object as before where the boom has not moved."""
+        now = np.asarray(strokes, dtype=np.float64)
+        if self._found is None or self._at is None or np.max(np.abs(now - self._at)) > MOVED:
+            self._found, self._at = self._work_out(now), now
+        return self._found
+
+    def _work_out(self, strokes: Array) -> Found:
+        raise NotImplementedError
+
+
+COUNT = 6
+WIDTH = 1e-4
+"""Relative accuracy of the frequencies."""
+
+
+class ModeList(PresentPosture[list[float]]):
+    """The lowest `COUNT` frequencies (Hz) about the equilibrium; none where there is no equilibrium."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__()
+        self._scene, self._plan = scene, compile_scene(scene)
+
+    def _work_out(self, strokes: Array) -> list[float]:
+        state, work = self._plan.state(), self._plan.work()
+        try:
+            settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
+        except BoomTwinError:
+            return []
+        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
+
+
+FREQUENCIES = np.geomspace(0.25, 30.0, 400)
+"""Hz, of the responses."""
+MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipResponses:
+    """How much the tip accelerates under harmonic loads.
+
+    Attributes
+    ----------
+    loads : tuple of str
+        In words.
+    frequencies : ndarray, shape (k,)
+        Hz.
+    accelerations : ndarray, shape (k, loads)
+        Amplitudes, both directions together, m/s^2.
+    trouble : str
+        Why there are none; else empty.
+    """
+
+    loads: tuple[str, ...] = ()
+    frequencies: Array = field(default_factory=lambda: np.zeros(0))
+    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    trouble: str = ""
+
+
+class ResponseList(PresentPosture[TipResponses]):
+    """Response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__()
+        self._scene = scene
+
+    def _work_out(self, strokes: Array) -> TipResponses:
+        try:
+            boom = linearised_boom(self._scene, strokes)
+            drives = range(boom.plan.joints)
+            loads = [boom.load(UPWARD), *(MILLIMETRE * boom.load(drive=i) for i in drives)]
+            columns = [np.linalg.norm(boom.respond(FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
+        except BoomTwinError as error:
+            return TipResponses(trouble=str(error))
+        names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
+        return TipResponses(names, FREQUENCIES, np.column_stack(columns))
