@@ -29,6 +29,9 @@ Measured less predicted:
 What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
 cylinder's force. The part of that which the few modes lack is added (static correction).
 
+A section that sags turns the tip and no joint, and to an IMU that turn is a bias. As far as the biases are beyond doubt, the
+stated covariance of the tip is wider: by the shares b, alike in all sections, that make such a turn.
+
 The modes are made anew when the posture has changed; their motion of the tip follows the posture at every sample, for the
 motions of the parts relative to one another stay, see `follow_posture`.
 
@@ -60,7 +63,7 @@ AGILITY, RETREAT = 2.0, 0.02  # 1/s, by which the load's level follows the innov
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
-BEYOND_DOUBT = 3.0  # standard deviations of the IMU's bias, beyond which it may be a sag that no angle shows
+BEYOND_DOUBT = 2.0  # standard deviations of the IMU's bias, beyond which it may be a sag that no angle shows
 INEXACT = 0.05  # share of the deviation that modes and static corrections may be wrong by
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
@@ -570,8 +573,11 @@ def correct(f, channel, residual, variance, age):
 
 
 @inner
-def write_estimate(f, results, estimates, out):
-    """Write the estimate at the newest prediction: see `WIDTH`."""
+def write_estimate(f, results, out):
+    """Write the estimate at the newest prediction: see `WIDTH`.
+
+    Errors of the strokes are in the covariance of the modes, by w: what a stroke does to the tip is the sum over the modes.
+    """
     size = states_of(f)
     for a in range(3):
         read_tip(f, a, f.rows[a])
@@ -587,12 +593,8 @@ def write_estimate(f, results, estimates, out):
     write_covariance(f, 3, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     at = TIP_COVARIANCE
     for a in range(3):
-        for b in range(a, 3):
-            for i in range(f.softness.shape[0]):
-                out[at] += f.lever[i, a] * f.lever[i, b] * estimates.variances[i]
-            if a == b:
-                out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
-            at += 1
+        out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
+        at += 3 - a
     add_sag(f, out)
     write_spread(f, results, out)
     for a in range(2):
