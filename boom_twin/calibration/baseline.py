@@ -15,6 +15,7 @@ from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.inference.fault_catalogue import parameters
 from ..health.learning import learn
+from ..health.suspicion import load_levels
 from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
@@ -35,7 +36,7 @@ def learn_baseline(
 ) -> Baseline:
     """What model and sensors are off by in `sessions`, called `names`, in which all was well.
 
-    `progress` is told the share done and what comes next.
+    A pump or wind may have shaken them. `progress` is told the share done and what comes next.
 
     Raises
     ------
@@ -47,7 +48,11 @@ def learn_baseline(
         progress(0.3 * len(problems) / len(names), name)
         problems.append(_problems(scene, settings, session, mounts))
     scene = loaded(scene, *settings.load)
-    return learn(problems, parameters(scene), len(scene.joints), names, lambda share: progress(0.3 + 0.7 * share, "learning"))
+
+    def tell(share: float) -> None:
+        progress(0.3 + 0.7 * share, "learning")
+
+    return learn(problems, parameters(scene), len(scene.joints), names, tell, load_levels(scene).tolist())
 
 
 def _problems(

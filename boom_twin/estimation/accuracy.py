@@ -120,4 +120,4 @@ def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, ze
         for _ in range(counts[3]):
             take_forces(f, zeros, size[0] + 2, k * span)
         f.level[0] = f.loads[USUAL_LOAD]  # readings without noise would let it fall
-    write_estimate(f, results, estimates, out)
+    write_estimate(f, results, out)

@@ -29,6 +29,9 @@ Measured less predicted:
 What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
 cylinder's force. The part of that which the few modes lack is added (static correction).
 
+A section that sags turns the tip and no joint, and to an IMU that turn is a bias. As far as the biases are beyond doubt, the
+stated covariance of the tip is wider: by the shares b, alike in all sections, that make such a turn.
+
 The modes are made anew when the posture has changed; their motion of the tip follows the posture at every sample, for the
 motions of the parts relative to one another stay, see `follow_posture`.
 
@@ -60,6 +63,7 @@ AGILITY, RETREAT = 2.0, 0.02  # 1/s, by which the load's level follows the innov
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
+BEYOND_DOUBT = 2.0  # standard deviations of the IMU's bias, beyond which it may be a sag that no angle shows
 INEXACT = 0.05  # share of the deviation that modes and static corrections may be wrong by
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
@@ -569,8 +573,11 @@ def correct(f, channel, residual, variance, age):
 
 
 @inner
-def write_estimate(f, results, estimates, out):
-    """Write the estimate at the newest prediction: see `WIDTH`."""
+def write_estimate(f, results, out):
+    """Write the estimate at the newest prediction: see `WIDTH`.
+
+    Errors of the strokes are in the covariance of the modes, by w: what a stroke does to the tip is the sum over the modes.
+    """
     size = states_of(f)
     for a in range(3):
         read_tip(f, a, f.rows[a])
@@ -586,15 +593,49 @@ def write_estimate(f, results, estimates, out):
     write_covariance(f, 3, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     at = TIP_COVARIANCE
     for a in range(3):
-        for b in range(a, 3):
-            for i in range(f.softness.shape[0]):
-                out[at] += f.lever[i, a] * f.lever[i, b] * estimates.variances[i]
-            if a == b:
-                out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
-            at += 1
+        out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
+        at += 3 - a
+    add_sag(f, out)
     write_spread(f, results, out)
     for a in range(2):
         out[FORCE + a], out[FORCE_VARIANCE + a] = f.x[LOAD + a], f.p[LOAD + a, LOAD + a]
+
+
+@inner
+def unexplained_turn2(f):
+    """Square of the turn of the tip (rad) that the IMU's biases would be, as far as it is beyond doubt.
+
+    A bias of the two axes and a turn of gravity in them are the same to the filter, and no angle shows a section that sags.
+    """
+    c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
+    x, z = c * f.now[FELT_Y] - s * f.now[FELT_X], -c * f.now[FELT_X] - s * f.now[FELT_Y]
+    felt2 = x * x + z * z
+    if felt2 == 0.0:
+        return 0.0
+    turn = (x * f.x[BIAS] + z * f.x[BIAS + 1]) / felt2
+    variance = x * x * f.p[BIAS, BIAS] + 2.0 * x * z * f.p[BIAS, BIAS + 1] + z * z * f.p[BIAS + 1, BIAS + 1]
+    return max(turn * turn - BEYOND_DOUBT * BEYOND_DOUBT * variance / (felt2 * felt2), 0.0)
+
+
+@inner
+def add_sag(f, out):
+    """Add to the tip's covariance what it is off by if the sections, each as likely as another, sag to the turn unexplained."""
+    turn2, n, all2 = unexplained_turn2(f), f.softness.shape[0], 0.0
+    if turn2 == 0.0:
+        return
+    sag = f.rows[0]  # no longer needed
+    clear(sag, 6)
+    for i in range(n):
+        x, y, turn = 0.0, 0.0, 0.0
+        for j in range(f.status[COUNT]):
+            still = f.coupling[j, 2 + n + i] / (f.omega[j] * f.omega[j])
+            x, y, turn = x + still * f.tip[j, 0], y + still * f.tip[j, 1], turn + still * f.tip[j, 2]
+        all2 += turn * turn
+        sag[0], sag[1], sag[2] = sag[0] + x * x, sag[1] + x * y, sag[2] + x * turn
+        sag[3], sag[4], sag[5] = sag[3] + y * y, sag[4] + y * turn, sag[5] + turn * turn
+    if all2 > 0.0:
+        for k in range(6):
+            out[TIP_COVARIANCE + k] += sag[k] * turn2 / all2
 
 
 @inner

@@ -2,13 +2,15 @@
 
 The errors (deviation of the model's error of angles and of the IMU, their noise, the detuning) are those under which the
 innovations of all sessions are most probable, found by coordinate search on a grid of ratios; with them, the regression of all
-sessions one after the other gives the parameters.
+sessions one after the other gives the parameters. A load at the tip that the model does not know, a pump's or the wind's, is a
+nuisance: of each session the level is taken that makes its innovations most probable, and it is no part of the baseline.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,14 +35,24 @@ LEAST = 45.0  # s
 Session = Sequence[BlockProblem]
 
 
+class ShakenSession(NamedTuple):
+    """A session, and the level (N) of the unknown load at the tip in it."""
+
+    problems: Session
+    level: float
+
+
 def learn(
     sessions: Sequence[Session],
     known: tuple[Parameter, ...],
     joints: int,
     names: Sequence[str],
     progress: Callable[[float], None] = lambda share: None,
+    levels: Sequence[float] = (0.0,),
 ) -> Baseline:
     """A baseline from the linear problems of healthy sessions of one rig, called `names`; `progress` is told the share done.
+
+    An unknown load at the tip may be of any of `levels` (N) in each session.
 
     Raises
     ------
@@ -52,11 +64,14 @@ def learn(
         raise UsageError(f"sessions = {span:.0f} s in all: too short to learn from. Give at least {LEAST:.0f} s, with moves.")
     best = Baseline(description="learnt", sessions=tuple(names))
     rounds = [(ratio, key) for ratio in RATIOS for _ in range(ROUNDS) for key in SEARCHED]
+    shaken: list[ShakenSession] = []
     for done, (ratio, key) in enumerate(rounds):
         progress(done / len(rounds))
-        best = _line_search(sessions, known, joints, best, key, ratio)
+        if done % len(SEARCHED) == 0:
+            shaken = [_under_load(session, known, joints, best, levels) for session in sessions]
+        best = _line_search(shaken, known, joints, best, key, ratio)
     progress(1.0)
-    regression, _ = _run(sessions, known, joints, best)
+    regression, _ = _run(shaken, known, joints, best)
     learnt = [i for i, each in enumerate(known) if each.healthy > 0.0]
     covariance = WIDER * regression.covariance[np.ix_(learnt, learnt)]
     return best.model_copy(
@@ -68,8 +83,18 @@ def learn(
     )
 
 
+def _under_load(
+    session: Session, known: tuple[Parameter, ...], joints: int, trial: Baseline, levels: Sequence[float]
+) -> ShakenSession:
+    """A session with that of the `levels` (N) under which it is most probable."""
+    if len(levels) == 1:
+        return ShakenSession(session, levels[0])
+    found = (ShakenSession(session, level) for level in levels)
+    return max(found, key=lambda shaken: _run([shaken], known, joints, trial)[1])
+
+
 def _line_search(
-    sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, start: Baseline, key: str, ratio: float
+    sessions: Sequence[ShakenSession], known: tuple[Parameter, ...], joints: int, start: Baseline, key: str, ratio: float
 ) -> Baseline:
     """Go up or down with one value as long as innovations get more probable."""
     low, high = BOUNDS[key]
@@ -92,13 +117,15 @@ def _line_search(
     return start.model_copy(update={key: float(f"{value:.3g}")})
 
 
-def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int, trial: Baseline) -> tuple[Regression, float]:
+def _run(
+    sessions: Sequence[ShakenSession], known: tuple[Parameter, ...], joints: int, trial: Baseline
+) -> tuple[Regression, float]:
     """Regression over all sessions, and the logarithm of the probability of their innovations."""
     regression, log = Regression(*Baseline().healthy(known)), 0.0
     errors2, noise2 = trial.errors(joints) ** 2, trial.noise(joints) ** 2
     for session in sessions:
-        whitening = InnovationFilter(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning)
-        for problem in session:
+        whitening = InnovationFilter(joints + 2, 1 + len(known), BLOCK * NANO, trial.detuning, session.level)
+        for problem in session.problems:
             whitening.tune(problem.modes)
             found = whitening.step(problem.table, problem.noise(noise2), errors2, problem.shaking, problem.travel)
             log += _log(regression, found.white, found.log)

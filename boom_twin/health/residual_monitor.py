@@ -15,7 +15,6 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..scene.summary import explain
 from ..types import NANO, SECOND, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
@@ -25,7 +24,7 @@ from .inference.fault_catalogue import parameters
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, LEVELS, Suspicion, carried_on
+from .suspicion import CRUDE, DETUNING, Suspicion, carried_on, load_levels
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
@@ -87,7 +86,7 @@ class ResidualMonitor:
         self._linear = LinearModel(scene, settings, mounts, known)
         self._mean, self.covariance = baseline.healthy(known)
         self._errors2, self._noise2, self._detuning = baseline.errors(n) ** 2, baseline.noise(n) ** 2, baseline.detuning
-        self._levels = LEVELS * explain(scene).mass * math.hypot(*scene.gravity)
+        self._levels = load_levels(scene)
         self._bank = HypothesisTest(known)
         self._tell = AlarmText(scene, known, self._linear.signatures, baseline.errors(n))
         self._known: dict[str, _KnownFault] = {}

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..scene.schema import Scene
+from ..scene.summary import explain
 from ..types import NANO, Array
 from .inference.block_problem import BLOCK, BlockProblem
 from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
@@ -24,6 +26,11 @@ MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the r
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
+
+
+def load_levels(scene: Scene) -> Array:
+    """Levels (N) that the unknown load at the tip of a boom is looked for at, from 0."""
+    return LEVELS * explain(scene).mass * math.hypot(*scene.gravity)
 
 
 class Suspicion:

@@ -224,7 +224,7 @@ def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, f
 def estimate(out, pins, tip, found):
     """Give the estimate beside the newest prediction."""
     n = found.measured.shape[1]
-    write_estimate(tip, results_in(out, n, pins), estimates_in(out, n, pins), found.estimates[found.counts[0] - 1])
+    write_estimate(tip, results_in(out, n, pins), found.estimates[found.counts[0] - 1])
 
 
 # -- measured angles and accelerations --------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from boom_twin.estimation import tip_estimate as tip
 from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.deviation_modes import DeviationModes
 from boom_twin.estimation.tip_estimate import DeviationFilter
+from boom_twin.health.baseline import Baseline
 from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
 from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
 from boom_twin.kernels.transfer.time_step import observe
@@ -253,6 +254,38 @@ def test_a_load_that_hangs_at_the_tip_is_found(scene: Scene) -> None:
     assert np.hypot(*(report.estimate.tip[:2] - truth["tip"])) < 0.25 * off
     deviation = np.sqrt(report.estimate.tip_covariance[[0, 3]])
     assert (np.abs(report.estimate.tip[:2] - truth["tip"]) < 4.0 * deviation + 1e-3).all()
+
+
+def with_imu(scene: Scene, true: Scene, samples: list[Sample]) -> list[Sample]:
+    """The same, and behind every sample of the angles what the IMU of the boom `true` reads, at rest."""
+    posed, rng = Posed(true, strokes_of_posture(scene, "arch")), np.random.default_rng(7)
+    heading = float(rows_of(posed.boom)[0].tip[0, 2])
+    c, s = math.cos(heading), math.sin(heading)
+    felt, found = -np.array([[c, s], [-s, c]]) @ np.array(scene.gravity), []
+    for sample in samples:
+        found.append(sample)
+        if sample.stream is Stream.ANGLES:
+            found.append(Sample(Stream.IMU, sample.stamp, felt + Settings().imu_sigma * rng.normal(size=2)))
+    return found
+
+
+@pytest.mark.parametrize(("stiffness", "is_off"), [(1.0, False), (0.6, True)])
+def test_a_sag_that_only_the_imu_shows_is_in_the_deviations(scene: Scene, stiffness: float, is_off: bool) -> None:
+    """A section 40 % softer turns the tip and no joint: prediction and estimate are off by what they say, not by far more."""
+    true = with_parameters(scene, {"section_2.EI": stiffness * parameter(scene, "section_2.EI")})
+    samples, truth = pseudo_session(scene, true, 10.0, 1)
+    twin = Twin(scene, baseline=Baseline())
+    health = []
+    for sample in with_imu(scene, true, samples):
+        report = twin.update(sample)
+        health += [report.health] if report.health is not None else []
+        if report.prediction is not None and report.estimate is not None:
+            prediction, estimate = report.prediction.tip_position, report.estimate
+    off, left = np.hypot(*(prediction - truth["tip"])), np.hypot(*(estimate.tip[:2] - truth["tip"]))
+    stated, said = np.hypot(*health[-1].tip_sigmas), math.sqrt(estimate.tip_covariance[[0, 3]].sum())
+    assert (off > 0.01) == is_off
+    assert off < 2.0 * stated and left < 2.0 * said
+    assert is_off or (stated < 8e-3 and said < 2e-3)
 
 
 def test_without_other_sensors_it_is_the_prediction(scene: Scene) -> None:
