@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels.elements import pin_contact as contact
+from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
@@ -129,9 +130,9 @@ class Plan:
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), right=np.zeros((inner, SLOTS)),
             condensed=condensed, hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
-            angles=np.zeros(points), turn=np.zeros((beams, points, 4)), local=np.zeros((points, 2)), drive=np.zeros(n),
+            turn=np.zeros((beams, TURN_ROWS, points)), local=np.zeros((LOCAL_ROWS, points)), drive=np.zeros(n),
             drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), guess=np.zeros(len(self.names)),
-            corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(3),
+            corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip
 

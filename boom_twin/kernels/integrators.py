@@ -158,14 +158,22 @@ def park(family, parameter, h, weights):
 @inner
 def start_step(scheme, history, hat, offset):
     """Fill x_hat and D, both shape (n,), from `history`, shape (depth, n)."""
-    for i in range(hat.shape[0]):
-        hat[i], offset[i] = 0.0, 0.0
-    for k in range(history.shape[0]):
+    weigh_newest(scheme.weights[HAT], history, hat)
+    weigh_newest(scheme.weights[OFFSET], history, offset)
+    for k in range(history.shape[0] - DEPTH):
         row, for_hat, for_offset = history[k], scheme.weights[HAT, OLD + k], scheme.weights[OFFSET, OLD + k]
-        if for_hat != 0.0 or for_offset != 0.0:
-            for i in range(hat.shape[0]):
-                hat[i] += for_hat * row[i]
-                offset[i] += for_offset * row[i]
+        for i in range(hat.shape[0]):
+            hat[i] += for_hat * row[i]
+            offset[i] += for_offset * row[i]
+
+
+@inner
+def weigh_newest(weights, history, total):
+    """Weighted sum of the newest four rows; a loop that writes one array only is vectorised, one that writes two is not."""
+    x, v, p, a = history[X], history[V], history[P], history[A]
+    for_x, for_v, for_p, for_a = weights[X], weights[V], weights[P], weights[A]
+    for i in range(total.shape[0]):
+        total[i] = for_x * x[i] + for_v * v[i] + for_p * p[i] + for_a * a[i]
 
 
 @inner
@@ -177,13 +185,36 @@ def finish_step(scheme, position, hat, offset, v, a, history):
     for i in range(position.shape[0]):
         a[i] = scheme.gain * (position[i] - hat[i])
         v[i] = scheme.rate * position[i] + offset[i]
-    for k in range(history.shape[0]):
-        row, weights = history[k], scheme.weights[ROWS + k]
-        for_x, for_v, for_a, keep = weights[NEW_X], weights[NEW_V], weights[NEW_A], weights[OLD + k]
+    if scheme.family == WILSON:  # ends before the instant that is solved for
+        renew_rows(scheme.weights, position, v, a, history, history.shape[0])
+        return
+    renew_rows(scheme.weights, position, v, a, history, history.shape[0] - DEPTH)
+    weights, p, old = scheme.weights[P], history[P], history[A]
+    for_a, keep, share = weights[NEW_A], weights[P], weights[A]
+    for i in range(position.shape[0]):
+        p[i] = for_a * a[i] + keep * p[i] + share * old[i]
+    weigh(scheme.weights[X, NEW_X], position, history[X])
+    weigh(scheme.weights[V, NEW_V], v, history[V])
+    weigh(scheme.weights[A, NEW_A], a, history[A])
+
+
+@inner
+def weigh(weight, of, row):
+    """`row` becomes `of` times a number."""
+    for i in range(of.shape[0]):
+        row[i] = weight * of[i]
+
+
+@inner
+def renew_rows(weights, position, v, a, history, rows):
+    """Make the first `rows` rows of `history` anew, each from the old ones at or behind its own place."""
+    for k in range(rows):
+        row, own = history[k], weights[ROWS + k]
+        for_x, for_v, for_a, keep = own[NEW_X], own[NEW_V], own[NEW_A], own[OLD + k]
         for i in range(position.shape[0]):
             row[i] = for_x * position[i] + for_v * v[i] + for_a * a[i] + keep * row[i]
         for j in range(k + 1, history.shape[0]):
-            share, older = weights[OLD + j], history[j]
+            share, older = own[OLD + j], history[j]
             if share != 0.0:
                 for i in range(position.shape[0]):
                     row[i] += share * older[i]

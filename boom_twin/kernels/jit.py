@@ -14,6 +14,8 @@ from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..errors import UsageError
 from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
 
@@ -145,6 +147,25 @@ class _Referenced:
 
 referenced = _Referenced()
 """A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
+
+
+class StackArray:
+    """A small array of constant shape that a kernel makes, not filled, of the same kind of numbers as its argument.
+
+    For shapes that are constants only, where all loops over it are unrolled; see `boom_twin.kernels.stack_arrays`.
+    """
+
+    def __init__(self, *shape: int) -> None:
+        self._shape = shape
+
+    def __call__(self, like: Any) -> Any:
+        return np.zeros(self._shape, like.dtype)
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        from .stack_arrays import type_of_maker
+
+        return type_of_maker(self._shape)
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:

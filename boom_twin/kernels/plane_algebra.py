@@ -8,7 +8,15 @@ import numpy as np
 
 from .jit import inner
 
-SMALL = 0.5  # rad; up to here the series below are exact to rounding
+COS, SIN = 0, 1  # rows of a table of turns
+
+# Cosine and sine on [-pi/4, pi/4]: the polynomials of fdlibm (k_cos.c, k_sin.c). pi/2 in three parts, the first two of 33 bits.
+QUARTER, FAR = 0.25 * math.pi, 1e5
+HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+C1, C2, C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+C4, C5, C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+S1, S2, S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+S4, S5, S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
 
 
 @inner
@@ -25,35 +33,44 @@ def rotated(c, s, x, y):
 
 
 @inner
-def cosines(angles, count, turn):
-    """Columns 0 and 1 of `turn` (>= count, >= 2): cosine and sine of the first `count` angles (rad).
+def near_zero(x):
+    """Cosine and sine of an angle in [-pi/4, pi/4] (rad), to one unit in the last place."""
+    u = x * x
+    v = u * u
+    c = (C1 + u * C2) + v * ((C3 + u * C4) + v * (C5 + u * C6))
+    s = (S1 + u * S2) + v * ((S3 + u * S4) + v * (S5 + u * S6))
+    return 1.0 - (0.5 * u - v * c), x + x * u * s
 
-    Below SMALL by Taylor series, whose remainders are below 1e-18 and 1e-19: bending turns little, and the library's
-    functions were a fifth of a step.
-    """
+
+@inner
+def cosine_and_sine(x):
+    """Cosine and sine of an angle (rad), to one unit in the last place of 1; the library's two calls were a fifth of a step."""
+    if not abs(x) < FAR:
+        return math.cos(x), math.sin(x)
+    quarters = np.floor(x * (2.0 / math.pi) + 0.5)
+    c, s = near_zero(((x - quarters * HALF_PI[0]) - quarters * HALF_PI[1]) - quarters * HALF_PI[2])
+    quadrant = np.int64(quarters) & 3
+    if quadrant == 0:
+        return c, s
+    if quadrant == 1:
+        return -s, c
+    if quadrant == 2:
+        return -c, -s
+    return s, -c
+
+
+@inner
+def cosines(angles, count, turn):
+    """Rows COS and SIN of `turn` (>= 2, >= count): of the first `count` angles (rad)."""
     largest = 0.0
     for j in range(count):
         largest = max(largest, abs(angles[j]))
-    if not largest < SMALL:
+    if largest < QUARTER:
         for j in range(count):
-            turn[j, 0], turn[j, 1] = math.cos(angles[j]), math.sin(angles[j])
+            turn[COS, j], turn[SIN, j] = near_zero(angles[j])
         return
     for j in range(count):
-        x = angles[j]
-        u = x * x
-        c = 1.0 - u * (1.0 / 182.0)
-        c = 1.0 - u * (1.0 / 132.0) * c
-        c = 1.0 - u * (1.0 / 90.0) * c
-        c = 1.0 - u * (1.0 / 56.0) * c
-        c = 1.0 - u * (1.0 / 30.0) * c
-        c = 1.0 - u * (1.0 / 12.0) * c
-        s = 1.0 - u * (1.0 / 210.0)
-        s = 1.0 - u * (1.0 / 156.0) * s
-        s = 1.0 - u * (1.0 / 110.0) * s
-        s = 1.0 - u * (1.0 / 72.0) * s
-        s = 1.0 - u * (1.0 / 42.0) * s
-        s = 1.0 - u * (1.0 / 20.0) * s
-        turn[j, 0], turn[j, 1] = 1.0 - 0.5 * u * c, x - x * u * (1.0 / 6.0) * s
+        turn[COS, j], turn[SIN, j] = cosine_and_sine(angles[j])
 
 
 SMALLEST_PIVOT = 1e-300
@@ -68,7 +85,8 @@ def condense(s, p, coupling, block, force, m, n):
     s, p : ndarray, shapes (>= m, >= m), (>= m,)
         What remains: H_ee, g_e; condensed in place.
     coupling, block, force : ndarray, shapes (>= n, >= m), (>= n, >= n), (>= n,)
-        H_ze, H_zz (lower triangle), g_z; coupling and force hold the gains H_zz^-1 H_ze, H_zz^-1 g_z afterwards.
+        H_ze, H_zz (lower triangle), g_z; coupling and force hold the gains H_zz^-1 H_ze, H_zz^-1 g_z afterwards, block the
+        factors L and 1/D.
     m, n : int
 
     Returns
@@ -101,6 +119,7 @@ def condense(s, p, coupling, block, force, m, n):
         for j in range(m):
             coupling[k, j] *= inverse
         force[k] *= inverse
+        block[k, k] = inverse
     for k in range(n):
         for j in range(k):
             factor = block[k, j]
@@ -116,13 +135,15 @@ def condense(s, p, coupling, block, force, m, n):
 @inner
 def condense_forces(p, coupling, block, force, m, n):
     """What `condense` does with p and force, by the gains and the factors that it left in coupling and block."""
-    for k in range(n):
-        for j in range(m):
-            p[j] -= coupling[k, j] * force[k]
+    for j in range(m):
+        value = p[j]
+        for k in range(n):
+            value -= coupling[k, j] * force[k]
+        p[j] = value
     for k in range(n - 1, -1, -1):
         for j in range(k):
             force[j] -= block[k, j] * force[k]
-        force[k] /= block[k, k]
+        force[k] *= block[k, k]
     for k in range(n):
         for j in range(k):
             force[k] -= block[k, j] * force[j]

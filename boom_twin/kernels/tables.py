@@ -192,16 +192,15 @@ class Work(NamedTuple):
     apart: Array  # (2, size + 1) rows of a six-bar's system, kept while it is assembled
     rho: Array  # (beams, P+1, 2)
     drho: Array  # (beams, P+1, n+1, 2)
-    angles: Array  # (P+1,)
-    turn: Array  # (beams, P+1, 4)
-    local: Array  # (P, 2)
+    turn: Array  # (beams, TURN_ROWS, P+1)
+    local: Array  # (LOCAL_ROWS, P)
     drive: Array  # (cylinders,) of a sub-step, m
     drive_rate: Array  # (cylinders,), m/s
     dz: Array  # (unknowns,)
     guess: Array  # (unknowns,) without the last step's correction, see `kernels.transfer.kept_tangent`
     corrections: Array  # (CORRECTIONS, unknowns), the newest first
     kept_z: Array  # (unknowns,) at which tangents were made
-    kept: Array  # (3,) as named there
+    kept: Array  # (4,) as named there
     cut: Array  # (SLOTS,)
 
 

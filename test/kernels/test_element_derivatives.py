@@ -132,11 +132,9 @@ BEAM_Z = np.array([0.2, -0.1, 0.6, 0.10, -0.15, 0.05, 0.02])  # x, y, theta of t
 def placed(z, row):
     """End position (3,), all histories and the part for input end z[:3] and coordinates z[3:]."""
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
-    part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((POINTS + 1, 4)))
-    angles, position = np.zeros(POINTS + 1), np.zeros(COUNT + 1 + 3 * POINTS)
-    angle = beam.beam_shape(row, part, SIZES, z[3:], angles)
-    c, s = np.cos(z[2]), np.sin(z[2])
-    beam.place_beam(row, part, SIZES, angles, *z[:3], c, s, position)
+    part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((beam.TURN_ROWS, POINTS + 1)))
+    position, c, s = np.zeros(COUNT + 1 + 3 * POINTS), np.cos(z[2]), np.sin(z[2])
+    angle = beam.place_beam(row, part, SIZES, z[3:], *z[:3], c, s, position, part.turn, part.rho)
     end = z[:2] + np.array([[c, -s], [s, c]]) @ rho[-1]
     return np.append(end, z[2] + angle), position, part
 
@@ -145,7 +143,7 @@ def swept(z, row):
     """Cut at the input end and gains, with two carried slots and the outboard side linearised where the end is."""
     _, position, part = placed(z, row)
     s, p, size = END_STIFFNESS.copy(), END_FORCE.copy(), COUNT + 1
-    own = beam.BeamEquations(np.zeros((size, 5)), np.zeros((size, size)), np.zeros(size), np.zeros((POINTS, 2)))
+    own = beam.BeamEquations(np.zeros((size, 5)), np.zeros((size, size)), np.zeros(size), np.zeros((beam.LOCAL_ROWS, POINTS)))
     motion, turn = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS), (np.cos(z[2]), np.sin(z[2]))
     beam.transfer_beam(row, part, SIZES, own, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5))
     return s, p, own.force, own.coupling
@@ -210,7 +208,9 @@ def test_beam_condenses_the_hessian_of_its_energy(beta, finite):
 @pytest.mark.parametrize("finite", [POINTS, 0])
 def test_beam_shape_derivatives(finite):
     row = beam_row(0.0, finite)
-    drho = placed(BEAM_Z, row)[2].drho
+    part = placed(BEAM_Z, row)[2]
+    beam.shape_derivatives(part, SIZES, 1.0 + BEAM_Z[-1])
+    drho = part.drho
     expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2].rho, BEAM_Z[3:])
     assert drho == pytest.approx(np.moveaxis(expected, -1, 1), abs=1e-8)
 

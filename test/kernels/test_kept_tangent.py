@@ -57,6 +57,20 @@ def test_a_sweep_of_forces_alone_gives_the_increments_of_a_whole_one(name, seed)
     assert np.array_equal(work.condensed.gains, gains) and not np.allclose(moved, whole, rtol=1e-6)
 
 
+@pytest.mark.parametrize("seed", [None, 8])
+def test_a_pass_of_forces_alone_makes_no_derivatives(seed):
+    """Neither placing nor a sweep of forces works out the derivatives of a part's shape: what only tangents need stays."""
+    plan, state, work, still = beside_rest(*((load_scene(), "arch") if seed is None else (booms.random_boom(seed), "test")))
+    increments(plan, state, work, Motion(1e5, 500.0, still, -500.0 * still))
+    kept = work.drho.copy()
+    state.z[:] += 1e-3 * (plan.tables.moving > 0)
+    place(plan.tables, state, work)
+    increments(plan, state, work, Motion(1e5, 500.0, still, -500.0 * still, False))
+    assert np.array_equal(work.drho, kept)
+    increments(plan, state, work, Motion(1e5, 500.0, still, -500.0 * still))
+    assert not np.array_equal(work.drho, kept)
+
+
 def test_condensing_forces_does_what_condensing_all_does():
     rng = np.random.default_rng(2)
     h, g = rng.normal(size=(8, 8)), rng.normal(size=8)

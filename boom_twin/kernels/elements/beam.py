@@ -14,14 +14,13 @@ Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.scene.notation`; 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...types import Array
-from ..jit import inner
-from ..plane_algebra import condense, condense_forces, cosines
+from ..jit import StackArray, inner
+from ..plane_algebra import COS, SIN, condense, condense_forces, cosine_and_sine, cosines
 
 BEAM = np.dtype(
     [
@@ -38,6 +37,9 @@ BEAM = np.dtype(
     ]
 )
 
+D_COS, D_SIN, ANGLE, TURN_ROWS = 2, 3, 4, 5  # rows of `BeamPart.turn`, behind COS and SIN
+FX, FY, TORQUE, CARRIED_X, CARRIED_Y, STRAIN, ALONG_Q, LOCAL_ROWS = range(8)  # rows of `BeamEquations.local`
+
 
 class Sizes(NamedTuple):
     """Loop counts of a part, as the row has them: bending, axial, points."""
@@ -53,7 +55,7 @@ class BeamPart(NamedTuple):
     psi : (P+1, n); the last row, as those of all that follows with P+1 rows, belongs to the output end.
     weights : (P+1, P), m. stiffness : (n, n), N m. mass, rotary : (P,), kg and kg m^2.
     rho : (P+1, 2), m. drho : (P+1, n + axial, 2), its derivatives by q.
-    turn : (P+1, 4) cosine, sine and their derivatives by the angle; of the output end the first two.
+    turn : (TURN_ROWS, P+1) cosine, sine, their derivatives by the angle (not of the output end), angle.
     """
 
     psi: Array
@@ -70,7 +72,8 @@ class BeamEquations(NamedTuple):
     """Equations of a part's q while it is condensed, and its gains afterwards (see `condense`).
 
     coupling : (>= n + axial, m) H_qe. block : (>= n + axial, ..) H_qq, lower triangle. force : (>= n + axial,) g_q.
-    local : (P, 2) forces of the points' masses in the axes of the input end, N.
+    local : (LOCAL_ROWS, >= P, >= n + axial) of the Gauss points, forces in the axes of the input end: force of their masses
+        (N), torque (N m), force that they carry (N); and of the coordinates, the strains that give elastic forces, and g_q.
     """
 
     coupling: Array
@@ -79,7 +82,8 @@ class BeamEquations(NamedTuple):
     local: Array
 
 
-USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))  # as constants, which the compiler unrolls: an eighth off a step
+USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))  # as constants, which the compiler unrolls
+USUAL_TURN, USUAL_RHO, USUAL_LOCAL = StackArray(TURN_ROWS, 5), StackArray(5, 2), StackArray(LOCAL_ROWS, 4)
 
 
 @inner
@@ -89,61 +93,85 @@ def is_usual(row):
 
 
 @inner
-def turn_points(row, part, sizes, z, angles):
-    """Fill the part's `turn`, and `angles` (P+1,) of all cross-sections; returns the end's turn (rad)."""
-    psi, turn, end = part.psi, part.turn, 0.0
-    for j in range(sizes.points + 1):
-        end = 0.0
+def turn_points(row, part, sizes, q, turn):
+    """Fill `turn`, see `BeamPart`; returns the end's turn (rad)."""
+    psi, end = part.psi, sizes.points
+    for j in range(end + 1):
+        angle = 0.0
         for k in range(sizes.bending):
-            end += psi[j, k] * z[row.z + k]
-        angles[j] = end
+            angle += psi[j, k] * q[k]
+        turn[ANGLE, j] = angle
     if row.finite:
-        cosines(angles, sizes.points + 1, turn)
+        cosines(turn[ANGLE], end + 1, turn)
+        for j in range(end):
+            turn[D_COS, j], turn[D_SIN, j] = -turn[SIN, j], turn[COS, j]
+        return turn[ANGLE, end]
+    for j in range(end):
+        turn[COS, j], turn[SIN, j], turn[D_COS, j], turn[D_SIN, j] = 1.0, turn[ANGLE, j], 0.0, 1.0
+    turn[COS, end], turn[SIN, end] = cosine_and_sine(turn[ANGLE, end])
+    return turn[ANGLE, end]
+
+
+@inner
+def stretch_of(sizes, q):
+    """1 + eps, or 1 for a part without axial strain."""
+    return 1.0 + q[sizes.bending] if sizes.axial else 1.0
+
+
+@inner
+def beam_shape(row, part, sizes, z, turn, rho):
+    """Fill `turn` and `rho`, see `BeamPart`, from the unknowns z; returns the end's turn (rad)."""
+    q = z[row.z : row.z + row.bending + row.axial]
+    weights, stretch = part.weights, stretch_of(sizes, q)
+    end = turn_points(row, part, sizes, q, turn)
+    for i in range(sizes.points + 1):
+        x, y = 0.0, 0.0
         for j in range(sizes.points):
-            turn[j, 2], turn[j, 3] = -turn[j, 1], turn[j, 0]
-        return end
-    for j in range(sizes.points):
-        turn[j, 0], turn[j, 1], turn[j, 2], turn[j, 3] = 1.0, angles[j], 0.0, 1.0
-    turn[sizes.points, 0], turn[sizes.points, 1] = math.cos(end), math.sin(end)
+            x += weights[i, j] * turn[COS, j]
+            y += weights[i, j] * turn[SIN, j]
+        rho[i, 0], rho[i, 1] = stretch * x, stretch * y
     return end
 
 
 @inner
-def beam_shape(row, part, sizes, z, angles):
-    """Fill the part's shape, and `angles` (P+1,) of its cross-sections, from the unknowns z; returns the end's turn (rad)."""
-    psi, weights, rho, drho, turn = part.psi, part.weights, part.rho, part.drho, part.turn
-    n, stretch = sizes.bending, 1.0
-    if sizes.axial:
-        stretch += z[row.z + n]
-    end = turn_points(row, part, sizes, z, angles)
+def shape_derivatives(part, sizes, stretch):
+    """Fill the part's `drho` from its `turn` and `rho`; only tangents need it."""
+    psi, weights, rho, drho, turn, n = part.psi, part.weights, part.rho, part.drho, part.turn, sizes.bending
     for i in range(sizes.points + 1):
-        x, y = 0.0, 0.0
         for k in range(n):
             drho[i, k, 0], drho[i, k, 1] = 0.0, 0.0
         for j in range(sizes.points):
-            weight = weights[i, j]
-            x += weight * turn[j, 0]
-            y += weight * turn[j, 1]
-            dx, dy = stretch * weight * turn[j, 2], stretch * weight * turn[j, 3]
+            weight = stretch * weights[i, j]
+            dx, dy = weight * turn[D_COS, j], weight * turn[D_SIN, j]
             for k in range(n):
                 drho[i, k, 0] += dx * psi[j, k]
                 drho[i, k, 1] += dy * psi[j, k]
-        rho[i, 0], rho[i, 1] = stretch * x, stretch * y
         if sizes.axial:
-            drho[i, n, 0], drho[i, n, 1] = x, y
-    return end
+            drho[i, n, 0], drho[i, n, 1] = rho[i, 0] / stretch, rho[i, 1] / stretch
 
 
 @inner
-def place_beam(row, part, sizes, angles, x, y, theta, c, s, position):
-    """Write the points, and the cross-section angles if there is rotary inertia, into `position`."""
-    rho = part.rho
+def place_beam(row, part, sizes, z, x, y, theta, c, s, position, turn, rho):
+    """Shape and place a part whose input end is at (x, y), turned by theta (cosine c, sine s).
+
+    Writes the part's `turn` and `rho`, and into `position` the points, and the angles there if there is rotary inertia. The
+    arguments `turn` and `rho` are room for them while they are worked out: the part's own, or on the stack.
+
+    Returns the end's turn (rad).
+    """
+    end, points = beam_shape(row, part, sizes, z, turn, rho), position[row.history : row.history + 2 * row.points + row.rotary]
     for i in range(sizes.points):
-        at = row.history + 2 * i
-        position[at] = x + c * rho[i, 0] - s * rho[i, 1]
-        position[at + 1] = y + s * rho[i, 0] + c * rho[i, 1]
-    for i in range(row.rotary):
-        position[row.history + 2 * sizes.points + i] = theta + angles[i]
+        points[2 * i] = x + c * rho[i, 0] - s * rho[i, 1]
+        points[2 * i + 1] = y + s * rho[i, 0] + c * rho[i, 1]
+    if row.rotary:
+        for i in range(sizes.points):
+            points[2 * sizes.points + i] = theta + turn[ANGLE, i]
+    for i in range(sizes.points + 1):
+        part.rho[i, 0], part.rho[i, 1] = rho[i, 0], rho[i, 1]
+    for k in range(TURN_ROWS):
+        for j in range(sizes.points + 1):
+            part.turn[k, j] = turn[k, j]
+    return end
 
 
 @inner
@@ -154,34 +182,26 @@ def transfer_beam(row, part, sizes, own, z, c, sn, motion, gravity, position, s,
 
     Returns the number of negative pivots, or -1.
     """
-    n = sizes.bending
-    size = n + sizes.axial
+    q = z[row.z : row.z + row.bending + row.axial]
+    size, stretch = sizes.bending + sizes.axial, stretch_of(sizes, q)
     fx, fy = c * p[0] + sn * p[1], -sn * p[0] + c * p[1]  # force at the output end in the axes of the input end
     if motion.renew:
+        shape_derivatives(part, sizes, stretch)
         _pull_back_tangents(part, sizes, own, c, sn, fx, fy, s, p, m)
-    _pull_back_forces(part, sizes, own, c, sn, p)
-    _add_forces_of_points(row, part, sizes, own, c, sn, motion, gravity, position, p)
-    _add_elastic_forces(row, part, sizes, own, z, motion)
+    torque = p[2]
+    _add_forces_to_cut(row, part, sizes, own, c, sn, motion, gravity, position, p)
+    _add_elastic_forces(row, part, sizes, own, q, motion)
+    _add_forces_to_coordinates(part, sizes, own, fx, fy, torque, stretch)
     if not motion.renew:
-        condense_forces(p, own.coupling, own.block, own.force, m, size)
+        condense_forces(p, own.coupling, own.block, own.local[ALONG_Q], m, size)
+    for a in range(size):
+        own.force[a] = own.local[ALONG_Q, a]
+    if not motion.renew:
         return 0
     _add_tangents_of_points(row, part, sizes, own, c, sn, motion, s)
-    _add_bending_of_forces(row, part, sizes, own, fx, fy, 1.0 if size == n else 1.0 + z[row.z + n])
+    _add_bending_of_forces(row, part, sizes, own, stretch)
     _add_stiffness(row, part, sizes, own, motion)
     return condense(s, p, own.coupling, own.block, own.force, m, size)
-
-
-@inner
-def _pull_back_forces(part, sizes, own, c, sn, p):
-    """Pull p at the output end back to e_I in place and to q in `own`."""
-    psi, rho, drho, n, force = part.psi[sizes.points], part.rho[sizes.points], part.drho[sizes.points], sizes.bending, own.force
-    for a in range(n + sizes.axial):
-        ax, ay = drho[a, 0], drho[a, 1]
-        bx, by = c * ax - sn * ay, sn * ax + c * ay
-        turn = psi[a] if a < n else 0.0
-        force[a] = bx * p[0] + by * p[1] + turn * p[2]
-    ex, ey = c * rho[0] - sn * rho[1], sn * rho[0] + c * rho[1]
-    p[2] += ex * p[1] - ey * p[0]
 
 
 @inner
@@ -212,31 +232,73 @@ def _pull_back_tangents(part, sizes, own, c, sn, fx, fy, s, p, m):
 
 
 @inner
-def _add_forces_of_points(row, part, sizes, own, c, sn, motion, gravity, position, p):
-    """Add forces of the masses at the Gauss points; leave them in `own.local`, too."""
-    psi, rho, drho, mass, rotary, force, local = part.psi, part.rho, part.drho, part.mass, part.rotary, own.force, own.local
-    fx_all, fy_all, moment = 0.0, 0.0, 0.0
+def _add_forces_to_cut(row, part, sizes, own, c, sn, motion, gravity, position, p):
+    """Move p from the output end to e_I and add the points' masses; their forces are left in `own.local`."""
+    rho, mass, local, end = part.rho, part.mass, own.local, sizes.points
+    first, behind = row.history, row.history + 2 * row.points + row.rotary
+    points, hat = position[first:behind], motion.hat[first:behind]  # views: places in them need no check for being negative
+    ex, ey = c * rho[end, 0] - sn * rho[end, 1], sn * rho[end, 0] + c * rho[end, 1]
+    fx_all, fy_all, moment = p[0], p[1], p[2] + ex * p[1] - ey * p[0]
     for i in range(sizes.points):
-        at = row.history + 2 * i
-        inertial = mass[i] * motion.gain
-        fx = inertial * (position[at] - motion.hat[at]) - mass[i] * gravity[0]
-        fy = inertial * (position[at + 1] - motion.hat[at + 1]) - mass[i] * gravity[1]
+        fx = mass[i] * (motion.gain * (points[2 * i] - hat[2 * i]) - gravity[0])
+        fy = mass[i] * (motion.gain * (points[2 * i + 1] - hat[2 * i + 1]) - gravity[1])
         ux, uy = c * fx + sn * fy, c * fy - sn * fx
-        local[i, 0], local[i, 1] = ux, uy
+        local[FX, i], local[FY, i], local[TORQUE, i] = ux, uy, 0.0
         fx_all += fx
         fy_all += fy
         moment += rho[i, 0] * uy - rho[i, 1] * ux
-        for a in range(sizes.bending + sizes.axial):
-            force[a] += ux * drho[i, a, 0] + uy * drho[i, a, 1]
-    for i in range(row.rotary):
-        at = row.history + 2 * sizes.points + i
-        torque = rotary[i] * motion.gain * (position[at] - motion.hat[at])
-        moment += torque
-        for a in range(sizes.bending):
-            force[a] += torque * psi[i, a]
-    p[0] += fx_all
-    p[1] += fy_all
-    p[2] += moment
+    if row.rotary:
+        for i in range(end):
+            torque = part.rotary[i] * motion.gain * (points[2 * end + i] - hat[2 * end + i])
+            local[TORQUE, i] = torque
+            moment += torque
+    p[0], p[1], p[2] = fx_all, fy_all, moment
+
+
+@inner
+def _add_elastic_forces(row, part, sizes, own, q, motion):
+    """Begin g_q with elastic forces and, where the row has damping, beta times the elastic force of the rates."""
+    stiffness, local, n = part.stiffness, own.local, sizes.bending
+    for b in range(n + sizes.axial):
+        local[STRAIN, b] = q[b]
+    if row.damped:
+        offset = motion.offset[row.z : row.z + row.damped]
+        for b in range(n + sizes.axial):
+            local[STRAIN, b] += row.beta * (motion.rate * q[b] + offset[b])
+    for a in range(n):
+        value = stiffness[a, 0] * local[STRAIN, 0]
+        for b in range(1, n):
+            value += stiffness[a, b] * local[STRAIN, b]
+        local[ALONG_Q, a] = value
+    if sizes.axial:
+        local[ALONG_Q, n] = row.axial_stiffness * local[STRAIN, n]
+
+
+@inner
+def _add_forces_to_coordinates(part, sizes, own, fx_end, fy_end, torque_end, stretch):
+    """Add to g_q what the end's force and torque and those in `own.local` do along q.
+
+    The derivatives of all positions are not needed for it: each force first goes to the Gauss points that carry it, whose sums
+    turn there, F_j = sum_i W[i, j] f_i.
+    """
+    psi, weights, rho, turn, local = part.psi, part.weights, part.rho, part.turn, own.local
+    n, end = sizes.bending, sizes.points
+    along = fx_end * rho[end, 0] + fy_end * rho[end, 1]
+    for j in range(end):
+        fx, fy = weights[end, j] * fx_end, weights[end, j] * fy_end
+        for i in range(end):
+            fx += weights[i, j] * local[FX, i]
+            fy += weights[i, j] * local[FY, i]
+        local[CARRIED_X, j], local[CARRIED_Y, j] = fx, fy
+        local[TORQUE, j] += stretch * (fx * turn[D_COS, j] + fy * turn[D_SIN, j])
+        along += local[FX, j] * rho[j, 0] + local[FY, j] * rho[j, 1]
+    for a in range(n):
+        value = local[ALONG_Q, a] + psi[end, a] * torque_end
+        for j in range(end):
+            value += psi[j, a] * local[TORQUE, j]
+        local[ALONG_Q, a] = value
+    if sizes.axial:
+        local[ALONG_Q, n] += along / stretch
 
 
 @inner
@@ -251,7 +313,7 @@ def _add_tangents_of_points(row, part, sizes, own, c, sn, motion, s):
     total, lever_x, lever_y, turning = 0.0, 0.0, 0.0, 0.0
     for i in range(sizes.points):
         inertial = mass[i] * motion.gain
-        x, y, ux, uy = rho[i, 0], rho[i, 1], local[i, 0], local[i, 1]
+        x, y, ux, uy = rho[i, 0], rho[i, 1], local[FX, i], local[FY, i]
         total += inertial
         lever_x += inertial * (c * x - sn * y)
         lever_y += inertial * (sn * x + c * y)
@@ -280,22 +342,18 @@ def _add_tangents_of_points(row, part, sizes, own, c, sn, motion, s):
 
 
 @inner
-def _add_bending_of_forces(row, part, sizes, own, fx_end, fy_end, stretch):
+def _add_bending_of_forces(row, part, sizes, own, stretch):
     """Second derivatives of all positions by two coordinates, times the forces there: the geometric stiffness."""
-    psi, weights, turn, local, block = part.psi, part.weights, part.turn, own.local, own.block
-    n, points = sizes.bending, sizes.points
-    for j in range(points):
-        fx, fy = weights[points, j] * fx_end, weights[points, j] * fy_end
-        for i in range(points):
-            fx += weights[i, j] * local[i, 0]
-            fy += weights[i, j] * local[i, 1]
+    psi, turn, local, block, n = part.psi, part.turn, own.local, own.block, sizes.bending
+    for j in range(sizes.points):
+        fx, fy = local[CARRIED_X, j], local[CARRIED_Y, j]
         if j < row.finite:
-            along = stretch * (fx * turn[j, 0] + fy * turn[j, 1])
+            along = stretch * (fx * turn[COS, j] + fy * turn[SIN, j])
             for a in range(n):
                 share = along * psi[j, a]
                 for b in range(a + 1):
                     block[a, b] -= share * psi[j, b]
-        across = fx * turn[j, 2] + fy * turn[j, 3]
+        across = fx * turn[D_COS, j] + fy * turn[D_SIN, j]
         for a in range(n * sizes.axial):
             block[n, a] += across * psi[j, a]
 
@@ -310,21 +368,3 @@ def _add_stiffness(row, part, sizes, own, motion):
             block[a, b] += lead * stiffness[a, b]
     if sizes.axial:
         block[n, n] += lead * row.axial_stiffness
-
-
-@inner
-def _add_elastic_forces(row, part, sizes, own, z, motion):
-    """Add elastic forces and, where the row has damping, beta times the elastic force of the rates."""
-    stiffness, force, n = part.stiffness, own.force, sizes.bending
-    for a in range(n):
-        for b in range(n):
-            force[a] += stiffness[a, b] * z[row.z + b]
-    if sizes.axial:
-        force[n] += row.axial_stiffness * z[row.z + n]
-    for b in range(row.damped):
-        rate = row.beta * (motion.rate * z[row.z + b] + motion.offset[row.z + b])
-        if b < n:
-            for a in range(n):
-                force[a] += stiffness[a, b] * rate
-        else:
-            force[n] += row.axial_stiffness * rate

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from ..elements.beam import USUAL, BeamPart, Sizes, beam_shape, is_usual, place_beam
+from ..elements.beam import USUAL, USUAL_RHO, USUAL_TURN, BeamPart, Sizes, is_usual, place_beam
 from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
 from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..integrators import X
 from ..jit import inner, kernel
-from ..plane_algebra import rotated
+from ..plane_algebra import COS, SIN, cosine_and_sine, rotated
 from ..tables import (
     BEAM,
     BODY,
@@ -62,9 +62,9 @@ def place_linkage(t, state, work, index, x, y, theta, c, s):
     joint, linkage, z, turns = t.joints[index], t.linkages[index], state.z, state.turns[index]
     section, left, right = z[joint.z + Z_SECTION], z[joint.z + Z_LINK_L], z[joint.z + Z_LINK_R]
     turns[HEAD_TURN], turns[HEAD_TURN + 1] = c, s
-    turns[SECTION_TURN], turns[SECTION_TURN + 1] = math.cos(section), math.sin(section)
-    turns[LINK_L_TURN], turns[LINK_L_TURN + 1] = math.cos(left), math.sin(left)
-    turns[LINK_R_TURN], turns[LINK_R_TURN + 1] = math.cos(right), math.sin(right)
+    turns[SECTION_TURN], turns[SECTION_TURN + 1] = cosine_and_sine(section)
+    turns[LINK_L_TURN], turns[LINK_L_TURN + 1] = cosine_and_sine(left)
+    turns[LINK_R_TURN], turns[LINK_R_TURN + 1] = cosine_and_sine(right)
     for k in range(joint.first_link, joint.first_link + joint.links):
         link = t.links[k]
         bx, by, cl, sl = link_frame(link.side, linkage, turns)
@@ -136,15 +136,13 @@ def place(t, state, work):
         if kind == BEAM:
             beam, part = t.beams[row], beam_part(t, work, row)
             if is_usual(beam):
-                end = beam_shape(beam, part, USUAL, z, work.angles)
-                place_beam(beam, part, USUAL, work.angles, x, y, theta, c, s, position)
+                end = place_beam(beam, part, USUAL, z, x, y, theta, c, s, position, USUAL_TURN(z), USUAL_RHO(z))
             else:
                 sizes = Sizes(beam.bending, beam.axial, beam.points)
-                end = beam_shape(beam, part, sizes, z, work.angles)
-                place_beam(beam, part, sizes, work.angles, x, y, theta, c, s, position)
+                end = place_beam(beam, part, sizes, z, x, y, theta, c, s, position, part.turn, part.rho)
             bx, by = part.rho[beam.points, 0], part.rho[beam.points, 1]
             x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
-            c, s = rotated(c, s, part.turn[beam.points, 0], part.turn[beam.points, 1])
+            c, s = rotated(c, s, part.turn[COS, beam.points], part.turn[SIN, beam.points])
         elif kind == BODY:
             body = t.bodies[row]
             at = body.history
@@ -170,7 +168,7 @@ def place(t, state, work):
             joint = t.joints[row]
             dx, dy = offset_of(t, z, joint, PIVOT)
             x, y, theta = joint.x + dx, joint.y + dy, z[joint.z + Z_SECTION]
-            c, s = math.cos(theta), math.sin(theta)
+            c, s = cosine_and_sine(theta)
             set_turn(t, work, joint, PIVOT, theta)
             place_barrel(t, state, work, row, joint.x + t.linkages[row].cx, joint.y + t.linkages[row].cy, 0.0)
     last = t.operations.shape[0]

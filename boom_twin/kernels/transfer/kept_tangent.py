@@ -27,8 +27,8 @@ LEAST_ERROR = 1e-15  # rad, that is asked for
 ROUNDING = 0.5  # of the increment before, that one consists of rounding above
 SEEN = 1e-7  # rad, increments from which a share is measured
 
-# Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known.
-GAIN, SHARE_LEAD, CORRECTED = range(3)
+# Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known; travel after the newest pass.
+GAIN, SHARE_LEAD, CORRECTED, TRAVEL = range(4)
 
 
 @inner
@@ -44,15 +44,15 @@ def forget_tangent(work):
 
 
 @inner
-def may_keep(t, state, work, gain):
+def may_keep(work, gain):
     """Whether the kept tangent is good enough for a step of a scheme with `gain`."""
-    return work.kept[GAIN] == gain and work.kept[SHARE_LEAD] * travel(t, state, work) < MOST_SHARE
+    return work.kept[GAIN] == gain and work.kept[SHARE_LEAD] * work.kept[TRAVEL] < MOST_SHARE
 
 
 @inner
 def keep_tangent(state, work, gain):
     """Note that tangents are made here, for `gain`."""
-    work.kept[GAIN] = gain
+    work.kept[GAIN], work.kept[TRAVEL] = gain, 0.0
     for i in range(state.z.shape[0]):
         work.kept_z[i] = state.z[i]
 
@@ -73,7 +73,7 @@ def is_converged(t, state, work, size, before, renewed, tolerance):
     before : increment of the pass before it in this step, or 0. renewed : whether the tangent was new, so that what is left is
     about the square of `size`. Below the tolerance an increment that does not get smaller is rounding.
     """
-    way = travel(t, state, work)
+    way = work.kept[TRAVEL] = travel(t, state, work)
     if before > SEEN and way > 0.0:
         work.kept[SHARE_LEAD] = max(work.kept[SHARE_LEAD], size / before / way)
     if size < tolerance and (renewed or size > ROUNDING * before > 0.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elements.beam import USUAL, BeamEquations, Sizes, is_usual, transfer_beam
+from ..elements.beam import USUAL, USUAL_LOCAL, BeamEquations, Sizes, is_usual, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
 from ..elements.rigid_body import (
     add_body_force,
@@ -57,15 +57,11 @@ def transfer_body(t, work, motion, row, c, sn):
 def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
     """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
     beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
-    own = BeamEquations(
-        coupling=condensed.gains[operation],
-        block=condensed.factors[operation],
-        force=condensed.free[operation],
-        local=work.local,
-    )
+    gains, factors, free = condensed.gains[operation], condensed.factors[operation], condensed.free[operation]
     if is_usual(beam):
+        own = BeamEquations(gains, factors, free, USUAL_LOCAL(p))
         return transfer_beam(beam, part, USUAL, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
-    sizes = Sizes(beam.bending, beam.axial, beam.points)
+    own, sizes = BeamEquations(gains, factors, free, work.local), Sizes(beam.bending, beam.axial, beam.points)
     return transfer_beam(beam, part, sizes, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
 
 

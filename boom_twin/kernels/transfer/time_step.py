@@ -78,7 +78,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         status, left, before = NOT_CONVERGED, passes, 0.0
         place(t, state, work)
         while status == NOT_CONVERGED and left > 0:
-            renew = not keep or not may_keep(t, state, work, now.gain)
+            renew = not keep or not may_keep(work, now.gain)
             if renew and keep:
                 keep_tangent(state, work, now.gain)
             motion = Motion(now.gain, now.rate, work.hat, work.offset, renew)
