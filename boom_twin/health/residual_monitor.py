@@ -25,7 +25,8 @@ from .inference.fault_catalogue import parameters
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, LEVELS, Suspicion, carried_on
+from .suspicion import CRUDE, DETUNING, LEVELS, MISFIT, WHOLE_MISFIT, Suspicion, carried_on
+from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
@@ -94,6 +95,7 @@ class ResidualMonitor:
         self._detector = Detector(len(names), BLOCK * NANO, settings.false_alarms / 86400.0)
         self._on_block = on_block
         self._regression = Regression(self._mean, self.covariance)
+        self._tip_load = TipLoadMonitor(settings.tip_load_limit)
         self.begin()
 
     def begin(self) -> None:
@@ -103,6 +105,8 @@ class ResidualMonitor:
         self._alarm: Alarm | None = None
         self._carried: dict[str, float] = {}
         self._blocks = 0
+        self._tip_load.begin()
+        self._unexplained: int | None = None  # stamp (ns) from which on no load explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._watch_anew()
 
@@ -115,8 +119,9 @@ class ResidualMonitor:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Those that last: of faults that are known, and the one that is being looked into."""
-        return (*(each.alarm for each in self._known.values()), *([] if self._alarm is None else [self._alarm]))
+        """Those that last: of faults that are known, and what is being looked into."""
+        open_ones = [each for each in (self._alarm, self._tip_load.alarm) if each is not None]
+        return (*(each.alarm for each in self._known.values()), *open_ones)
 
     @property
     def levels(self) -> Array:
@@ -153,7 +158,7 @@ class ResidualMonitor:
         if self._alarm is not None:
             return
         self._detector.take(self.surprise)
-        if known.has_strayed:  # too slowly for the detector; now it will be told at once
+        if known.has_strayed and self._tip_load.alarm is None:  # too slowly for the detector; now it will be told at once
             known.restart()
             self._suspicion = None
         if self._suspicion is None and self._detector.suspicion > SUSPICIOUS:
@@ -180,11 +185,15 @@ class ResidualMonitor:
         suspicion = self._suspicion
         assert suspicion is not None
         if self._alarm is None and self._detector.suspicion < CLEAN:
-            self._suspicion = None
-            return []
+            self._suspicion, self._unexplained = None, None
+            return self._tip_load.end(start)
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
-        news = self._judge(start, suspicion, verdict)
+        if verdict.none_excess <= WHOLE_MISFIT:
+            self._unexplained = None
+        elif self._unexplained is None:
+            self._unexplained = suspicion.start
+        news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
         if self._suspicion is suspicion and suspicion.is_outdated(verdict):
             self._carried = carried_on(verdict) if self._alarm is not None else {}
             self._suspect(start + BLOCK)
@@ -194,11 +203,15 @@ class ResidualMonitor:
         """Open, change or end an alarm."""
         load = self._load_lately(start)
         waiting = LEAST_SPAN if load == 0.0 or verdict.strength > OBVIOUS else SWINGS
+        is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
+        unexplained = self._unexplained_for(start)
+        is_lasting = unexplained >= (LEAST_SPAN if is_sure and verdict.none_excess > MISFIT else SWINGS)
+        if self._alarm is None and self._tip_load.alarm is None and is_lasting and self.levels.max() >= 1.0:
+            return self._open(start, suspicion, verdict, unexplained)
         if suspicion.span < waiting or self._weight(verdict.best) < LOAD_MEANS * load:
             return []
         if self._alarm is None:
-            is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
-            return self._open(start, suspicion, verdict) if is_sure else []
+            return self._open(start, suspicion, verdict, suspicion.span) if is_sure else []
         if verdict.strength < GONE:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
@@ -209,6 +222,17 @@ class ResidualMonitor:
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
 
+    def _judge_load(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+        """Compare the load with its limit, where it explains what is measured and no fault does."""
+        if self._alarm is not None or verdict.strength >= SURE:
+            return self._tip_load.end(start)
+        size, sigma = (0.0, 0.0) if verdict.none_excess > MISFIT else suspicion.load(verdict.level)
+        return self._tip_load.take(start, size, sigma)
+
+    def _unexplained_for(self, start: int) -> float:
+        """Time (s) for which no load at the tip has explained the deviation; suspicions that begin anew do not end it."""
+        return 0.0 if self._unexplained is None else (start - self._unexplained) * NANO
+
     def _load_lately(self, start: int) -> float:
         """Highest level (N) of the load at the tip lately; 0 of a calm boom."""
         return float(self._levels[start - self._shaken < EXCITED_FOR * SECOND].max(initial=0.0))
@@ -218,14 +242,15 @@ class ResidualMonitor:
         reach = {"tip.payload": 1.0, "line_fill": 0.5 * self._scene.reach}.get(self._bank.known[each.place].cause, math.inf)
         return abs(each.value) * math.hypot(*self._scene.gravity) * reach
 
-    def _open(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+    def _open(self, start: int, suspicion: Suspicion, verdict: Verdict, span: float) -> list[Alarm]:
+        """Begin an alarm of a deviation that has lasted for `span` (s), unless it is the end of a known fault."""
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
         channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
         is_calm = self._load_lately(start) == 0.0
-        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), suspicion.span, start, is_calm, self.signature)
+        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), span, start, is_calm, self.signature)
         return [self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
@@ -244,8 +269,8 @@ class ResidualMonitor:
 
     def _end_open(self, start: int) -> list[Alarm]:
         """End the alarm that is being looked into, if there is one."""
-        ended = [] if self._alarm is None else [replace(self._alarm, until=start)]
-        self._alarm, self._suspicion, self._carried = None, None, {}
+        ended = self._tip_load.end(start) + ([] if self._alarm is None else [replace(self._alarm, until=start)])
+        self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._detector.reset()
         return ended
 
@@ -263,7 +288,7 @@ class ResidualMonitor:
             self._known[cause or ""] = replace(before, value=before.value + best.value)
         else:
             return
-        self._alarm, self._suspicion, self._carried = None, None, {}
+        self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._start_about_known()
 
     def _start_about_known(self) -> None:
@@ -276,8 +301,8 @@ class ResidualMonitor:
 
     def forget(self) -> None:
         """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
-        if self._alarm is None:
-            self._suspicion = None
+        if self._alarm is None and self._tip_load.alarm is None:
+            self._suspicion, self._unexplained = None, None
             self._detector.reset()
 
     def close(self, stamp: int) -> list[Alarm]:

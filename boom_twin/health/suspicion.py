@@ -87,6 +87,13 @@ class Suspicion:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
         return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
 
+    def load(self, level: int) -> tuple[float, float]:
+        """Magnitude of the force at the tip, and its deviation, N, if there is no fault but a load of this level."""
+        force, covariance = self._filters[level].load(self.mean, self.covariance)
+        size = float(np.hypot(*force))
+        along = force / max(size, 1e-9)
+        return size, math.sqrt(float(along @ covariance @ along))
+
     def is_outdated(self, verdict: Verdict) -> bool:
         """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
         if self.blocks <= RECENT:

@@ -1,0 +1,62 @@
+"""A load at the tip that the model does not know stays plausible: above its limit it is an alarm, and what it does not explain is one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from health.recorded import Outcome, run
+
+from boom_twin import load_scene
+from boom_twin.bag.session_files import samples_of
+from boom_twin.health.tip_load import AFTER, OVER, TipLoadMonitor
+from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.types import SECOND
+
+RATE, SECONDS = 100.0, 10.0
+
+
+def without_deflection(imu: bool) -> Outcome:
+    """A boom at rest whose angles lack its deflection, 3 to 21 mrad of it; its IMU reads gravity in the frame of the base."""
+    random, scene, count = np.random.default_rng(1), load_scene(), int(RATE * SECONDS)
+    strokes = strokes_of_posture(scene, "arch")
+    angles = joint_angles_of_strokes(scene, strokes) + random.normal(0.0, 1.7e-4, (count, 4))
+    force = np.array([0.0, 9.81]) + random.normal(0.0, 0.05, (count, 2))
+    stamps = 10**18 + (np.arange(count) * SECOND / RATE).astype(np.int64)
+    rows = strokes + random.normal(0.0, 2e-5, (count, 4))
+    return run(samples_of(stamps, rows, angles, force if imu else None, stamps, None))
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_a_deviation_that_no_plausible_load_explains_is_told_within_5_s_and_lasts(imu):
+    outcome = without_deflection(imu)
+    told = outcome.told()
+    assert told and told[0][0] < 5.0
+    assert outcome.causes() <= {"tip.load"}, "no part of the boom is to blame"
+    assert all(any(alarm.until is None for alarm in health.alarms) for health in outcome.health if health.alarms)
+    assert outcome.health[-1].alarms
+
+
+def test_a_load_above_its_limit_is_an_alarm_with_size_deviation_and_remedy():
+    _, alarm = without_deflection(imu=False).states()[-1]
+    kind, size, sigma, unit = alarm.ranked[0].parts[0]
+    assert (alarm.cause, alarm.kind, kind, unit) == ("tip.load", "exceeded", "exceeded", "N")
+    assert size > 1000.0 and 0.0 < sigma < 0.2 * size
+    assert f"{size:.0f} +- {sigma:.0f} N at the tip, above the limit of 500 N (tip_load_limit); stop the pump" in alarm.told
+
+
+def test_a_load_is_told_from_its_second_passing_of_the_limit_on_until_it_stays_away():
+    monitor, news = TipLoadMonitor(500.0), {}
+    for tenth in range(300):
+        time = 0.1 * tenth
+        size = 900.0 if 5.0 <= time < 15.0 and time % 2.5 < 0.25 else 100.0  # pulses
+        for alarm in monitor.take(tenth * SECOND // 10, size, 50.0):
+            news[tenth] = alarm
+    first, last = min(news), max(news)
+    assert 50 + 10 * AFTER <= first <= 50 + 10 * (AFTER + 2.5) and news[first].since == 5 * SECOND
+    assert news[last].until == last * SECOND // 10 and last == pytest.approx(127 + 10 * OVER, abs=2) and monitor.alarm is None
+
+
+@pytest.mark.parametrize("size, sigma", [(499.0, 1.0), (600.0, 40.0)])
+def test_a_load_that_is_not_surely_above_its_limit_is_none(size, sigma):
+    monitor = TipLoadMonitor(500.0)
+    assert [monitor.take(second * SECOND, size, sigma) for second in range(60)] == [[]] * 60
