@@ -213,7 +213,7 @@ def test_a_fault_below_its_least_value_explains_nothing():
         Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0, least=0.0),
         Parameter("tip_imu.sensor", "bias x", Form.IMU, 0, "m/s^2", 0.01, 0.5),
     )
-    white = np.array([[-10.0, 1.0, 0.0, 0.0, 0.0], [-2.0, 0.0, 20.0, 0.0, 0.0]])
+    white = np.array([[-10.0, 1.0, 0.0, 0.0, 0.0], [-9.0, 0.0, 20.0, 0.0, 0.0]])
     verdict = HypothesisTest(known).explain([Evidence.of(white, 0.0)], np.zeros(2), np.zeros((2, 2)), 1.0, {})
     assert verdict.causes[0].name == "tip_imu.sensor"
     assert next(cause.probability for cause in verdict.causes if cause.name == "line_fill") < 1e-6

@@ -1,4 +1,4 @@
-"""A load at the tip that the model does not know stays plausible: above its limit it is an alarm, and what it does not explain is one."""
+"""An unknown load at the tip stays plausible: above its limit it is an alarm, and so is what no load explains."""
 
 from __future__ import annotations
 
