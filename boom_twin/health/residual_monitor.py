@@ -30,7 +30,8 @@ from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
-LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm; and while a load shakes the boom: a pump's stroke
+LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm if it is obvious; and else: a pump's stroke, a gust
+UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is an alarm
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 PERIOD = 3  # blocks between two looks at a suspicion
@@ -106,7 +107,7 @@ class ResidualMonitor:
         self._carried: dict[str, float] = {}
         self._blocks = 0
         self._tip_load.begin()
-        self._unexplained: int | None = None  # stamp (ns) from which on no load explains the deviation
+        self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._watch_anew()
 
@@ -189,24 +190,25 @@ class ResidualMonitor:
             return self._tip_load.end(start)
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
-        if verdict.none_excess <= WHOLE_MISFIT:
-            self._unexplained = None
-        elif self._unexplained is None:
-            self._unexplained = suspicion.start
         news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
-        if self._suspicion is suspicion and suspicion.is_outdated(verdict):
+        if self._suspicion is not suspicion:
+            return news
+        if suspicion.is_outdated(verdict):
+            is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
+            self._unexplained = (self._unexplained or suspicion.start) if is_odd else None
             self._carried = carried_on(verdict) if self._alarm is not None else {}
             self._suspect(start + BLOCK)
+        elif suspicion.is_settled:
+            self._unexplained = None
         return news
 
     def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         """Open, change or end an alarm."""
         load = self._load_lately(start)
-        waiting = LEAST_SPAN if load == 0.0 or verdict.strength > OBVIOUS else SWINGS
+        waiting = LEAST_SPAN if verdict.strength > OBVIOUS else SWINGS
         is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
-        unexplained = self._unexplained_for(start)
-        is_lasting = unexplained >= (LEAST_SPAN if is_sure and verdict.none_excess > MISFIT else SWINGS)
-        if self._alarm is None and self._tip_load.alarm is None and is_lasting and self.levels.max() >= 1.0:
+        unexplained, is_free = self._unexplained_for(start), self._alarm is None and self._tip_load.alarm is None
+        if is_free and unexplained >= UNEXPLAINED and self.levels.max() >= 1.0:
             return self._open(start, suspicion, verdict, unexplained)
         if suspicion.span < waiting or self._weight(verdict.best) < LOAD_MEANS * load:
             return []
@@ -226,11 +228,11 @@ class ResidualMonitor:
         """Compare the load with its limit, where it explains what is measured and no fault does."""
         if self._alarm is not None or verdict.strength >= SURE:
             return self._tip_load.end(start)
-        size, sigma = (0.0, 0.0) if verdict.none_excess > MISFIT else suspicion.load(verdict.level)
-        return self._tip_load.take(start, size, sigma)
+        is_load = self._tip_load.alarm is not None or verdict.none_excess <= MISFIT
+        return self._tip_load.take(start, *(suspicion.load(verdict.level) if is_load else (0.0, 0.0)))
 
     def _unexplained_for(self, start: int) -> float:
-        """Time (s) for which no load at the tip has explained the deviation; suspicions that begin anew do not end it."""
+        """Time (s) for which neither a load nor a fault has explained the deviation: suspicions began anew all the time."""
         return 0.0 if self._unexplained is None else (start - self._unexplained) * NANO
 
     def _load_lately(self, start: int) -> float:

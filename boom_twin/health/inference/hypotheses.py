@@ -35,7 +35,7 @@ from .fault_catalogue import Parameter, variances
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
-CRUDE = 0.003  # see above
+CRUDE = 0.001  # see above
 
 
 @dataclass(frozen=True)
