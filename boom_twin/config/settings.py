@@ -138,6 +138,7 @@ class Settings(BaseModel):
     leap: Limit = Field(default=3600.0, description="a longer step of the first stamps of angles is confirmed, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     false_alarms: Positive = Field(default=0.03, description="false alarms of all residuals together that are allowed, a day")
+    tip_load_limit: Positive = Field(default=500.0, description="force at the tip beside the known load that is an alarm, N")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @classmethod

@@ -178,8 +178,8 @@ class ResidualJudge:
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
-    def status(self, alarm: tuple[Level, str] | None, at: Evaluation) -> Status:
-        """State of the channel, with its alarm if there is one."""
+    def status(self, alarm: tuple[Level, str] | None, at: Evaluation, explained: str = "") -> Status:
+        """State of the channel, with its alarm if there is one; `explained` by an alarm, in words, its size is not judged."""
         thresholds = at.thresholds
         while self._window and self._window[0].time <= at.now - thresholds.residual_window:
             self._window.popleft()
@@ -190,14 +190,15 @@ class ResidualJudge:
         told = f"{rms:.2f} times as large as noise explains, for {window:.2g} s"
         if alarm is not None:
             judge.fault(*alarm)
-        judge.check("rms_normalised", rms, Bounds(thresholds.residual_warn, thresholds.residual_error), told)
+        bounds = Bounds() if explained else Bounds(thresholds.residual_warn, thresholds.residual_error)
+        judge.check("rms_normalised", rms, bounds, told)
         judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
         judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))
         judge.note("count", count)
         judge.note("window_s", window)
         if not count:
             judge.fault(Level.STALE, f"none for {window:.2g} s")
-        return judge.finish("as large as noise explains")
+        return judge.finish(explained or "as large as noise explains")
 
 
 class HealthWatch:
@@ -229,6 +230,12 @@ class HealthWatch:
     def of(self, channel: str) -> Alarm | None:
         """The alarm that lasts in a channel."""
         return next((alarm for alarm in self._alarms.lasting if alarm.channel == channel), None)
+
+    @property
+    def explained(self) -> str:
+        """Where to look for what residuals deviate by: the channels whose alarms were inferred from them; empty without one."""
+        channels = dict.fromkeys(alarm.channel for alarm in self._alarms.lasting if alarm.ranked)
+        return f"judged by health: alarm of {', '.join(channels)}" if channels else ""
 
     def status(self, at: Evaluation) -> Status:
         """State of the rig."""

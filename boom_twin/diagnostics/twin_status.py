@@ -181,7 +181,8 @@ class TwinWatch:
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
         self._looked = at.now
-        return [judge.status(self._alarm_of(name), at) for name, judge in self._judges.items()]
+        explained = "" if self.health is None else self.health.explained
+        return [judge.status(self._alarm_of(name), at, explained) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
         """Level and words of the alarm that lasts in a channel."""

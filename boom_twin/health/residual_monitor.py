@@ -24,11 +24,13 @@ from .inference.fault_catalogue import parameters
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, Suspicion, carried_on, load_levels
+from .suspicion import CRUDE, DETUNING, MISFIT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
+from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
-LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm; and while a load shakes the boom: a pump's stroke
+LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm if it is obvious; and else: a pump's stroke, a gust
+UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is an alarm
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 PERIOD = 3  # blocks between two looks at a suspicion
@@ -93,6 +95,7 @@ class ResidualMonitor:
         self._detector = Detector(len(names), BLOCK * NANO, settings.false_alarms / 86400.0)
         self._on_block = on_block
         self._regression = Regression(self._mean, self.covariance)
+        self._tip_load = TipLoadMonitor(settings.tip_load_limit)
         self.begin()
 
     def begin(self) -> None:
@@ -102,6 +105,8 @@ class ResidualMonitor:
         self._alarm: Alarm | None = None
         self._carried: dict[str, float] = {}
         self._blocks = 0
+        self._tip_load.begin()
+        self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._watch_anew()
 
@@ -114,8 +119,9 @@ class ResidualMonitor:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Those that last: of faults that are known, and the one that is being looked into."""
-        return (*(each.alarm for each in self._known.values()), *([] if self._alarm is None else [self._alarm]))
+        """Those that last: of faults that are known, and what is being looked into."""
+        open_ones = [each for each in (self._alarm, self._tip_load.alarm) if each is not None]
+        return (*(each.alarm for each in self._known.values()), *open_ones)
 
     @property
     def levels(self) -> Array:
@@ -152,7 +158,7 @@ class ResidualMonitor:
         if self._alarm is not None:
             return
         self._detector.take(self.surprise)
-        if known.has_strayed:  # too slowly for the detector; now it will be told at once
+        if known.has_strayed and self._tip_load.alarm is None:  # too slowly for the detector; now it will be told at once
             known.restart()
             self._suspicion = None
         if self._suspicion is None and self._detector.suspicion > SUSPICIOUS:
@@ -179,25 +185,34 @@ class ResidualMonitor:
         suspicion = self._suspicion
         assert suspicion is not None
         if self._alarm is None and self._detector.suspicion < CLEAN:
-            self._suspicion = None
-            return []
+            self._suspicion, self._unexplained = None, None
+            return self._tip_load.end(start)
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
-        news = self._judge(start, suspicion, verdict)
-        if self._suspicion is suspicion and suspicion.is_outdated(verdict):
+        news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
+        if self._suspicion is not suspicion:
+            return news
+        if suspicion.is_outdated(verdict):
+            is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
+            self._unexplained = (self._unexplained or suspicion.start) if is_odd else None
             self._carried = carried_on(verdict) if self._alarm is not None else {}
             self._suspect(start + BLOCK)
+        elif suspicion.is_settled:
+            self._unexplained = None
         return news
 
     def _judge(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
         """Open, change or end an alarm."""
         load = self._load_lately(start)
-        waiting = LEAST_SPAN if load == 0.0 or verdict.strength > OBVIOUS else SWINGS
+        waiting = LEAST_SPAN if verdict.strength > OBVIOUS else SWINGS
+        is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
+        unexplained, is_free = self._unexplained_for(start), self._alarm is None and self._tip_load.alarm is None
+        if is_free and unexplained >= UNEXPLAINED and self.levels.max() >= 1.0:
+            return self._open(start, suspicion, verdict, unexplained)
         if suspicion.span < waiting or self._weight(verdict.best) < LOAD_MEANS * load:
             return []
         if self._alarm is None:
-            is_sure = verdict.strength >= SURE and self.levels.max() >= 1.0
-            return self._open(start, suspicion, verdict) if is_sure else []
+            return self._open(start, suspicion, verdict, suspicion.span) if is_sure else []
         if verdict.strength < GONE:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
@@ -208,6 +223,17 @@ class ResidualMonitor:
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
 
+    def _judge_load(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+        """Compare the load with its limit, where it explains what is measured and no fault does."""
+        if self._alarm is not None or verdict.strength >= SURE:
+            return self._tip_load.end(start)
+        is_load = self._tip_load.alarm is not None or verdict.none_excess <= MISFIT
+        return self._tip_load.take(start, *(suspicion.load(verdict.level) if is_load else (0.0, 0.0)))
+
+    def _unexplained_for(self, start: int) -> float:
+        """Time (s) for which neither a load nor a fault has explained the deviation: suspicions began anew all the time."""
+        return 0.0 if self._unexplained is None else (start - self._unexplained) * NANO
+
     def _load_lately(self, start: int) -> float:
         """Highest level (N) of the load at the tip lately; 0 of a calm boom."""
         return float(self._levels[start - self._shaken < EXCITED_FOR * SECOND].max(initial=0.0))
@@ -217,14 +243,15 @@ class ResidualMonitor:
         reach = {"tip.payload": 1.0, "line_fill": 0.5 * self._scene.reach}.get(self._bank.known[each.place].cause, math.inf)
         return abs(each.value) * math.hypot(*self._scene.gravity) * reach
 
-    def _open(self, start: int, suspicion: Suspicion, verdict: Verdict) -> list[Alarm]:
+    def _open(self, start: int, suspicion: Suspicion, verdict: Verdict, span: float) -> list[Alarm]:
+        """Begin an alarm of a deviation that has lasted for `span` (s), unless it is the end of a known fault."""
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
         channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
         is_calm = self._load_lately(start) == 0.0
-        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), suspicion.span, start, is_calm, self.signature)
+        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), span, start, is_calm, self.signature)
         return [self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
@@ -243,8 +270,8 @@ class ResidualMonitor:
 
     def _end_open(self, start: int) -> list[Alarm]:
         """End the alarm that is being looked into, if there is one."""
-        ended = [] if self._alarm is None else [replace(self._alarm, until=start)]
-        self._alarm, self._suspicion, self._carried = None, None, {}
+        ended = self._tip_load.end(start) + ([] if self._alarm is None else [replace(self._alarm, until=start)])
+        self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._detector.reset()
         return ended
 
@@ -262,7 +289,7 @@ class ResidualMonitor:
             self._known[cause or ""] = replace(before, value=before.value + best.value)
         else:
             return
-        self._alarm, self._suspicion, self._carried = None, None, {}
+        self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._start_about_known()
 
     def _start_about_known(self) -> None:
@@ -275,8 +302,8 @@ class ResidualMonitor:
 
     def forget(self) -> None:
         """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
-        if self._alarm is None:
-            self._suspicion = None
+        if self._alarm is None and self._tip_load.alarm is None:
+            self._suspicion, self._unexplained = None, None
             self._detector.reset()
 
     def close(self, stamp: int) -> list[Alarm]:

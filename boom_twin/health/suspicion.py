@@ -18,8 +18,8 @@ from .inference.innovation_filter import InnovationFilter
 LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
 DETUNING = 0.15  # share by which a fault may change natural frequencies
-SHAKEN = 0.3  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
-CRUDE = 0.03  # share of a deviation by which its signature, a derivative, may be wrong
+SHAKEN = 0.6  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
+CRUDE = 0.01  # share of a deviation by which its signature, a derivative, may be wrong
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
@@ -69,6 +69,11 @@ class Suspicion:
         """Time (s) that the evidence has taken."""
         return self.blocks * BLOCK * NANO
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether it is old enough to be outdated, see `is_outdated`."""
+        return self.blocks > RECENT
+
     def take(self, problem: BlockProblem) -> None:
         """Take one block."""
         left = problem.table[:, 0]
@@ -94,9 +99,16 @@ class Suspicion:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
         return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
 
+    def load(self, level: int) -> tuple[float, float]:
+        """Magnitude of the force at the tip, and its deviation, N, if there is no fault but a load of this level."""
+        force, covariance = self._filters[level].load(self.mean, self.covariance)
+        size = float(np.hypot(*force))
+        along = force / max(size, 1e-9)
+        return size, math.sqrt(float(along @ covariance @ along))
+
     def is_outdated(self, verdict: Verdict) -> bool:
         """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
-        if self.blocks <= RECENT:
+        if not self.is_settled:
             return False
         if self.blocks > LONGEST or verdict.excess > WHOLE_MISFIT:
             return True

@@ -8,8 +8,8 @@ import numpy as np
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import Evaluation, Level, Status
-from boom_twin.diagnostics.model_status import HealthWatch
-from boom_twin.types import Alarm, Health
+from boom_twin.diagnostics.model_status import HealthWatch, ResidualJudge
+from boom_twin.types import Alarm, Health, Ranked
 
 SECOND = 1_000_000_000
 BIAS = Alarm("joint_3", "bias", 15 * SECOND, None, "joint_3.sensor", "joint_3.sensor bias: +0.0035 rad")
@@ -62,3 +62,21 @@ def test_an_alarm_that_is_told_of_no_more_has_ended() -> None:
     watch.took(health(17, BIAS))
     watch.took(health(18))
     assert status(watch).values["1 to_s"] == "18.000" and watch.of("joint_3") is None
+
+
+def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
+    """Not to that of a sensor which gives itself away: it explains no other channel."""
+    watch = HealthWatch()
+    watch.took(health(17, BIAS))
+    assert watch.explained == ""
+    inferred = replace(OPEN, ranked=(Ranked("cylinder_1.k", 0.6, ()), Ranked("joint_1.sensor", 0.4, ())))
+    watch.took(health(18, BIAS, inferred))
+    assert watch.explained == "judged by health: alarm of joint_1"
+    judge = ResidualJudge("joint_2", 0.0)
+    told = []
+    for second in range(1, 30):
+        judge.take(np.full(100, 6.0), float(second))
+        told.append(judge.status(None, Evaluation(Thresholds(), float(second), 0.0), watch.explained if second < 15 else ""))
+    assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, "judged by health: alarm of joint_1")}
+    assert told[0].values["rms_normalised"] == 6.0
+    assert told[-1].level == Level.ERROR and "6.00 times as large as noise explains" in told[-1].message

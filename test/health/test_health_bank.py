@@ -11,7 +11,7 @@ from boom_twin.health.inference.fault_catalogue import Form, Parameter
 from boom_twin.health.inference.hypotheses import CRUDE, GROWING_PRIOR, GROWN, Evidence, Explanation, HypothesisTest
 
 KNOWN = (
-    Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, one_sided=True),
+    Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, least=0.0),
     Parameter("joint_1.sensor", "bias", Form.ANGLE, 0, "rad", 0.1, 2.0),
     Parameter("joint_1.sensor", "scale", Form.ANGLE, 0, "", 0.0, 1.0, prior=0.3),
     Parameter("joint_2.sensor", "bias", Form.ANGLE, 1, "rad", 0.1, 3.0),
@@ -205,3 +205,15 @@ def test_coefficients_are_those_of_the_beginning():
     growing = Explanation(3, 0, 1.0, 5.0, 0.1, 0.2, 0.01)
     found = BANK.coefficients(growing, 10.0)
     assert found[3] == pytest.approx(3.0) and found[3 + SIZE] == 0.2 and np.count_nonzero(found) == 2
+
+
+def test_a_fault_below_its_least_value_explains_nothing():
+    """Less concrete than an empty line holds is no cause, however well it would fit."""
+    known = (
+        Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0, least=0.0),
+        Parameter("tip_imu.sensor", "bias x", Form.IMU, 0, "m/s^2", 0.01, 0.5),
+    )
+    white = np.array([[-10.0, 1.0, 0.0, 0.0, 0.0], [-9.0, 0.0, 20.0, 0.0, 0.0]])
+    verdict = HypothesisTest(known).explain([Evidence.of(white, 0.0)], np.zeros(2), np.zeros((2, 2)), 1.0, {})
+    assert verdict.causes[0].name == "tip_imu.sensor"
+    assert max(part.log_factor for cause in verdict.causes if cause.name == "line_fill" for part in cause.parts) < 1.0

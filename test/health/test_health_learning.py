@@ -15,7 +15,7 @@ from boom_twin.health.learning import LEAST, learn
 
 BLOCK, JOINTS, TRAVEL = 0.1, 2, 0.01
 KNOWN = (
-    Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, one_sided=True),
+    Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, least=0.0),
     Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0),
     Parameter("joint_1.sensor", "bias", Form.ANGLE, 0, "rad", 1e-4, 5e-3),
     Parameter("cylinder_1.rod.clearance", "grown", Form.PLAY, 0, "m", 0.0, 4e-4),

@@ -18,19 +18,21 @@ from boom_twin.health.baseline import Baseline
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import with_faults, wrong_by
+from boom_twin.validation.rig.loads import PumpLoad, RigLoad, tip_load
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)  # see test/bench/health/sessions.py
 pytestmark = pytest.mark.slow
 
 
-def session(seed: int, seconds: float, fault: str | None = None, posture: str = "arch"):
+def session(seed: int, seconds: float, fault: str | None = None, posture: str = "arch", loads: tuple[RigLoad, ...] = ()):
     """Random moves of a rig that the scene describes 2 % wrong."""
     boom = wrong_by(load_scene(), 0.02, 1)
     boom = boom if fault is None else with_faults(boom, [parse(fault)])
     programme = random_programme(load_scene(), posture, seconds, seed)
     resting = at_rest(boom, np.array(programme.first), ELEMENTS, nodally_exact=True)
-    rows, _ = move(resting, programme, seconds, STEP, STEP, SCHEME)
-    seen = observe(boom, programme, rows, Sensors(), seed)
+    load = tip_load(boom, loads, seconds, seed) if loads else None
+    rows, _ = move(resting, programme, seconds, STEP, STEP, SCHEME, load)
+    seen = observe(boom, programme, rows, Sensors(), seed, load)
     return samples_of(seen.stamps, seen.strokes, seen.joints, seen.imu, seen.angle_stamps)
 
 
@@ -98,6 +100,14 @@ def test_more_payload(baseline, seed):
     assert outcome.told() and outcome.causes() <= {"tip.payload"}
     assert outcome.states()[-1][1].cause == "tip.payload"
     assert estimate(outcome, "tip.payload") == pytest.approx(20.0, abs=3.0)
+
+
+def test_pulses_above_the_limit_are_told_as_the_load_that_they_are(baseline):
+    """900 N against a limit of 500 N: named with their size, and nothing of the boom is."""
+    outcome = run(session(5, 20.0, loads=(PumpLoad(0.43, 900.0, onset=5.0),)), baseline=baseline)
+    told = outcome.told()
+    assert told and 5.0 < told[0][0] < 10.0 and outcome.causes() == {"tip.load"}
+    assert estimate(outcome, "tip.load") == pytest.approx(900.0, rel=0.2)
 
 
 def test_too_little_to_learn_from():

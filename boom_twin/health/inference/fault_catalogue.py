@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -48,8 +49,8 @@ class Parameter:
         Standard deviation that it may have while all is well and nothing has been learnt.
     faulty : float
         Standard deviation of a fault.
-    one_sided : bool
-        Faults are positive.
+    least : float
+        What it cannot be below: a spring is only expected to soften, an empty line cannot lose concrete.
     prior : float
         Weight of such a fault beside others before anything is seen.
     """
@@ -61,7 +62,7 @@ class Parameter:
     unit: str
     healthy: float
     faulty: float
-    one_sided: bool = False
+    least: float = -inf
     prior: float = 1.0
 
     @property
@@ -79,23 +80,23 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     names, joints = set(parameter_names(scene)), len(scene.joints)
     each = range(joints)
     found = [
-        Parameter(f"cylinder_{i + 1}.k", "softer", Form.SCENE, i, "", *COMPLIANCE, one_sided=True)
+        Parameter(f"cylinder_{i + 1}.k", "softer", Form.SCENE, i, "", *COMPLIANCE, least=0.0)
         for i in each
         if f"cylinder_{i + 1}.k" in names
     ]
     found += [
-        Parameter(f"section_{i + 1}.EI", "softer", Form.SCENE, i, "", *BENDING, one_sided=True)
+        Parameter(f"section_{i + 1}.EI", "softer", Form.SCENE, i, "", *BENDING, least=0.0)
         for i in each
         if f"section_{i + 1}.EI" in names
     ]
     found += [
-        Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0),
-        Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0),
+        Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0, least=-parameter(scene, "tip.payload")),
+        Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0, least=-parameter(scene, "line_fill")),
     ]
     found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
-    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, True, 0.1) for i in each]
+    found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, 0.0, 0.1) for i in each]
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
     found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
     found += [

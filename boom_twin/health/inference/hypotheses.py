@@ -35,7 +35,7 @@ from .fault_catalogue import Parameter, variances
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
-CRUDE = 0.003  # see above
+CRUDE = 0.001  # see above
 
 
 @dataclass(frozen=True)
@@ -153,12 +153,15 @@ class Verdict:
     causes : tuple of Cause
     excess : float
         Squares that the best explanation leaves over those that noise leaves, at least 1.
+    none_excess : float
+        Likewise where there is no fault, with the load at the tip that goes best with that.
     level : int
         Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
     """
 
     causes: tuple[Cause, ...]
     excess: float
+    none_excess: float
     level: int
 
     @property
@@ -184,7 +187,7 @@ class HypothesisTest:
         self.known = known
         self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
         self._faulty = variances(known, "faulty")[self._places]
-        self._one_sided = np.array([known[i].one_sided for i in self._places])
+        self._least = np.array([known[i].least for i in self._places])
         self._priors = np.log([known[i].prior for i in self._places])
 
     def explain(
@@ -226,8 +229,9 @@ class HypothesisTest:
             Explanation(int(place), level, float(factors[level, i]), *fits[level, 2:, i].tolist())
             for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
         ]
-        is_faulty = float(factors[best]) > 0.0
-        return Verdict(self._grouped(found, shares), excess, int(best[0]) if is_faulty else int(np.argmax(logs)))
+        is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
+        none_excess = max(1.0, healthy[none].squares / max(healthy[none].rows, 1.0))
+        return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
 
     def _steady(self, healthy: Evidence) -> Array:
         """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (6, places)."""
@@ -255,10 +259,10 @@ class HypothesisTest:
         return np.stack([factors, explained, values, sigmas, found[:, 1], np.sqrt(spread[:, 1, 1])])
 
     def _sided(self, values: Array, sigmas: Array) -> Array:
-        """What it adds to the log factor that some faults are positive."""
+        """What it adds to the log factor that faults have a least value."""
         from scipy.special import log_ndtr  # a twin that is well need not wait for it
 
-        return np.where(self._one_sided, log_ndtr(values / sigmas) + log(2.0), 0.0)
+        return np.asarray(log_ndtr((values - self._least) / sigmas) - log_ndtr(-self._least / np.sqrt(self._faulty)))
 
     def _grouped(self, found: list[Explanation], shares: Array) -> tuple[Cause, ...]:
         groups: dict[str, list[int]] = {}

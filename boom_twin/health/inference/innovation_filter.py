@@ -49,6 +49,7 @@ LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, a
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
 MEAN = 1.0  # see above
 LOAD = 4  # states of the load: x and y about the mean, and the mean's
+BOTH = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])  # what of these is the whole load
 
 
 class ModalStates(NamedTuple):
@@ -227,6 +228,19 @@ class InnovationFilter:
         self._p = self._p - cross.T @ cross
         log = -0.5 * float(innovation[:, 0] @ innovation[:, 0]) - float(np.log(np.diag(root)).sum())
         return Innovations(innovation, log)
+
+    def load(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
+        """Force at the tip along x and y, shape (2,), and its covariance, shape (2, 2); N, after the newest block.
+
+        Parameters
+        ----------
+        mean, covariance : ndarray, shape (k,), (k, k)
+            Of the parameters of the first k signatures.
+        """
+        x = self._x[self._size :][:LOAD]
+        p = self._p[self._size :, self._size :][:LOAD, :LOAD]
+        by, k = BOTH @ x[:, 1:], len(mean)
+        return BOTH @ x[:, 0] - by[:, :k] @ mean, BOTH @ p @ BOTH.T + by[:, :k] @ covariance @ by[:, :k].T
 
     def _go_on(self, errors2: Array, shaking: float, travel: float) -> None:
         """To the next block, before it is measured."""
