@@ -101,7 +101,7 @@ def _run(sessions: Sequence[Session], known: tuple[Parameter, ...], joints: int,
         for problem in session:
             whitening.tune(problem.modes)
             found = whitening.step(problem.table, problem.noise(noise2), errors2, problem.shaking, problem.travel)
-            log += _log(regression, found.white, found.log)
+            log += _log(regression, found.white, float(found.log))
     return regression, log
 
 

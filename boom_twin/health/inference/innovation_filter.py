@@ -181,7 +181,8 @@ class InnovationFilter:
         x = np.zeros((*self._levels, size + others, self._x.shape[-1]))
         p = np.zeros((*self._levels, size + others, size + others))
         p[..., :size, :size] = modes.rest
-        x[..., at, :], p[(..., *np.ix_(at, at))] = self._x[..., places, :], self._p[(..., *np.ix_(places, places))]
+        (to, across), (of, beside) = np.ix_(at, at), np.ix_(places, places)
+        x[..., at, :], p[..., to, across] = self._x[..., places, :], self._p[..., of, beside]
         self._x, self._p, self._size = x, p, size
         self._least, self._driven = modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
@@ -223,7 +224,7 @@ class InnovationFilter:
             return Innovations(np.zeros((*self._levels, 0, table.shape[1])), np.zeros(self._levels))
         shown = self._shown[rows]
         cross = self._p @ shown.T
-        own = (noise + _diagonal(shaken * self._shaken + self._rough))[(..., *np.ix_(rows, rows))]
+        own = (noise + _diagonal(shaken * self._shaken + self._rough))[..., rows, :][..., rows]
         root = np.linalg.cholesky(shown @ cross + own)
         white = np.linalg.solve(root, np.concatenate([table[rows] - shown @ self._x, cross.mT], axis=-1))
         innovation, cross = white[..., : table.shape[1]], white[..., table.shape[1] :]
@@ -256,7 +257,7 @@ def _diagonal(values: Array) -> Array:
 
 
 def _swung(modes: ModalStates, level2: Array) -> Array:
-    """Covariance (..., 2 m, 2 m) of the modes' coordinates that loads of these levels (..., 1) have brought before the start."""
+    """Covariance (..., 2 m, 2 m) of the modes' coordinates that loads of levels (..., 1) brought about before the start."""
     turn, pushed = modes.turn, modes.pushed
     still = np.linalg.solve(np.eye(len(turn)) - turn, pushed) if len(turn) else pushed
     omegas = 2.0 * math.pi * np.repeat(modes.frequencies, 2)
