@@ -74,8 +74,12 @@ def constraints(plan: Plan) -> int:
 def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     """Negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
     place(plan.tables, state, work)
-    position, still = work.position.copy(), np.zeros_like(work.position)
-    drive = drive_at_rest(plan, state, work)
+    return _pivots_about(plan, state, work, omega, work.position.copy(), drive_at_rest(plan, state, work))
+
+
+def _pivots_about(plan: Plan, state: State, work: Work, omega: float, position: Array, drive: Array) -> int:
+    """As `negative_pivots` does, of a boom that was placed; `position` and `drive` (m) are those of its equilibrium."""
+    still = np.zeros_like(position)
     for _ in range(TRIES):
         status, negative, condensed = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
         if status == OK:
@@ -119,9 +123,12 @@ def natural_modes(
     `width` is the relative accuracy of the frequencies. The state stays as it is.
     """
     base = negative_pivots(plan, state, work, 0.0)
+    place(plan.tables, state, work)
+    position, drive = work.position.copy(), drive_at_rest(plan, state, work)
 
     def below(omega: float) -> int:
-        return negative_pivots(plan, state, work, omega) - base
+        place(plan.tables, state, work)
+        return _pivots_about(plan, state, work, omega, position, drive) - base
 
     modes: list[Mode] = []
     low = 0.0

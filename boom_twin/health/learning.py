@@ -128,7 +128,7 @@ def _run(
         for problem in session.problems:
             whitening.tune(problem.modes)
             found = whitening.step(problem.table, problem.noise(noise2), errors2, problem.shaking, problem.travel)
-            log += _log(regression, found.white, found.log)
+            log += _log(regression, found.white, float(found.log))
     return regression, log
 
 

@@ -58,7 +58,7 @@ class Suspicion:
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
         channels, coefficients = len(errors2), 2 * len(mean)
-        self._filters = [InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, float(each)) for each in levels]
+        self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks = np.zeros(channels), 0
         self._evidence = [Evidence.none(coefficients) for _ in levels]
         self._calm = self._evidence
@@ -81,11 +81,10 @@ class Suspicion:
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
         noise, crude = problem.noise(self._noise2), self._errors2 + (CRUDE * self.size) ** 2
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
-        found, weight = [], 1.0 / (1.0 + problem.shaking / SHAKEN**2)
-        for each in self._filters:
-            each.tune(problem.modes)
-            innovations = each.step(table, noise, crude, problem.shaking, problem.travel)
-            found.append(Evidence.of(innovations.white, innovations.log))
+        weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
+        self._filter.tune(problem.modes)
+        white, logs = self._filter.step(table, noise, crude, problem.shaking, problem.travel)
+        found = [Evidence.of(each, log) for each, log in zip(white, logs.tolist(), strict=True)]
         self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
         self._calm = [before + new.weighted(weight) for before, new in zip(self._calm, found, strict=True)]
         self._recent.append(found)
@@ -101,7 +100,8 @@ class Suspicion:
 
     def load(self, level: int) -> tuple[float, float]:
         """Magnitude of the force at the tip, and its deviation, N, if there is no fault but a load of this level."""
-        force, covariance = self._filters[level].load(self.mean, self.covariance)
+        forces, covariances = self._filter.load(self.mean, self.covariance)
+        force, covariance = forces[level], covariances[level]
         size = float(np.hypot(*force))
         along = force / max(size, 1e-9)
         return size, math.sqrt(float(along @ covariance @ along))

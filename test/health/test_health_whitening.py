@@ -123,6 +123,24 @@ def test_modes_keep_their_signs(boom):
     assert one == pytest.approx(two, rel=1e-6)
 
 
+def test_levels_in_one_filter_are_those_of_each_alone(boom):
+    """To the bit: the posture's modes change, and one channel is not measured all the time."""
+    modes = [modes_of(*boom, None), modes_of(*boom, None)]
+    tables = np.random.default_rng(2).normal(0.0, 1e-4, (20, 6, 5))
+    tables[7:9, 2, 0], tables[12, :, 0] = np.nan, np.nan
+    levels = np.array([0.0, 15.0, 170.0])
+    together = InnovationFilter(6, 5, BLOCK, 0.15, levels)
+    alone = [InnovationFilter(6, 5, BLOCK, 0.15, float(level)) for level in levels]
+    for k, table in enumerate(tables):
+        for each in (together, *alone):
+            each.tune(modes[k // 10])
+        found, *ones = (each.step(table, 1e-10 * np.eye(6), np.full(6, 1e-9), 0.1, 0.01) for each in (together, *alone))
+        assert found.white.shape == (3, int(np.isfinite(table[:, 0]).sum()), 5)
+        assert found.white.tobytes() == np.array([one.white for one in ones]).tobytes()
+        assert found.log.tolist() == [float(one.log) for one in ones]
+    assert len(set(found.log.tolist())) == len(levels)
+
+
 def filtered(whitening: InnovationFilter, modes, tables):
     """Innovations of all tables, the modes changed in the middle."""
     size, found = tables.shape[1], []

@@ -134,18 +134,18 @@ class Innovations(NamedTuple):
 
     Attributes
     ----------
-    white : ndarray, shape (measured, columns)
+    white : ndarray, shape (..., measured, columns)
         In the order of the channels that were measured; each row of unit variance and independent of the others.
-    log : float
+    log : ndarray, shape (...)
         Logarithm of the probability density of column 0, but for a constant.
     """
 
     white: Array
-    log: float
+    log: Array
 
 
 class InnovationFilter:
-    """Filters several columns at once: column 0 the residuals, the others signatures.
+    """Filters several columns at once: column 0 the residuals, the others signatures; under one level of the load or several.
 
     Parameters
     ----------
@@ -154,15 +154,18 @@ class InnovationFilter:
         Length of a block, s.
     detuning : float
         Share by which natural frequencies may be wrong.
-    level : float
-        Of the unknown load, N.
+    level : float or ndarray, shape (...)
+        Of the unknown load, N. All levels are filtered in the same calls, as a filter of each alone would do to the bit.
     """
 
-    def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float = 0.0) -> None:
-        self._block, self._detuning2, self._channels, self._level2 = block, detuning**2, channels, level**2
-        self._x, self._p = np.zeros((LOAD + channels, columns)), np.zeros((LOAD + channels, LOAD + channels))
+    def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float | Array = 0.0) -> None:
+        self._block, self._detuning2, self._channels = block, detuning**2, channels
+        self._level2 = np.asarray(level, float)[..., None] ** 2
+        self._levels = self._level2.shape[:-1]
+        others = LOAD + channels
+        self._x, self._p = np.zeros((*self._levels, others, columns)), np.zeros((*self._levels, others, others))
         self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
-        self._p[:LOAD, :LOAD] = np.diag(self._stationary)
+        self._p[..., :LOAD, :LOAD] = _diagonal(self._stationary)
         self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
         self._posture: ModalStates | None = None
@@ -176,21 +179,23 @@ class InnovationFilter:
         kept = min(size, old)
         places = [*range(kept), *range(old, old + others)]
         at = [*range(kept), *range(size, size + others)]
-        x, p = np.zeros((size + others, self._x.shape[1])), np.zeros((size + others, size + others))
-        p[:size, :size] = modes.rest
-        x[at], p[np.ix_(at, at)] = self._x[places], self._p[np.ix_(places, places)]
+        x = np.zeros((*self._levels, size + others, self._x.shape[-1]))
+        p = np.zeros((*self._levels, size + others, size + others))
+        p[..., :size, :size] = modes.rest
+        (to, across), (of, beside) = np.ix_(at, at), np.ix_(places, places)
+        x[..., at, :], p[..., to, across] = self._x[..., places, :], self._p[..., of, beside]
         self._x, self._p, self._size = x, p, size
         self._least, self._driven = modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         at_once = self._level2 * (modes.lifted**2).sum(axis=1)
-        self._rough, self._pushed = ROUGH**2 * at_once, float(at_once[-2:].sum())
+        self._rough, self._pushed = ROUGH**2 * at_once, at_once[..., -2:].sum(axis=-1, keepdims=True)
         self._turn = np.eye(size + LOAD)
         self._turn[:size, :size] = modes.turn
         self._turn[:size, size:] = np.hstack([modes.pushed, modes.pushed])
         self._turn[size:, size:] = np.diag(self._kept)
         self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
         if is_first:
-            self._p[:size, :size] += _swung(modes, self._level2)
+            self._p[..., :size, :size] += _swung(modes, self._level2)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
         """Innovations of one block.
@@ -213,56 +218,63 @@ class InnovationFilter:
         Innovations
             Of the channels that were measured, and the probability of the residuals among them.
         """
-        shaking += self._pushed
-        self._go_on(errors2, shaking, travel)
+        shaken = shaking + self._pushed
+        self._go_on(errors2, shaken, travel)
         rows = np.isfinite(table[:, 0])
         if not rows.any():
-            return Innovations(table[:0], 0.0)
+            return Innovations(np.zeros((*self._levels, 0, table.shape[1])), np.zeros(self._levels))
         shown = self._shown[rows]
         cross = self._p @ shown.T
-        own = (noise + np.diag(shaking * self._shaken + self._rough))[np.ix_(rows, rows)]
+        own = (noise + _diagonal(shaken * self._shaken + self._rough))[..., rows, :][..., rows]
         root = np.linalg.cholesky(shown @ cross + own)
-        white = np.linalg.solve(root, np.hstack([table[rows] - shown @ self._x, cross.T]))
-        innovation, cross = white[:, : table.shape[1]], white[:, table.shape[1] :]
-        self._x = self._x + cross.T @ innovation
-        self._p = self._p - cross.T @ cross
-        log = -0.5 * float(innovation[:, 0] @ innovation[:, 0]) - float(np.log(np.diag(root)).sum())
-        return Innovations(innovation, log)
+        white = np.linalg.solve(root, np.concatenate([table[rows] - shown @ self._x, cross.mT], axis=-1))
+        innovation, cross = white[..., : table.shape[1]], white[..., table.shape[1] :]
+        self._x = self._x + cross.mT @ innovation
+        self._p = self._p - cross.mT @ cross
+        left = innovation[..., :1]
+        log = -0.5 * (left.mT @ left)[..., 0, 0] - np.log(root.diagonal(axis1=-2, axis2=-1)).sum(axis=-1)
+        return Innovations(innovation, np.asarray(log))
 
     def load(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
-        """Force at the tip along x and y, shape (2,), and its covariance, shape (2, 2); N, after the newest block.
+        """Force at the tip along x and y, shape (..., 2), and its covariance, shape (..., 2, 2); N, after the newest block.
 
         Parameters
         ----------
         mean, covariance : ndarray, shape (k,), (k, k)
             Of the parameters of the first k signatures.
         """
-        x = self._x[self._size :][:LOAD]
-        p = self._p[self._size :, self._size :][:LOAD, :LOAD]
-        by, k = BOTH @ x[:, 1:], len(mean)
-        return BOTH @ x[:, 0] - by[:, :k] @ mean, BOTH @ p @ BOTH.T + by[:, :k] @ covariance @ by[:, :k].T
+        here = slice(self._size, self._size + LOAD)
+        by, k = BOTH @ self._x[..., here, 1:], len(mean)
+        force = (BOTH @ self._x[..., here, :1])[..., 0] - by[..., :k] @ mean
+        return force, BOTH @ self._p[..., here, here] @ BOTH.T + by[..., :k] @ covariance @ by[..., :k].mT
 
-    def _go_on(self, errors2: Array, shaking: float, travel: float) -> None:
-        """To the next block, before it is measured."""
+    def _go_on(self, errors2: Array, shaking: Array, travel: float) -> None:
+        """To the next block, before it is measured; `shaking` has the shape (..., 1)."""
         m, at = self._size, self._size + LOAD
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
-        self._x[:at] = self._turn @ self._x[:at]
-        self._x[at:] *= kept
-        self._p[:at] = self._turn @ self._p[:at]
-        self._p[:, :at] = self._p[:, :at] @ self._turn.T
-        self._p[at:] *= kept
-        self._p[:, at:] *= kept
-        self._p[:m, :m] += self._least + shaking * self._driven
-        self._p[m:at, m:at] += np.diag((1.0 - self._kept**2) * self._stationary)
-        self._p[at:, at:] += np.diag((1.0 - kept * kept) * errors2)
+        x, p = self._x, self._p
+        x[..., :at, :] = self._turn @ x[..., :at, :]
+        x[..., at:, :] *= kept
+        p[..., :at, :] = self._turn @ p[..., :at, :]
+        p[..., :at] = p[..., :at] @ self._turn.T
+        p[..., at:, :] *= kept
+        p[..., at:] *= kept
+        p[..., :m, :m] += self._least + shaking[..., None] * self._driven
+        p[..., m:at, m:at] += _diagonal((1.0 - self._kept**2) * self._stationary)
+        p[..., at:, at:] += np.diag((1.0 - kept * kept) * errors2)
 
 
-def _swung(modes: ModalStates, level2: float) -> Array:
-    """Covariance of the modes' coordinates, shape (2 m, 2 m), that a load of this level has brought about before the start."""
+def _diagonal(values: Array) -> Array:
+    """Matrices (..., k, k) with `values` (..., k) on their diagonals."""
+    return np.asarray(values[..., None] * np.eye(values.shape[-1]))
+
+
+def _swung(modes: ModalStates, level2: Array) -> Array:
+    """Covariance (..., 2 m, 2 m) of the modes' coordinates that loads of levels (..., 1) brought about before the start."""
     turn, pushed = modes.turn, modes.pushed
     still = np.linalg.solve(np.eye(len(turn)) - turn, pushed) if len(turn) else pushed
     omegas = 2.0 * math.pi * np.repeat(modes.frequencies, 2)
     spread = (1.0 + MEAN**2) * level2 * (still**2).sum(axis=1)
-    spread[1::2] = spread[0::2] * omegas[0::2] ** 2
-    return np.diag(spread)
+    spread[..., 1::2] = spread[..., 0::2] * omegas[0::2] ** 2
+    return _diagonal(spread)
