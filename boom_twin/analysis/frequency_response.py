@@ -230,8 +230,8 @@ def frequency_response(
     Raises
     ------
     UsageError
-        As `statics` does; frequencies that are negative or not finite; a force and a drive; a force of 0; a cylinder that is not
-        there; pins with clearance.
+        As `statics` does; frequencies that are negative or not finite; a force and a drive; a force of 0; a cylinder that is
+        not there; pins with clearance.
     SolverError
         No stable equilibrium was found.
 

@@ -43,7 +43,8 @@ class RefusedStrokes:
         unit = next((unit for unit, factor in self._by_size() if self._fits(factor)), None)
         if unit is None:
             return said
-        return f"{said} With the unit `{unit}` it would fit: give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
+        remedy = f"give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
+        return f"{said} With the unit `{unit}` it would fit: {remedy}"
 
     def _fits_in_other_order(self) -> bool:
         """Whether every stroke is within the travel of a cylinder of its own, if not of the one that it is named after."""

@@ -12,7 +12,7 @@ import pytest
 
 from boom_twin.cli.examples import EXAMPLES
 from boom_twin.cli.main import main
-from boom_twin.cli.progress import TenthLines
+from boom_twin.offline.progress import TenthLines
 from boom_twin.scene.load import default_text
 
 STROKES = "0.63,0.165,0.235,0.187"

@@ -8,7 +8,7 @@ import pytest
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.offline.refused_strokes import RefusedStrokes
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.twin.blocks import SampleBlock, block_of
+from boom_twin.twin.blocks import block_of
 
 TRAVEL = np.array([joint.cylinder.max_stroke for joint in load_scene().joints])
 
