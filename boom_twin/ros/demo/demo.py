@@ -210,10 +210,12 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
     with ros([]):
         player = Player(session)
         running.wait_for_discovery(player)
-        bar, before = progress_of(round(player.length(0.0, duration)), "s", "playing"), 0
+        total, before = round(player.length(0.0, duration)), 0
+        bar = progress_of(total, "s", "playing")
         for elapsed in running.play(player, duration):
             bar.update((elapsed - before) * NANO)
             before = elapsed
+        bar.update(total - before * NANO)  # the last message comes shortly before the end
         bar.close()
         time.sleep(SETTLE)
         running.check()
