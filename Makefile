@@ -1,4 +1,4 @@
-# make demo and make test need Python 3.11 or 3.12, make and PyPI; each sets up .venv by itself.
+# make demo and make test need Python 3.11 to 3.13, make and PyPI; each sets up .venv by itself.
 PYTHON ?= $(shell command -v python3.12 >/dev/null 2>&1 && python3.12 -c '' >/dev/null 2>&1 && echo python3.12 || { command -v python3.11 >/dev/null 2>&1 && python3.11 -c '' >/dev/null 2>&1 && echo python3.11; } || echo python3)
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -31,7 +31,7 @@ help:
 setup: $(READY)
 
 $(READY): setup.py
-	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 12) else "boom_twin needs Python 3.11 or 3.12, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
+	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 13) else "boom_twin needs Python 3.11 to 3.13, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
 	@touch $@

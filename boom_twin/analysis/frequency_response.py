@@ -287,8 +287,8 @@ def frequency_response(
     Raises
     ------
     UsageError
-        As `statics` does; frequencies that are negative or not finite; a force and a drive; a cylinder that is not there; a pin
-        with clearance that has friction, bears no force, or is treated as spring-damper.
+        As `statics` does; frequencies that are negative or not finite; a force and a drive; a force of 0; a cylinder that is
+        not there; a pin with clearance that has friction, bears no force, or is treated as spring-damper.
     SolverError
         No stable equilibrium was found.
 
@@ -310,6 +310,8 @@ def frequency_response(
         raise UsageError(f"drive = {drive}: the scene has cylinders 1 to {n}. Name one of them.")
     if tip_force is not None and not (len(tip_force) == 2 and np.all(np.isfinite(tip_force))):
         raise UsageError(f"tip_force = {tip_force}: give two numbers, the force in x and y (N).")
+    if tip_force is not None and not np.any(tip_force):
+        raise UsageError("tip_force = (0, 0) N moves nothing. Give a force, such as 0,1, or the drive of a cylinder.")
     boom = linearised_boom(scene, strokes, posture)
     force = tip_force if tip_force is not None else UPWARD
     return boom.respond(frequencies, boom.load(force) if drive is None else boom.load(drive=drive - 1))

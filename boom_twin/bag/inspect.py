@@ -135,6 +135,8 @@ class BagInfo:
         Of the chunks: ``zstd``, ``lz4``, ``none``, ..; or that the file has none.
     size : int
         Bytes of all files.
+    window : TimeWindow
+        The part of the session that the tallies are of.
     """
 
     session: Session
@@ -142,6 +144,16 @@ class BagInfo:
     library: str
     compression: str
     size: int
+    window: TimeWindow = WHOLE
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Log times (ns) of the first and the last message in the window; twice its beginning where there is none."""
+        if self.window == WHOLE:
+            return self.session.start, self.session.end
+        seen = [tally for tally in self.tallies if tally.count]
+        begin = self.window.bounds(self.session.start)[0]
+        return min((tally.first for tally in seen), default=begin), max((tally.last for tally in seen), default=begin)
 
     @property
     def synthetic(self) -> bool | None:
@@ -170,7 +182,7 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     with as_bag_error(files[0].path):
         library, compression = files[0].written_by()
     size = sum(file.path.stat().st_size for file in files)
-    return BagInfo(session, tuple(tallies.values()), library, compression, size)
+    return BagInfo(session, tuple(tallies.values()), library, compression, size, window)
 
 
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:

@@ -25,7 +25,7 @@ from .integrity import compare_counts
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata
 from .session_blocks import SessionBlocks
 from .session_file import CDR, SessionFile
-from .session_sheet import incompleteness
+from .session_sheet import incompleteness, kept_origin
 from .storages import summarise
 from .time_window import WHOLE, TimeWindow
 
@@ -189,6 +189,8 @@ def _scan(path: Path, incomplete: str) -> Session:
     if metadata is not None:
         compare_counts(path, FILE_NAME, metadata.counts, "files", {topic.name: topic.count for topic in topics})
         notes |= metadata.notes
+    if "origin" not in notes:
+        notes |= kept_origin(path)
     filled = [file for file in files if any(file.counts.values())]
     return Session(
         path=path,

@@ -131,6 +131,15 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
     return KeptText(text, f"{path}, {key}") if text else None
 
 
+def kept_origin(session: Path) -> dict[str, str]:
+    """The note ``origin`` of a ``session.yaml``, for storages that keep no notes; empty where none can be read."""
+    try:
+        found = kept(session, "origin", "--scene")
+    except BagError:
+        return {}  # a note is not worth a refusal: whoever needs the sheet's scene or mapping is told
+    return {"origin": found.text} if found else {}
+
+
 def sha256(text: str) -> str:
     """Digest of a text in UTF-8."""
     return hashlib.sha256(text.encode()).hexdigest()

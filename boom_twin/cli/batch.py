@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..offline.progress import progress_of
 from .arguments import add_window, positive, window_of
 from .main import add_params
-from .progress import progress_of
 
 if TYPE_CHECKING:
     from ..batch.results import BatchFolder

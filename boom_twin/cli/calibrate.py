@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
+from ..offline.progress import TenthLines
 from .arguments import add_window, window_of
 from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
-from .progress import TenthLines
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene

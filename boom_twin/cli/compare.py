@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from .arguments import add_window, window_of
 from .main import add_json, add_params, add_session_scene, open_session_scene, print_result
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
     add_session_scene(parser)
     add_params(parser)
+    add_window(parser)
     parser.add_argument("--baseline", metavar="FILE", type=Path, help="as for replay")
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
@@ -56,15 +58,18 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
     from ..report.compare import side_of
     from ..report.evaluation import Evaluator
 
+    window = window_of(args)
+
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
         scene, settings = open_session_scene(session, args.scene), load_settings(args.params)
         inner = building.inner(name)
         evaluator = Evaluator(scene.scene, settings, args.baseline)
-        evaluator.finish(replay_into(inner, session, scene, settings, baseline=args.baseline, take=evaluator.add), inner.folder)
+        result = replay_into(inner, session, scene, settings, baseline=args.baseline, window=window, take=evaluator.add)
+        evaluator.finish(result, inner.folder)
         return inner.folder
 
-    return side_of(path, replayed)
+    return side_of(path, replayed, window)
 
 
 def _draw(out: Path, one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> None:

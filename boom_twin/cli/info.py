@@ -43,6 +43,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped) -> dict[str, Any
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
     topics, joints = mapped.topics, len(scene.scene.joints)
+    start, end = info.span
     return {
         "path": str(session.path),
         "storage": session.files[0].storage,
@@ -53,8 +54,9 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped) -> dict[str, Any
         "library": info.library,
         "files": [file.path.name for file in session.files],
         "bytes": info.size,
-        "start_ns": session.start,
-        "duration_s": (session.end - session.start) * NANO,
+        "start_ns": start,
+        "duration_s": (end - start) * NANO,
+        "session_duration_s": (session.end - session.start) * NANO,
         "messages": sum(tally.count for tally in tallies),
         "checksums": session.checked,
         "origin": session.notes.get("origin"),
@@ -109,7 +111,7 @@ def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[st
         f"made by    {told['origin'] or 'origin not noted'} ({made})",
         f"scene      {told['scene']}, sha256 {told['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"mapping    {told['mapping']}",
-        f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages",
+        f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages{_part(info, told)}",
         "",
         *_table(info),
         "",
@@ -121,6 +123,12 @@ def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[st
     lines += [f"missing    {sentence}" for sentence in told["missing_for_replay"]]
     lines += [] if told["missing_for_replay"] else ["replay     nothing is missing"]
     return [printable(line, keep="") for line in lines]
+
+
+def _part(info: BagInfo, told: dict[str, Any]) -> str:
+    """Of which part of the session that is, where it is not all of it."""
+    whole = told["session_duration_s"] == told["duration_s"]
+    return "" if whole else f": the part from {info.window.start:g} s on, of {told['session_duration_s']:.3f} s"
 
 
 def _table(info: BagInfo) -> list[str]:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
+from ..offline.progress import progress_of
 from .arguments import SESSION, add_mapping, add_window, window_of
 from .main import add_json, add_namespace, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
-from .progress import progress_of
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene

@@ -105,7 +105,7 @@ def _check_sampling(args: Namespace) -> None:
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
     """Simulate many booms; write their statistics and the samples."""
     from ..analysis.monte_carlo import simulate_samples
-    from .progress import progress_of
+    from ..offline.progress import progress_of
 
     out = Path(args.out)
     table = out.with_name(f"{out.stem}_samples.csv")

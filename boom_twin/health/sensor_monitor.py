@@ -53,7 +53,7 @@ QUIET = 0.3  # of the noise that is stated: a channel with less gives clean read
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
-SILENT_FOR = 0.5  # s
+SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
 
 
@@ -147,14 +147,14 @@ class SensorCheck:
         whole, span = bool(np.isfinite(raw.sum())), float(stamps[-1] - stamps[0])
         self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
         self._listen(left[1:], span)
-        steps = np.diff(left, axis=0)
+        steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
         noise = np.sqrt(np.fmax(self._power, self._sigma**2))
         sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
         findings = SensorFindings(
             stuck=self._stuck(times[2:], all_raw[2:]),
             noisy=self._power > (NOISY * self._sigma) ** 2,
             spikes=self._spikes(steps, noise) if sudden else np.zeros(count, dtype=bool),
-            jumped=self._jumps(times, all_raw, left, noise) if sudden else np.zeros(count),
+            jumped=self._jumps(times, all_raw, left, steps, noise) if sudden else np.zeros(count),
             silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
             outside=((raw < self._low) | (raw > self._high)).sum(axis=0) > 0.5 * len(raw),
         )
@@ -205,10 +205,13 @@ class SensorCheck:
         witnessed = live.any() and len(live) > 1
         return np.asarray((self._run >= self._patience) & (times[-1] - self._since >= REPEATS_FOR) & witnessed)
 
-    def _jumps(self, times: Array, raw: Array, left: Array, noise: Array) -> Array:
-        """How far readings changed from one to the next, for good, while the model did not; 0 where they did not."""
+    def _jumps(self, times: Array, raw: Array, left: Array, steps: Array, noise: Array) -> Array:
+        """How far readings changed from one to the next, for good, while the model did not; 0 where they did not.
+
+        `steps` are those of `left` from each reading to the next, NaN across a gap.
+        """
         with np.errstate(invalid="ignore"):
-            step, measured = left[2:-1] - left[1:-2], raw[2:-1] - raw[1:-2]
+            step, measured = steps[1:-1], raw[2:-1] - raw[1:-2]
             lasting = 0.5 * (left[2:-1] + left[3:]) - 0.5 * (left[:-3] + left[1:-2])
             least = np.maximum(JUMP * noise, self._fastest * (times[2:-1] - times[1:-2])[:, None])
             sudden = (np.abs(measured) > least) & (np.abs(step) > least) & (np.abs(lasting) > 0.7 * np.abs(step))

@@ -38,10 +38,19 @@ class RefusedStrokes:
             return ""
         i = int(np.flatnonzero((self._first < 0.0) | (self._first > self._travel))[0])
         said = f" The first refused value: {self._names[i]} = {self._first[i]:.6g} m, its travel is 0 to {self._travel[i]:g} m."
+        if self._fits_in_other_order():
+            return f"{said} In another order the strokes would fit: look for cylinders whose names or columns are swapped."
         unit = next((unit for unit, factor in self._by_size() if self._fits(factor)), None)
         if unit is None:
             return said
-        return f"{said} In {unit} it would fit: give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
+        remedy = f"give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
+        return f"{said} With the unit `{unit}` it would fit: {remedy}"
+
+    def _fits_in_other_order(self) -> bool:
+        """Whether every stroke is within the travel of a cylinder of its own, if not of the one that it is named after."""
+        assert self._first is not None
+        known = np.isfinite(self._first)
+        return bool(known.all() and self._first.min() >= 0.0 and (np.sort(self._first) <= np.sort(self._travel)).all())
 
     @staticmethod
     def _by_size() -> list[tuple[str, float]]:

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 class ProgressBar(Protocol):
     """What is told how far a replay is; ``tqdm`` is one."""
 
-    def update(self, n: int, /) -> object:
+    def update(self, n: float, /) -> object:
         """So many more messages were taken."""
 
     def close(self) -> object:

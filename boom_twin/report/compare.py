@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..bag.session_sheet import incompleteness
+from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME as RESULT
-from ..errors import BagError
+from ..errors import BagError, UsageError
 from ..offline.replay import alarm_as_text
 from ..system.received_files import holds_file, open_received, sha256_of
 from .quantities import Quantity, read
@@ -40,17 +41,22 @@ class ComparedSession:
     incomplete: str = ""
 
 
-def side_of(path: Path, replayed: Callable[[Path], Path]) -> ComparedSession:
-    """One side from a replay folder, or from a session, of which `replayed` makes a replay folder.
+def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = WHOLE) -> ComparedSession:
+    """One side from a replay folder, or from a session, of which `replayed` makes a replay folder of the `window`.
 
     Raises
     ------
     BagError
         The session cannot be replayed, or the folder is incomplete, lacks figures or has none that can be read.
+    UsageError
+        A window of a replay folder, which has its own.
     """
-    if holds_file(path / "summary.json") and (told := incompleteness(path)):
+    is_replay = holds_file(path / "summary.json")
+    if is_replay and (told := incompleteness(path)):
         raise BagError(f"{path}: {told}")
-    folder = path if holds_file(path / "summary.json") else replayed(path)
+    if is_replay and window != WHOLE:
+        raise UsageError(f"{path}: a replay folder has its own window. Give the session itself with --start and --duration.")
+    folder = path if is_replay else replayed(path)
     scene, found = read(folder)
     try:
         with open_received(folder / "summary.json") as file:

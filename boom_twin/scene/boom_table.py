@@ -13,7 +13,7 @@ from ..errors import ABSENT, Fault, SceneError
 from .block_reader import validated
 from .format import Format
 from .glossary import MEANING
-from .schema import Base, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
+from .schema import Base, Bore, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
 from .yaml_reader import NUMBER, Document, Place, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
@@ -36,7 +36,7 @@ class DrawnJoint(Part):
 
     kind: Literal["A", "B1", "B2", "B3"]
     range_deg: tuple[Finite, Finite]
-    bore: Positive
+    bore: Bore
     rod: Positive
     C: Point | None = None
     D: Point | None = None

@@ -15,11 +15,12 @@ import numpy as np
 from ..config.yaml_text import yaml_text
 from ..errors import Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
+from ..types import Array
 from .boom_table import BoomTable, BoxSection, DrawnJoint
-from .kinematics import linkage_of
+from .kinematics import linkage_of, stroke_curve
 from .load import examine_text
-from .oil_spring import middle_stiffness
-from .schema import Cylinder, Joint, Scene, Section
+from .oil_spring import middle_stiffness, stiffness
+from .schema import Cylinder, Joint, Oil, Scene, Section
 from .straight_boom import straight_boom
 from .yaml_reader import Document, with_end_mark, words
 
@@ -40,7 +41,7 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
     """
     try:
         scene, _ = examine_text(_text(table, source, None), source)
-        found = straight_boom(scene, np.array([middle_stiffness(joint.cylinder) for joint in scene.joints]))
+        found = straight_boom(scene, _straight_stiffnesses(scene))
         text = _text(table, source, float(found.frequencies[0]) if len(found.frequencies) else None)
         return text, *examine_text(text, source)
     except SceneError as error:
@@ -50,6 +51,13 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
             for told in (error.faults, error.oddities)
         )
         raise SceneError(source, tuple(faults), tuple(odd)) from None
+
+
+def _straight_stiffnesses(scene: Scene) -> Array:
+    """Stiffness (N/m) of every cylinder, shape (n,), where its joint is straight, or next to it."""
+    angles = [np.radians([np.clip(0.0, *joint.range_deg)]) for joint in scene.joints]
+    strokes = [float(stroke_curve(scene, i, angle)[0]) for i, angle in enumerate(angles)]
+    return np.array([stiffness(joint.cylinder, stroke) for joint, stroke in zip(scene.joints, strokes, strict=True)])
 
 
 def _text(table: BoomTable, source: str, first: float | None) -> str:
@@ -124,16 +132,18 @@ def _joint(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> 
 
 def _cylinder(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
     closed, stroke, told = _stroke(table, i, joint)
-    rho, middle = table.material.rho or 0.0, 0.5 * stroke
-    cap, ring = math.pi / 4 * joint.bore**2, math.pi / 4 * (joint.bore**2 - joint.rod**2)
-    columns = (cap**2 / (joint.cap_line + cap * middle), ring**2 / (joint.rod_line + ring * (stroke - middle)))
-    k = table.bulk_modulus * sum(columns)
-    formula = f"B [Ac^2/(Vc + Ac s) + Ar^2/(Vr + Ar (max_stroke - s))] at s = {middle:.3g}, B = {table.bulk_modulus:.3g}"
-    areas = f"Ac = pi bore^2/4 = {cap:.3g}, Ar = pi (bore^2 - rod^2)/4 = {ring:.3g}"
-    areas += f", Vc = {joint.cap_line:g}, Vr = {joint.rod_line:g}"
-    rows = [("k", _number(k), formula), ("", "", areas)]
+    rho = table.material.rho or 0.0
+    values = joint.model_dump(include={"bore", "rod", "cap_line", "rod_line"})
+    oil = Oil(bulk_modulus=table.bulk_modulus, **values)
+    k = middle_stiffness(Cylinder(closed_length=closed, max_stroke=stroke, oil=oil))
+    rows = [
+        ("oil", _block(oil.model_dump()), ""),
+        ("", "", "k(s) = B [Ac^2/(Vc + Ac s) + Ar^2/(Vr + Ar (max_stroke - s))], B bulk_modulus, Vc cap_line, Vr rod_line"),
+        ("", "", f"Ac = pi bore^2/4 = {oil.cap_area:.3g}, Ar = pi (bore^2 - rod^2)/4 = {oil.rod_area:.3g}"),
+        ("", "", f"k = {k:.3g} N/m in the middle of the stroke; `k` instead of `oil` keeps it the same over the stroke"),
+    ]
     if first is not None:
-        rows.append(("d", _number(k * _delay(table, first)), "[estimate] 2 zeta k / omega, as beta"))
+        rows.append(("d", _number(k * _delay(table, first)), "[estimate] 2 zeta k / omega, as beta, k in the middle"))
     rows += [("closed_length", _number(closed), told), ("max_stroke", _number(stroke), told)]
     barrel = rho * math.pi * joint.bore**2 * TUBE * (1 + TUBE) * closed
     rod = rho * math.pi / 4 * joint.rod**2 * closed

@@ -99,10 +99,14 @@ class CylinderPart(Part):
     com: NotNegative
 
 
+Bore = Annotated[float, Field(ge=1e-3, le=1.0, allow_inf_nan=False)]
+"""Diameter of a piston, m. One of more than 1 m is in no boom: it was given in mm."""
+
+
 class Oil(Part):
     """Oil shut in both chambers: diameters of piston and rod (m), bulk modulus (Pa), oil in the lines of each side (m^3)."""
 
-    bore: Annotated[float, Field(ge=1e-3, le=LARGEST, allow_inf_nan=False)]
+    bore: Bore
     rod: Positive
     bulk_modulus: Annotated[float, Field(ge=1e7, le=1e11)]
     cap_line: NotNegative

@@ -53,6 +53,16 @@ class Document:
             place = place[:-1]
         return self.lines.get(place)
 
+    def written(self, place: Place) -> Any:
+        """The value at a place as it stands in the text, for example with its unit; None where there is none."""
+        value = self.values
+        for step in place:
+            try:
+                value = value[step]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return value
+
     def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
         """A fault at a place of this text."""
         return Fault(words(place), value, bound, remedy, self.line(place))

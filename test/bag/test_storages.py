@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
@@ -223,3 +224,26 @@ def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 57
     assert np.isfinite([columns["measured_cylinder_1_m"], columns["estimate_tip_x_m"]]).all()
     assert part.summary["tip_error_rms_m"] < 0.03  # the boom was moving, the model begins at rest; by another time decimetres
+
+
+def test_a_database_has_the_origin_of_the_sheet_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = stored(moving(tmp_path / "mcap"), "db3 file", tmp_path)
+    (file.parent / "metadata.yaml").unlink()
+    assert "origin" not in scan(file).notes
+    (file.parent / "session.yaml").write_text("origin: synthetic, a test\n")
+    assert main(["info", str(file)]) == 0
+    assert "made by    synthetic, a test (synthetic)" in capsys.readouterr().out
+    (file.parent / "session.yaml").write_text("origin: [broken\n")
+    assert "origin" not in scan(file).notes
+
+
+def test_info_tells_the_length_of_the_window(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = str(moving(tmp_path / "mcap"))
+    assert main(["info", source, "--start", "1", "--duration", "0.5", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["duration_s"] == pytest.approx(0.495) and told["session_duration_s"] == pytest.approx(1.995)
+    assert told["start_ns"] == 1_700_000_001_000_000_000
+    assert main(["info", source, "--start", "1", "--duration", "0.5"]) == 0
+    assert "lasts      0.495 s, 200 messages: the part from 1 s on, of 1.995 s" in capsys.readouterr().out
+    assert main(["info", source]) == 0
+    assert "lasts      1.995 s, 800 messages\n" in capsys.readouterr().out

@@ -117,3 +117,8 @@ def test_usage(capsys: Capture, given: list[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["response", *given])
     assert stopped.value.code == 2
+
+
+def test_a_force_of_zero_is_refused(capsys: Capture) -> None:
+    assert main(["response", "--posture", "arch", "--tip", "0,0"]) == 1
+    assert "moves nothing. Give a force" in capsys.readouterr().err

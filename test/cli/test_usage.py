@@ -12,7 +12,7 @@ import pytest
 
 from boom_twin.cli.examples import EXAMPLES
 from boom_twin.cli.main import main
-from boom_twin.cli.progress import TenthLines
+from boom_twin.offline.progress import TenthLines
 from boom_twin.scene.load import default_text
 
 STROKES = "0.63,0.165,0.235,0.187"
@@ -128,5 +128,5 @@ def test_a_refused_stroke_is_told_with_its_likely_unit(tmp_path: Path, capsys: p
     session = drive(tmp_path / "in.csv", *(f"{0.01 * row:.2f},630,165,235,187" for row in range(30)))
     assert main(["replay", session, "--out", str(tmp_path / "out"), "--no-pictures"]) == 1
     told = capsys.readouterr().err
-    assert "first refused value: cylinder_1 = 630 m, its travel is 0 to 0.79 m. In mm it would fit" in told
+    assert "first refused value: cylinder_1 = 630 m, its travel is 0 to 0.79 m. With the unit `mm` it would fit" in told
     assert "replay: 100 %, 30 of 30 messages" in told

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorFindings, SensorMonitor
+from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorCheck, SensorFindings, SensorMonitor
 from boom_twin.types import SENSORS, Stream
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
@@ -85,3 +85,18 @@ def test_two_faults_of_one_sensor():
     watched.take(findings(0, "range"))
     watched.take(findings(0, "noise"))
     assert {alarm.kind for alarm in watched.watch.alarms} == {"range", "noise"}
+
+
+def jumped_after_a_pause(seconds: float) -> float:
+    """What a check finds of a reading that is 0.1 rad further for good, so long after the one before it."""
+    check = SensorCheck(2e-4, 1e-4, np.array([-3.0]), np.array([3.0]), 0.0)
+    noise = np.random.default_rng(1).normal(0.0, 2e-4, (80, 1))
+    before, after = np.arange(40) * 0.005, 0.195 + seconds + np.arange(40) * 0.005
+    assert not check.look(before, noise[:40], np.zeros((40, 1)), before[-1]).jumped.any()
+    return float(check.look(after, 0.1 + noise[40:], np.zeros((40, 1)), after[-1]).jumped[0])
+
+
+def test_a_jump_from_one_reading_to_the_next_is_found_and_none_across_a_gap():
+    """While nothing came the boom may have moved, and the model did not see it."""
+    assert abs(jumped_after_a_pause(0.005) - 0.1) < 2e-3
+    assert jumped_after_a_pause(4.0) == 0.0

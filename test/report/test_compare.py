@@ -91,3 +91,16 @@ def test_an_old_replay_must_be_made_anew(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / "summary.json").write_text("{}")
     assert main(["compare", str(tmp_path), str(tmp_path)]) == 1
     assert "Replay the session again" in capsys.readouterr().err
+
+
+def test_a_window_is_that_of_the_sessions_and_refused_for_a_replay(
+    sessions: tuple[Path, Path], replays: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    window = ["--start", "1", "--duration", "1"]
+    assert main(["compare", *map(str, sessions), *window, "--out", str(tmp_path)]) == 0
+    for side in ("A", "B"):
+        summary = json.loads((tmp_path / side / "summary.json").read_text())
+        assert (summary["window_start_s"], summary["window_duration_s"]) == (1.0, 1.0) and summary["duration_s"] <= 1.0
+    capsys.readouterr()
+    assert main(["compare", *map(str, replays), *window]) == 1
+    assert "a replay folder has its own window" in capsys.readouterr().err

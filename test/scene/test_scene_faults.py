@@ -121,6 +121,7 @@ CONTRADICTIONS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (j(1, "cylinder", "oil"), OIL, "joints[1].cylinder.oil", ("k = 3e+07 N/m too", "Remove k, or remove oil")),
     (j(1, "cylinder", "oil"), OIL | {"rod": 0.1}, "joints[1].cylinder.oil.rod", ("thinner than the bore, 0.1 m", "diameters")),
     (j(1, "cylinder", "oil"), OIL | {"bulk_modulus": 1.5}, "joints[1].cylinder.oil.bulk_modulus", ("not be less than 1e+07",)),
+    (j(1, "cylinder", "oil"), OIL | {"bore": 160}, "joints[1].cylinder.oil.bore", ("not be more than 1", "piston, m")),
     (j(1, "cylinder", "oil"), OIL | {"bore": 1e-9}, "joints[1].cylinder.oil.bore", ("not be less than 0.001", "piston, m")),
     (j(1, "cylinder", "oil"), {"bore": 0.1}, "joints[1].cylinder.oil.bulk_modulus", ("is absent", "Pa")),
     (j(1, "cylinder", "oil"), OIL | {"rod_line": -1.0}, "joints[1].cylinder.oil.rod_line", ("not be less than 0", "m^3")),

@@ -43,7 +43,6 @@ UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (("tip",), {"payload": 4e5}, "tip.payload", ("grams?",)),
     (j(1, "mL"), 4e6, "joints[1].mL", ("grams?",)),
     (j(1, "cylinder", "k"), 30.0, "joints[1].cylinder.k", ("kN/mm?", "30 kN/mm are 3e+07")),
-    (j(1, "cylinder", "oil"), OIL | {"bore": 100.0}, "joints[1].cylinder.oil.bore", ("mm?", "100 mm is 0.1")),
     (j(1, "cylinder", "oil"), OIL | {"cap_line": 2.0}, "joints[1].cylinder.oil.cap_line", ("litres?", "1e-3")),
     (j(1, "cylinder", "oil"), OIL | {"rod_line": 0.0}, "joints[1].cylinder.oil.rod_line", ("full stroke, 0.42 m",)),
     (("gravity",), [0.0, -1.62], "gravity", ("9.81", "[0.0, -9.81]")),

@@ -108,3 +108,12 @@ def test_a_new_key_of_the_glossary_needs_no_more_than_its_meaning() -> None:
 def test_a_scene_in_plain_numbers_imports_no_library_of_units() -> None:
     code = "import sys; from boom_twin.scene import load_scene; load_scene(); sys.exit('pint' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+
+
+def test_a_length_in_a_unit_that_cannot_be_meant_is_warned_of_as_it_was_written(bench: Any) -> None:
+    def edit(values: Any) -> None:
+        values["sections"][0]["length"] = "8500 furlong"
+
+    _, oddities = examine(bench.edited(edit))
+    told = [str(each) for each in oddities if each.path == "sections[0].length"]
+    assert told and "written as `8500 furlong`, which is more than 200 m" in told[0]

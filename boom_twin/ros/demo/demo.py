@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from ...bag.reader import Session, read, scan
 from ...bag.session_model import scene_of
@@ -28,6 +27,7 @@ from ...messages.topic_table import Output, Topic, load_topics
 from ...offline.ground_truth import FILE_NAME as TRUTH
 from ...offline.ground_truth import TipTruth, load_truth
 from ...offline.history import draw, history_of
+from ...offline.progress import progress_of
 from ...offline.replay import Replay, replay_into
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
@@ -159,7 +159,6 @@ def _residual_rms(residuals: list[Any]) -> dict[str, float]:
 
 SETTLE = 1.0
 """Seconds for the last messages to arrive."""
-BAR = "playing {l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 
 def main() -> int:
@@ -211,9 +210,13 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
     with ros([]):
         player = Player(session)
         running.wait_for_discovery(player)
-        with tqdm(total=player.length(0.0, duration), ncols=80, mininterval=0.5, bar_format=BAR) as bar:
-            for elapsed in running.play(player, duration):
-                bar.update(elapsed * NANO - bar.n)
+        total, before = round(player.length(0.0, duration)), 0
+        bar = progress_of(total, "s", "playing")
+        for elapsed in running.play(player, duration):
+            bar.update((elapsed - before) * NANO)
+            before = elapsed
+        bar.update(total - before * NANO)  # the last message comes shortly before the end
+        bar.close()
         time.sleep(SETTLE)
         running.check()
         player.close()

@@ -181,8 +181,6 @@ SUSPECTS: dict[str, tuple[float, str, str]] = {
     "inclination": (0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?", "Give radians: 5 degrees are 0.0873."),
     "closed_length": (50.0, "more than 50 m: mm?", "Give lengths in m."),
     "max_stroke": (50.0, "more than 50 m: mm?", "Give lengths in m."),
-    "bore": (1.0, "more than 1 m: mm?", "Give the diameter in m: 100 mm is 0.1."),
-    "rod": (1.0, "more than 1 m: mm?", "Give the diameter in m: 70 mm is 0.07."),
     "cap_line": (0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
     "rod_line": (0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
 }
@@ -234,7 +232,9 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
     elif key in MASSES and value > 1e5:
         yield warning(draft, place, value, "more than 1e5 kg: grams?", f"Give kg: {value:g} g are {value / 1000:g}.")
     elif key in LENGTHS and max(map(abs, value if isinstance(value, tuple) else (value,))) > 200:
-        yield warning(draft, place, value, "more than 200 m: mm?", "Give lengths in m.")
+        written = draft.document.written(place)
+        told = f"written as `{written}`, which is more than 200 m" if isinstance(written, str) else "more than 200 m: mm?"
+        yield warning(draft, place, value, told, "Give lengths in m, or with their unit: 8500 mm.")
     else:
         yield from _upper(draft, place, value)
 

@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..offline.replay import ProgressBar
+    from .replay import ProgressBar
 
 
 class TenthLines:

@@ -1,0 +1,31 @@
+"""What is said of the first stroke that could not be used: its likely unit, or that cylinders are swapped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream, load_scene
+from boom_twin.offline.refused_strokes import RefusedStrokes
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.twin.blocks import block_of
+
+TRAVEL = np.array([joint.cylinder.max_stroke for joint in load_scene().joints])
+
+
+def told(strokes: np.ndarray) -> str:
+    refused = RefusedStrokes(load_scene())
+    refused.take(block_of([Sample(Stream.STROKES, 1, strokes)], 4))
+    return refused.told
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("mm", 1e3), ("cm", 1e2)])
+def test_strokes_in_another_unit(unit: str, factor: float) -> None:
+    assert f"With the unit `{unit}` it would fit: give by --mapping" in told(0.9 * factor * TRAVEL)
+
+
+def test_swapped_strokes_are_no_other_unit() -> None:
+    assert strokes_of_posture(load_scene(), "arch").max() < TRAVEL.max()
+    said = told(np.array(0.9 * TRAVEL)[::-1])
+    assert "In another order the strokes would fit: look for cylinders whose names or columns are swapped" in said
+    assert "unit" not in said
