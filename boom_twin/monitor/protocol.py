@@ -6,7 +6,8 @@ A message is a sequence of blocks, each of a multiple of 8 bytes, all numbers li
 offset  type                   meaning
 ======  =====================  ========================================================================================
 0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram, 4 = response
-1       uint8                  number of the table, its place in the newest ``layout`` message
+1       uint8                  kinds 1, 2: number of the table, its place in the newest ``layout`` message; kind 3: of the
+                               signal in `boom_twin.monitor.data.analyst.SIGNALS`; kind 4: 0
 2       uint16                 columns, c
 4       uint32                 rows, k
 8       float64 x k            kinds 1, 3: seconds since the session's epoch; kinds 2, 4: frequencies, Hz

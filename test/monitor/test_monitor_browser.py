@@ -239,6 +239,35 @@ def test_the_span_that_is_shown_can_be_chosen(page: Any, seconds: str) -> None:
     assert high - low == pytest.approx(float(seconds))
 
 
+def test_a_finger_opens_tabs_and_chooses_a_span(browser: Any, monitor: Monitor) -> None:
+    """On a tablet: a tap is a click, a stroke along a chart shows its part, a double tap all of it again."""
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(monitor.url)
+    wait(page, "twin.timeline.isRead", 120_000)
+    go(page, FAULT)
+    for tab in ("spectrum", "shape", "traces"):
+        page.locator(f"#tabs button[data-tab='{tab}']").tap()
+        wait(page, f"getComputedStyle(document.getElementById('{tab}')).display !== 'none'")
+    box = page.locator("#charts .u-over").first.bounding_box()
+    devtools = context.new_cdp_session(page)
+
+    def touch(kind: str, share: float | None = None) -> None:
+        points = [] if share is None else [{"x": box["x"] + share * box["width"], "y": box["y"] + 20}]
+        devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", 0.7)
+    for share in (0.75, 0.8, 0.85, 0.9):
+        touch("touchMove", share)
+    touch("touchEnd")
+    wait(page, "twin.view.zoom !== null")
+    low, high = page.evaluate("twin.view.zoom")
+    assert high - low == pytest.approx(0.2 * 30.0, rel=0.15)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    context.close()
+
+
 def test_spectrum_and_spectrogram(page: Any) -> None:
     page.keyboard.press("2")
     wait(page, "document.querySelectorAll('#peaks tr').length > 2")
@@ -253,7 +282,8 @@ def test_spectrum_and_spectrogram(page: Any) -> None:
     assert page.locator("#density canvas").count() == 1
     page.keyboard.press("3")
     page.wait_for_timeout(1500)
-    assert "dB" in page.locator("#waterfall-words").inner_text() and is_drawn(page, "#waterfall")
+    words = page.locator("#waterfall-words").inner_text()
+    assert "dB" in words and "acceleration, measured by the IMU, both directions" in words and is_drawn(page, "#waterfall")
 
 
 def is_drawn(page: Any, canvas: str) -> bool:

@@ -20,6 +20,7 @@ from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl, is_loopback
 from boom_twin.monitor.actions import ViewerActions
+from boom_twin.monitor.data.analyst import PREDICTION, SIGNALS
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.session_list import SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
@@ -135,7 +136,8 @@ def test_a_response_comes_once_as_long_as_the_posture_is_the_same() -> None:
 def test_the_spectrogram_since_before_the_page_was_opened_comes_once_and_then_what_is_new() -> None:
     async def talk(session: ClientSession, url: str) -> None:
         async with connect(session, url) as socket:
-            assert (await until(socket, "past"))["times"].tolist() == [10.0]
+            past = await until(socket, "past")
+            assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
             feed.rows(900)
             assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
             feed.store.clear()

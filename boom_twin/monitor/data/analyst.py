@@ -108,12 +108,13 @@ class Analyst:
         """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
         ends = STEP * np.arange(floor(after / STEP) + 1.0, floor(until / STEP) + 1.0)
         ends = ends[ends > SEGMENT]
-        table = self._feed.store.tables.get(PREDICTION.table)
+        signal = self._signal(ends[-1]) if len(ends) else PREDICTION
+        table = self._feed.store.tables.get(signal.table)
         if table is None or not len(ends):
             return None
         times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
-        found = await asyncio.to_thread(spectrogram, times, values.astype(float), ends)
-        return float(ends[-1]), pack(SPECTROGRAM, 0, ends, found)
+        found = await asyncio.to_thread(spectrogram, times, values[:, signal.columns].astype(float), ends)
+        return float(ends[-1]), pack(SPECTROGRAM, SIGNALS.index(signal), ends, found)
 
     def _signal(self, time: float) -> Signal:
         """The best acceleration of which the last segment before `time` (s) has values."""

@@ -51,10 +51,12 @@ const AS_MOUSE = { touchstart: "mousedown", touchmove: "mousemove", touchend: "m
 
 // One finger reads values and chooses a span as the mouse does; two are left to the browser.
 function listenToTouch(element) {
+  let last = 0; // uPlot takes a mouse that is said not to have moved for one that has not
   for (const [touch, mouse] of Object.entries(AS_MOUSE)) element.addEventListener(touch, event => {
     const finger = event.changedTouches[0];
     if (event.touches.length > 1 || !finger) return;
-    const { clientX, clientY, screenX, screenY } = finger, options = { clientX, clientY, screenX, screenY, bubbles: true, button: 0 };
+    const { clientX, clientY, screenX, screenY } = finger, options = { clientX, clientY, screenX, screenY, movementX: clientX - last, bubbles: true, button: 0 };
+    last = clientX;
     if (touch === "touchstart") for (const kind of ["mouseenter", "mousemove"]) element.dispatchEvent(new MouseEvent(kind, options));
     element.dispatchEvent(new MouseEvent(mouse, options));
   }, { passive: true });

@@ -7,6 +7,7 @@ const LOWEST = 0.25, HIGHEST = 50; // Hz
 const COLUMNS = 300; // of the spectrogram
 const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: STEP and FREQUENCIES of boom_twin/monitor/data/spectrum.py
 const RANGE = 60; // dB from dark to bright
+const SOURCES = ["measured by the IMU", "estimated from all sensors", "predicted"]; // SIGNALS of boom_twin/monitor/data/analyst.py
 
 export class SpectrumTab {
   constructor(connection, htmlTable) {
@@ -30,9 +31,9 @@ export class SpectrumTab {
     this.isNew = true;
   }
 
-  addColumns({ times, values, rows, columns }) {
+  addColumns({ table: source, times, values, rows, columns }) {
     const decibels = row => Float32Array.from({ length: columns }, (_, c) => 10 * Math.log10(Math.max(values[c * rows + row], 1e-30)));
-    this.history = [...this.history, ...Array.from(times, (time, row) => ({ time, levels: decibels(row) }))].slice(-COLUMNS);
+    this.history = [...this.history, ...Array.from(times, (time, row) => ({ time, source, levels: decibels(row) }))].slice(-COLUMNS);
     this.isNew = true;
   }
 
@@ -76,6 +77,12 @@ export class SpectrumTab {
     this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `${this.lines.source}, last 40 s, segments of 8 s; ${moved}${words}`);
   }
 
+  // Whose density it is, in the order of time.
+  sources() {
+    const changes = this.history.filter(({ source }, i) => i === 0 || source !== this.history[i - 1].source);
+    return changes.map(({ source, time }, i) => i === 0 ? SOURCES[source] : `from ${time.toFixed(0)} s ${SOURCES[source]}`).join(", ");
+  }
+
   // One pixel for every cell, drawn large.
   drawSpectrogram() {
     if (!this.history.length) return;
@@ -97,7 +104,7 @@ export class SpectrumTab {
     this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ mode ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
     context.fillText(`${(this.history[0].time - WIDTH).toFixed(0)} s`, left, height - 6);
     context.fillText(`${this.history.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
-    document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
+    document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, ${this.sources()}, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
   }
 }
 
