@@ -44,13 +44,14 @@ def released(scene, angles):
     state, work = start.state, start.work
     set_undeformed(plan, state, np.asarray(angles, dtype=float))
     place(plan.tables, state, work)
-    state.history[X] = work.position
+    state.history[X] = begin = work.position.copy()
     weights = new_weights(DEPTH)
-    weights[HAT, X] = weights[X, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
+    weights[HAT, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
     instant = Scheme(np.int64(GENERALISED_ALPHA), 0.0, 0.0, 2.0 / INSTANT**2, 0.0, weights)
     still = np.zeros(plan.joints)
     status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None, False)
     assert status == 0
+    state.history[X] = begin
     return start
 
 
