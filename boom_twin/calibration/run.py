@@ -11,7 +11,7 @@ import numpy as np
 from ..bag.session_model import Mapped, mapping_of
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
-from ..errors import BagError, UsageError
+from ..errors import BagError, SolverError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Mount, Stream
@@ -184,7 +184,10 @@ def _fitted(
     if quiet.misfit <= LOADED:
         return problem, quiet
     finer = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.loaded_length, 0.5), parts.channels, settings)
-    loaded = fitted_under_load(finer, quiet, tell)
+    try:
+        loaded = fitted_under_load(finer, quiet, tell)
+    except SolverError:  # then the misfit stays, and is remarked on
+        return problem, quiet
     return problem, loaded if loaded.misfit <= LOADED else quiet
 
 

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import SolverError
 from ..estimation.load_spectrum import TipLoad, TipLoadFinder
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
@@ -65,6 +66,11 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
         That without.
     tell : callable
         Called before every pass over the sessions.
+
+    Raises
+    ------
+    SolverError
+        The filter has no usable numbers for this boom, as for a single stiff section.
     """
     weight = explain(problem.scene).mass * float(np.hypot(*problem.scene.gravity))
     count = 0
@@ -180,5 +186,7 @@ def _pass(
     for i, other in found.items():
         if i is not None:
             white[i] = (other.values[:, 0] - values[:, 0]) / TRIAL
+    if not (np.isfinite(values).all() and (variances > 0.0).all()):
+        raise SolverError("the filter of the unknown load lost its digits on this boom.")
     root = np.sqrt(variances)
     return Pass(values[:, 0] / root, white / root, loads)

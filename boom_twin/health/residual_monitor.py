@@ -29,7 +29,7 @@ from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
-LEAST_SPAN, SWINGS = 3.0, 5.0  # s that evidence has to take for an alarm if it is obvious; and else: a pump's stroke, a gust
+LEAST_SPAN, SWINGS = 3.0, 4.5  # s that evidence has to take for an alarm if it is obvious; and else: a pump's stroke, a gust
 UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is an alarm
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
