@@ -78,7 +78,7 @@ class Viewer:
 
     async def serve(self) -> None:
         """Send and hear, until one of the two ends."""
-        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectrum, self._receive)]
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_responses, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
@@ -174,9 +174,9 @@ class Viewer:
         times = table.rows(row, row + 1)[0]
         return float(times[0]) if len(times) else float("inf")
 
-    async def _send_spectrum(self) -> None:
+    async def _send_spectra(self) -> None:
         while not self._socket.closed:
-            position = self._feed.store.newest if self._playback is None else self._playback.position
+            position = self._position
             found = await self._analyst.spectrum_at(position)
             if found is not None and self._tables:
                 lines, block = found
@@ -185,7 +185,6 @@ class Viewer:
             if (load := await self._analyst.load_at(position)) is not None:
                 await self._send_text(load)
             await self._send_spectrogram(position)
-            await self._send_response(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
@@ -196,14 +195,21 @@ class Viewer:
             self._spectrogram_until, block = found
             await self._socket.send_bytes(block)
 
-    async def _send_response(self, position: float) -> None:
+    async def _send_responses(self) -> None:
         """The response in the posture shown, where it is another than the page has."""
-        found = await self._analyst.response_at(position)
-        if found is not self._response:
-            self._response, (text, block) = found, response_messages(found)
-            await self._send_text(text)
-            if block:
-                await self._socket.send_bytes(block)
+        while not self._socket.closed:
+            found = await self._analyst.response_at(self._position)
+            if found is not self._response:
+                self._response, (text, block) = found, response_messages(found)
+                await self._send_text(text)
+                if block:
+                    await self._socket.send_bytes(block)
+            await asyncio.sleep(SPECTRUM_PERIOD)
+
+    @property
+    def _position(self) -> float:
+        """The session's time that is shown, s."""
+        return self._feed.store.newest if self._playback is None else self._playback.position
 
     async def _send_text(self, message: dict[str, Any]) -> None:
         await self._socket.send_str(dump(message))

@@ -43,7 +43,7 @@ MATCH = 0.2
 
 
 class Analyst:
-    """Looks at one feed; one look at a time, because the model's workspace is one.
+    """Looks at one feed; one look of a kind at a time, because the model's workspace is one.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Analyst:
         self._feed = feed
         self._modes: ModeList | None = None
         self._responses: ResponseList | None = None
-        self._turn = asyncio.Lock()
+        self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
         self._firsts: dict[int, tuple[float, float]] = {}
 
@@ -85,8 +85,11 @@ class Analyst:
             return self._known[1]
 
     async def response_at(self, time: float) -> TipResponses:
-        """How the tip answers to loads in the posture at `time` (s); the same object while the boom has not moved."""
-        async with self._turn:
+        """How the tip answers to loads in the posture at `time` (s); the same object while the boom has not moved.
+
+        It has a boom of its own, so that no spectrum waits for it: the first of an installation compiles for half a minute.
+        """
+        async with self._response_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
             if scene is None:
                 return UNKNOWN_SCENE

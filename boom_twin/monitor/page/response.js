@@ -6,7 +6,7 @@ import { markFrequencies, oneDigit } from "./spectrum.js";
 export class ResponseTab {
   constructor(connection) {
     this.lines = { natural: [], source: "" };
-    this.loads = { names: [], trouble: "waiting for the model" };
+    this.loads = { names: [], trouble: "waiting for the model (the first time on a computer, half a minute)" };
     connection.addEventListener("lines", event => { if (event.detail.source !== this.lines.source) this.rebuild(); this.lines = event.detail; this.isNew = true; });
     connection.addEventListener("loads", event => { if (event.detail.names.length !== this.loads.names.length) this.rebuild(); this.loads = event.detail; this.isNew = true; });
     connection.addEventListener("response", event => { this.response = event.detail; this.isNew = true; });
