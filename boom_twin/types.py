@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal
@@ -418,6 +419,8 @@ class Health:
         How near each channel is to an alarm, which is at 1.
     tip_sigmas : ndarray, shape (2,)
         Standard deviation of the predicted tip's x and y, m: strokes' noise, and what model and sensors may be off by.
+    noise : dict
+        By the name of its setting (``angle_sigma``), how many times the stated noise most sensors of a stream have, at least 1.
     """
 
     stamp: int
@@ -425,6 +428,7 @@ class Health:
     names: tuple[str, ...]
     levels: Array
     tip_sigmas: Array
+    noise: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import numpy as np
 from ..config.settings import Thresholds
 from ..estimation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, values_of
+from ..health.sensor_monitor import noise_as_text
 from ..types import SECOND, Alarm, Array, Estimate, Health, Report
 from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 
@@ -212,12 +213,13 @@ class HealthWatch:
 
     def __init__(self) -> None:
         self._judge = ComponentJudge("health")
-        self._alarms = Alarms()
+        self._alarms, self._noise = Alarms(), dict[str, float]()
         self.has_news = False
 
     def took(self, health: Health) -> None:
         """Go on with what the twin tells."""
         before = len(self._alarms.all)
+        self._noise = dict(health.noise)
         self._alarms.take(health)
         self.has_news |= len(self._alarms.all) > before
 
@@ -248,6 +250,10 @@ class HealthWatch:
             judge.fault(level_of(alarm), told_of(alarm))
             for key, value in {"channel": alarm.channel, **values_of(alarm)}.items():
                 judge.note(f"{number} {key}", value)
+        for name, times in self._noise.items():
+            judge.note(f"noise_over_{name}", times)
+        for told in noise_as_text(self._noise):
+            judge.fault(Level.WARN, told)
         return judge.finish("no alarm")
 
 

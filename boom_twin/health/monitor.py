@@ -26,6 +26,8 @@ LOUDEST, NOISE_SHARE = 100.0, 0.05
 """Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
 CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
+MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
+"""Those whose noise is told: what an IMU reads of vibration is not told from noise."""
 
 
 class HealthMonitor:
@@ -116,7 +118,8 @@ class HealthMonitor:
         for monitor in self._sensors.values():
             alarms += monitor.alarms
         alarms += self.residuals.alarms
-        return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas())
+        measured = {SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
+        return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
 
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,7 +48,9 @@ Flags = NDArray[np.bool_]
 
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
 JUMP = 10.0  # likewise, by which readings change at once and for good
-NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is stated; time (s) over which it is taken
+NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
+USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
+MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
@@ -125,6 +127,12 @@ class SensorCheck:
         self._run, self._since = np.zeros(count, dtype=np.int64), np.zeros(count)
         self._heard = np.full(count, np.nan)
         self._power, self._missing = np.full(count, np.nan), np.zeros(count)
+        self._usual2 = self._lasting2 = self._sigma**2
+
+    @property
+    def noise(self) -> float:
+        """Times the noise that is stated, as it is with most channels, lately."""
+        return math.sqrt(self._lasting2) / self._sigma
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
@@ -152,7 +160,7 @@ class SensorCheck:
         sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
         findings = SensorFindings(
             stuck=self._stuck(times[2:], all_raw[2:]),
-            noisy=self._power > (NOISY * self._sigma) ** 2,
+            noisy=self._power > NOISY**2 * self._usual2,
             spikes=self._spikes(steps, noise) if sudden else np.zeros(count, dtype=bool),
             jumped=self._jumps(times, all_raw, left, steps, noise) if sudden else np.zeros(count),
             silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
@@ -187,6 +195,17 @@ class SensorCheck:
         fresh = np.isnan(self._power)
         mixed = np.where(fresh, np.minimum(power, self._sigma**2), self._power + share * (power - self._power))
         self._power = np.where(np.isnan(power), self._power, mixed)
+        self._usual2 = self._usual_power()
+        self._lasting2 += min(1.0, max(span, 1e-3) / USUAL_WINDOW) * (self._usual2 - self._lasting2)
+
+    def _usual_power(self) -> float:
+        """Of the noise, as it is with most channels: a sensor is faulty that is noisier than its like, not than a data sheet.
+
+        Between what is stated and `NOISY` times that; of a single channel what is stated.
+        """
+        known, stated = np.sort(self._power[np.isfinite(self._power)]), self._sigma**2
+        middle = float(known[(len(known) - 1) // 2]) if len(known) > 1 else stated
+        return min(max(middle, stated), NOISY**2 * stated)
 
     def _lacks(self, raw: Array, span: float, whole: bool) -> Flags:
         """Channels of which too many readings are missing, in messages that come."""
@@ -240,12 +259,21 @@ def repeats(sigma: float, resolution: float) -> int:
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 TOLD = {
     "stuck": "repeats one reading again and again",
-    "noise": "is noisier than stated",
+    "noise": "is noisier than its like and than stated",
     "spikes": "has single readings far from their neighbours",
     "jump": "jumped at once, which no boom can",
     "dropout": "gives no readings",
     "range": "reads out of its range",
 }
+
+
+def noise_as_text(noise: Mapping[str, float]) -> list[str]:
+    """A warning for every stream whose sensors are noisier than stated, most of them; `noise` as in `Health.noise`."""
+    return [
+        f"most sensors are {times:.1f} times as noisy as {name} states; judgement allows for it: set {name} to what they have"
+        for name, times in noise.items()
+        if times > MISSTATED
+    ]
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -157,6 +157,8 @@ class Recording:
         Samples that were not used.
     is_judged : bool
         Whether the rig's health was.
+    noise : dict
+        See `Health.noise`; the newest.
     totals : SessionTotals
         Of all stretches that are complete.
     """
@@ -177,6 +179,7 @@ class Recording:
         self.clock_sets: list[tuple[int, int]] = []
         self.refused = 0
         self.is_judged = False
+        self.noise: Mapping[str, float] = {}
         self.totals = SessionTotals(joints)
 
     def add(self, found: ReportBlock | Report) -> None:
@@ -220,6 +223,7 @@ class Recording:
 
     def _add_health(self, health: Health) -> None:
         self.is_judged = True
+        self.noise = health.noise
         self._health.append(health)
         self._alarms.take(health)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import __version__
 from ..analysis.bending_stress import BOX
+from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
 from ..plots import AlarmSpan, History
@@ -103,6 +104,7 @@ def _head(subject: Subject) -> list[str]:
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
+        *(("noise", told) for told in noise_as_text(summary.get("noise_over_stated", {}))),
     ]
     scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
     return [

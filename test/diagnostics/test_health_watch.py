@@ -31,6 +31,17 @@ def test_without_alarms() -> None:
     assert not watch.has_news and watch.acknowledge() == "no alarm has ended"
 
 
+def test_a_stream_noisier_than_stated_is_one_warning() -> None:
+    watch = HealthWatch()
+    watch.took(replace(health(1), noise={"stroke_sigma": 1.2, "angle_sigma": 2.04}))
+    found = status(watch)
+    assert found.level == Level.WARN and found.values["noise_over_angle_sigma"] == 2.04
+    assert found.message.startswith("most sensors are 2.0 times as noisy as angle_sigma states")
+    assert "stroke" not in found.message
+    watch.took(health(2))
+    assert status(watch).level == Level.OK
+
+
 def test_the_worst_is_told_first() -> None:
     watch = HealthWatch()
     watch.took(health(17, OPEN, BIAS))
