@@ -86,7 +86,7 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
 
 @dataclass(frozen=True)
 class SensorFindings:
-    """By channel, in one block; shape (channels,) each."""
+    """By channel, in one block; shape (channels,) each: findings, steps of jumps, and how far the newest readings are off."""
 
     stuck: Flags
     noisy: Flags
@@ -94,6 +94,7 @@ class SensorFindings:
     jumped: Array
     silent: Flags
     outside: Flags
+    level: Array
 
     def by_kind(self) -> dict[str, Flags]:
         """In the words of alarms."""
@@ -165,13 +166,14 @@ class SensorCheck:
             jumped=self._jumps(times, all_raw, left, steps, noise) if sudden else np.zeros(count),
             silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
             outside=((raw < self._low) | (raw > self._high)).sum(axis=0) > 0.5 * len(raw),
+            level=left[-1],
         )
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
         return findings
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
         none = np.zeros(count, dtype=bool)
-        return SensorFindings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none)
+        return SensorFindings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none, np.full(count, np.nan))
 
     def _spikes(self, steps: Array, noise: Array) -> Flags:
         """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next.
@@ -281,6 +283,8 @@ class _Fault:
     alarm: Alarm
     seen: int
     offset: float = 0.0
+    before: float = math.nan
+    """Of a jump: how far the reading was off before it."""
 
 
 class SensorMonitor:
@@ -320,7 +324,8 @@ class SensorMonitor:
             for channel in np.flatnonzero(flags).tolist():
                 if kind == "jump" and self._is_wild(channel):
                     continue
-                news += self._seen(channel, kind, start, end, findings.jumped)
+                jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
+                news += self._seen(channel, kind, start, end, jump)
         for key, fault in list(self._faults.items()):
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
@@ -328,20 +333,22 @@ class SensorMonitor:
         return news
 
     def _is_wild(self, channel: int) -> bool:
-        """Whether the sensor has a fault in which jumps mean nothing more."""
-        return any((channel, kind) in self._faults for kind in ("noise", "spikes"))
+        """Whether jumps mean nothing more: the sensor has another fault, out of which it jumps when it recovers."""
+        return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
 
-    def _seen(self, channel: int, kind: str, start: int, end: int, jumped: Array) -> list[Alarm]:
+    def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None) -> list[Alarm]:
+        """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""
         key = (channel, kind)
         fault = self._faults.get(key)
-        size = float(jumped[channel]) if kind == "jump" else 0.0
+        size, level = jump or (0.0, math.nan)
         if fault is not None:
-            if kind == "jump" and end - fault.seen > SETTLED // 10 and abs(fault.offset + size) < 0.3 * abs(fault.offset):
+            off = min(abs(fault.offset + size), abs(level - fault.before)) if math.isfinite(level) else abs(fault.offset + size)
+            if jump and end - fault.seen > SETTLED // 10 and off < 0.3 * abs(fault.offset):
                 del self._faults[key]
                 return [replace(fault.alarm, until=end)]
             fault.seen = end
             return []
         name = self._names[channel]
         told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._sensors.unit}" if size else "")
-        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size)
+        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size, level - size)
         return [self._faults[key].alarm]

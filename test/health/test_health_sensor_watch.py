@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorCheck, SensorFindings, SensorMonitor
@@ -10,14 +12,16 @@ from boom_twin.types import SENSORS, Stream
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
 
-def findings(channel: int | None = None, kind: str = "", jump: float = 0.0) -> SensorFindings:
+def findings(channel: int | None = None, kind: str = "", jump: float = 0.0, level: float = math.nan) -> SensorFindings:
     flags = {each: np.zeros(2, dtype=bool) for each in TOLD}
     jumped = np.zeros(2)
     if kind == "jump":
         jumped[channel] = jump
     elif kind:
         flags[kind][channel] = True
-    return SensorFindings(flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"])
+    return SensorFindings(
+        flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"], np.full(2, level)
+    )
 
 
 class Watched:
@@ -78,6 +82,30 @@ def test_jumps_of_a_wild_sensor_mean_nothing_more():
         watched.take(findings(0, kind))
         assert watched.take(findings(0, "jump", 0.01)) == []
         assert [alarm.channel for alarm in watched.take(findings(1, "jump", 0.01))] == ["joint_2"]
+
+
+def test_a_frozen_sensor_that_lives_again_is_taken_back():
+    """It jumps from where it was frozen to where the boom has gone meanwhile."""
+    watched = Watched()
+    watched.take(findings(0, "stuck"))
+    watched.rest(SETTLED // 2)
+    assert watched.take(findings(0, "jump", 0.05, level=0.0)) == []
+    (ended,) = watched.rest(SETTLED)
+    assert ended.kind == "stuck" and not watched.watch.masked.any()
+
+
+def test_a_jump_ends_where_the_reading_is_right_again():
+    """After a jump to a reading that repeats: the boom has moved when it comes back, so the steps are of different size."""
+    watched = Watched()
+    watched.take(findings(0, "jump", -0.5, level=-0.501))
+    watched.take(findings(0, "stuck"))
+    watched.rest(SETTLED // 2)
+    (ended,) = watched.take(findings(0, "jump", 0.8, level=0.002))
+    assert ended.kind == "jump"
+    assert [alarm.kind for alarm in watched.rest(SETTLED)] == ["stuck"] and not watched.watch.masked.any()
+    watched.take(findings(0, "jump", -0.5, level=-0.501))
+    watched.rest(SETTLED)
+    assert watched.take(findings(0, "jump", 0.8, level=0.299)) == [], "elsewhere, but not right"
 
 
 def test_two_faults_of_one_sensor():
