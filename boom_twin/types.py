@@ -420,7 +420,7 @@ class Health:
     tip_sigmas : ndarray, shape (2,)
         Standard deviation of the predicted tip's x and y, m: strokes' noise, and what model and sensors may be off by.
     noise : dict
-        By the name of its setting (``angle_sigma``), how many times the stated noise most sensors of a stream have, at least 1.
+        How many times the stated noise most sensors of a stream have, at least 1; ``noise_over_`` and the name of its setting.
     """
 
     stamp: int

@@ -153,7 +153,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines.append(f"load at the tip    {summary['tip_load']}")
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
-    lines += [f"noise              {told}" for told in noise_as_text(summary.get("noise_over_stated", {}))]
+    lines += [f"noise              {told}" for told in noise_as_text(summary)]
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
 

@@ -251,7 +251,7 @@ class HealthWatch:
             for key, value in {"channel": alarm.channel, **values_of(alarm)}.items():
                 judge.note(f"{number} {key}", value)
         for name, times in self._noise.items():
-            judge.note(f"noise_over_{name}", times)
+            judge.note(name, times)
         for told in noise_as_text(self._noise):
             judge.fault(Level.WARN, told)
         return judge.finish("no alarm")

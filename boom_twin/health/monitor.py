@@ -14,7 +14,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels
 from .baseline import JUDGED, Baseline, judged_channels
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import SensorCheck, SensorMonitor, bends2, sensor_ranges
+from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, bends2, sensor_ranges
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0
@@ -118,7 +118,7 @@ class HealthMonitor:
         for monitor in self._sensors.values():
             alarms += monitor.alarms
         alarms += self.residuals.alarms
-        measured = {SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
+        measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
 
     def _judge(self, block: Block) -> list[Alarm]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its nei
 JUMP = 10.0  # likewise, by which readings change at once and for good
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
+NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
@@ -269,11 +271,12 @@ TOLD = {
 }
 
 
-def noise_as_text(noise: Mapping[str, float]) -> list[str]:
-    """A warning for every stream whose sensors are noisier than stated, most of them; `noise` as in `Health.noise`."""
+def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
+    """A warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
+    found = {name.removeprefix(NOISE_OVER): times for name, times in figures.items() if name.startswith(NOISE_OVER)}
     return [
         f"most sensors are {times:.1f} times as noisy as {name} states; judgement allows for it: set {name} to what they have"
-        for name, times in noise.items()
+        for name, times in found.items()
         if times > MISSTATED
     ]
 

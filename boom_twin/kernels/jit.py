@@ -61,6 +61,12 @@ def _folder() -> Path | None:
     return folder
 
 
+def could_be_kept(kernel: Kernel) -> bool:
+    """Whether compiled code of `kernel` is kept on this computer, and is not there yet; the first use makes it."""
+    folder, function = cache_folder(), kernel.py_func
+    return fault_of(folder) is None and not any(folder.glob(f"{function.__module__}.{function.__qualname__}-*{SUFFIX}"))
+
+
 @cache
 def _tell_not_kept(reason: str) -> None:
     logging.getLogger("boom_twin").warning(NOT_KEPT, reason)

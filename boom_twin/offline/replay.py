@@ -415,7 +415,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         **_load(totals.load.load),
         **_pins(recording, twin),
         **_steps(twin),
-        **({"noise_over_stated": dict(recording.noise)} if recording.is_judged else {}),
+        **recording.noise,
         "output_sha256": sha256_of(file),
         "alarms": _alarms(recording, recording.first),
     }

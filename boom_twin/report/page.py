@@ -104,7 +104,7 @@ def _head(subject: Subject) -> list[str]:
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
-        *(("noise", told) for told in noise_as_text(summary.get("noise_over_stated", {}))),
+        *(("noise", told) for told in noise_as_text(summary)),
     ]
     scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
     return [

@@ -33,7 +33,7 @@ def test_without_alarms() -> None:
 
 def test_a_stream_noisier_than_stated_is_one_warning() -> None:
     watch = HealthWatch()
-    watch.took(replace(health(1), noise={"stroke_sigma": 1.2, "angle_sigma": 2.04}))
+    watch.took(replace(health(1), noise={"noise_over_stroke_sigma": 1.2, "noise_over_angle_sigma": 2.04}))
     found = status(watch)
     assert found.level == Level.WARN and found.values["noise_over_angle_sigma"] == 2.04
     assert found.message.startswith("most sensors are 2.0 times as noisy as angle_sigma states")

@@ -41,6 +41,7 @@ COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESI
 ORDERED = (Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD, Output.TIP_UNCERTAINTY, Output.HEALTH)
 """What depends on the order in which samples of several streams are taken. Where DDS sends a lost packet again, to the recorder
 or to the node, the two have not seen the same order; that their bits are equal where they have is for `test_ros_live`."""
+JUDGED = (Output.HEALTH, Output.TIP_UNCERTAINTY)
 NODES = ("boom_twin", "boom_twin_recorder", "boom_twin_monitor")
 SLOWLY = ("--namespace", "front", "--rate", "0.01", "--wait", "0")
 PLAYED = ("cylinder_strokes", "joint_angles", "tip_imu", "rosout", "parameter_events")
@@ -197,6 +198,14 @@ def published(path: Path, topics: Topics, key: Output) -> list[tuple[int, bytes]
     return [(stamp_of(each), bytes(jazzy().serialize_cdr(msg, TYPES[key]))) for each, msg in zip(holders, found, strict=True)]
 
 
+def looks_left_out(path: Path, topics: Topics) -> int:
+    """Looks at the rig's health that the node left out, by its own words."""
+    states = [msg for _, _, msg in read(scan(path), {topics.outputs[Output.DIAGNOSTICS].absolute: TYPES[Output.DIAGNOSTICS]})]
+    pairs = [pair for msg in states for status in msg.status for pair in status.values]
+    assert any(pair.key == "looks at health left_out" for pair in pairs)
+    return sum(int(float(pair.value)) for pair in pairs if pair.key == "looks at health left_out")
+
+
 @pytest.mark.parametrize("name", BOOMS)
 def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, Any], name: str, tmp_path: Path) -> None:
     """Bit for bit, of the strokes that the node answered; what depends on the order of arrival has its stamps."""
@@ -215,6 +224,8 @@ def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, An
         live = published(path, topics, key)
         assert len(live) > (0 if key in RARE else 100)
         replayed = published(tmp_path / "out" / "bag", topics, key)
+        if key in JUDGED and looks_left_out(path, topics):
+            continue  # a node that is overloaded judges health later, and says so; a replay never is
         if key in ORDERED:
             assert [stamp for stamp, _ in live] == [stamp for stamp, _ in replayed], key
         else:

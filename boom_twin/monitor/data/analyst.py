@@ -12,7 +12,7 @@ import numpy as np
 from ...estimation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .present_posture import MOVED, ModeList, ResponseList, TipResponses
+from .present_posture import MOVED, ModeList, ResponseList, TipResponses, compile_beside
 from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
 from .topic_rows import ESTIMATE
 
@@ -87,7 +87,7 @@ class Analyst:
     async def response_at(self, time: float) -> TipResponses:
         """How the tip answers to loads in the posture at `time` (s); the same object while the boom has not moved.
 
-        It has a boom of its own, so that no spectrum waits for it: the first of an installation compiles for half a minute.
+        It has a boom of its own, so that no spectrum waits for it: the first on a computer compiles for half a minute.
         """
         async with self._response_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
@@ -95,7 +95,9 @@ class Analyst:
                 return UNKNOWN_SCENE
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
-            self._responses = self._responses or ResponseList(scene)
+            if self._responses is None:
+                await compile_beside()
+                self._responses = ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
 
     async def load_at(self, time: float) -> dict[str, Any] | None:

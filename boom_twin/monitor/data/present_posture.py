@@ -5,7 +5,10 @@ Worked out anew only where the boom has moved, in a thread beside the server and
 
 from __future__ import annotations
 
+import asyncio
+from asyncio.subprocess import DEVNULL
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -16,8 +19,12 @@ from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.modal import natural_modes
 from ...compiler.compile import compile_scene
 from ...errors import BoomTwinError
-from ...scene.kinematics import joint_angles_of_strokes
+from ...kernels.jit import could_be_kept
+from ...kernels.transfer.frequency_response import harmonic_response
+from ...scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from ...scene.load import load_scene
 from ...scene.schema import Scene
+from ...system.child_process import python_command
 from ...types import Array
 
 MOVED = 0.005
@@ -109,3 +116,23 @@ class ResponseList(PresentPosture[TipResponses]):
             return TipResponses(trouble=str(error))
         names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
         return TipResponses(names, FREQUENCIES, np.column_stack(columns))
+
+
+async def compile_beside() -> None:
+    """Have a process of its own compile what responses need, if that was never done on this computer.
+
+    It takes half a minute, in which a compiler in a thread of the server would leave it little of the interpreter's lock.
+    """
+    if not could_be_kept(harmonic_response):
+        return
+    process = await asyncio.create_subprocess_exec(*python_command(__name__), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL)
+    try:
+        await process.wait()
+    finally:
+        with suppress(ProcessLookupError):
+            process.kill()
+
+
+if __name__ == "__main__":
+    example = load_scene()
+    ResponseList(example).at(strokes_of_posture(example, next(iter(example.postures))).tolist())
