@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -287,10 +288,25 @@ def read_state(path: Path) -> InitialState:
     """A state that `write_state` kept; UsageError if the file has another form."""
     try:
         with open_received(path) as file:
-            content = json.load(file)
+            content = json.load(file, object_pairs_hook=_without_repetition)
         pairs = content["coordinates"]
-        values = np.array(list(pairs.values()), float).reshape(len(pairs), 2)
-        pins = np.array(content["pins"], float).reshape(-1, COLUMNS)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{path}: {error}. Give a file that `boom_twin simulate --save-state` wrote.") from None
+        values = np.array([_numbers(name, row, 2) for name, row in pairs.items()]).reshape(-1, 2)
+        pins = np.array([_numbers(f"pins[{i}]", row, COLUMNS) for i, row in enumerate(content["pins"])]).reshape(-1, COLUMNS)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        told = f"no {error}" if isinstance(error, KeyError) else error
+        raise UsageError(f"{path}: {told}. Give a file that `boom_twin simulate --save-state` wrote.") from None
     return InitialState(tuple(pairs), values[:, 0], values[:, 1], pins)
+
+
+def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(name for name in names if names.count(name) > 1)} is given twice")
+    return found
+
+
+def _numbers(name: str, row: Any, count: int) -> list[float]:
+    if not (isinstance(row, list) and len(row) == count and all(type(each) in (int, float) for each in row)):
+        raise ValueError(f"{name} = {str(row)[:60]}: must be {count} numbers")
+    return [float(each) for each in row]

@@ -1,7 +1,9 @@
 """Steady state under a periodic load at the tip: its Fourier series through the frequency response.
 
-The load is sampled at `SAMPLES` even instants of a period; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest
-is answered by the boom linearised at rest, its mean by the static limit, and the answers are added up in time.
+The load stands for `SAMPLES` even instants of a period, of a long period as many as its harmonics up to `HIGHEST` need; every
+harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean by the static
+limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
+(`polygon_series`): instants of it alone would take what is faster than half their rate for something slower.
 """
 
 from __future__ import annotations
@@ -18,6 +20,14 @@ from ..types import Array, ComplexArray
 from .frequency_response import LinearisedBoom, linearised_boom
 
 SAMPLES = 2048
+HIGHEST = 200.0
+"""Hz; far above what moves a boom."""
+PERIODS = (0.01, 2000.0)
+"""s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time."""
+LARGEST = 1e7
+"""N; far above what any boom bears."""
+MOST_TERMS = 2e9
+"""Rows times harmonics that are summed one by one, where rows are not even in time."""
 NEGLIGIBLE = 1e-6
 
 
@@ -58,13 +68,13 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
             f"pump change-over = {change_over:g} s: at {frequency:g} Hz it must be at most half a period, "
             f"{0.5 / frequency:g} s. Give less."
         )
-    times = np.arange(SAMPLES) / (SAMPLES * frequency)
+    times = _instants(1.0 / frequency)
     pulses = height * pump_pulses(times, frequency, change_over)
     return PeriodicLoad(1.0 / frequency, pulses[:, None] * upward(scene.base.inclination))
 
 
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
-    """A load that goes straight from row to row; the last row ends the period with the force of the first.
+    """A load that goes straight from row to row, with harmonics up to `HIGHEST`; its last row is the first of the next period.
 
     Parameters
     ----------
@@ -78,8 +88,15 @@ def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
     UsageError
         Fewer than three rows, a value that is not finite, times that do not increase, ends that differ.
     """
-    if len(times) < 3 or not (np.isfinite(times).all() and np.isfinite(forces).all()):
+    if len(times) < 3:
         raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
+    usable = np.isfinite(times) & (np.abs(forces) <= LARGEST).all(axis=1)
+    if not usable.all():
+        row = int(np.flatnonzero(~usable)[0])
+        raise UsageError(
+            f"row {row + 1} of the load: t_s = {times[row]:g} s, fx_N = {forces[row, 0]:g}, fy_N = {forces[row, 1]:g}: times "
+            f"must be finite, forces at most {LARGEST:g} N. Put it right."
+        )
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
         raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the load: not after row {row + 1}. Sort the rows.")
@@ -89,8 +106,60 @@ def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
             "The last row ends the period: give it the force of the first."
         )
     period = float(times[-1] - times[0])
-    at = times[0] + period * np.arange(SAMPLES) / SAMPLES
-    return PeriodicLoad(period, np.stack([np.interp(at, times, column) for column in forces.T], axis=1))
+    count = len(_instants(period))
+    series = polygon_series(times, forces, count // 2)
+    return PeriodicLoad(period, np.fft.irfft(count * series, count, axis=0))
+
+
+def _instants(period: float) -> Array:
+    """Even instants of a period (s), an even number of them; UsageError if it is too short or too long."""
+    low, high = PERIODS
+    if not low <= period <= high:
+        raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
+    count = 2 * max(SAMPLES // 2, math.ceil(HIGHEST * period))
+    return period * np.arange(count) / count
+
+
+def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
+    """Fourier coefficients 0 to `count` - 1 of what goes straight from row to row and repeats, exactly.
+
+    Its second derivative is a sum of impulses, as large as its slope changes at the rows, which gives
+    c_k = sum_j ds_j e^(-i w_k t_j) / (T (i w_k)^2), w_k = 2 pi k / T.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+        s, increasing; the last ends the period.
+    values : ndarray, shape (m, columns)
+        The last as the first.
+    count : int
+
+    Returns
+    -------
+    ndarray of complex, shape (count, columns)
+
+    Raises
+    ------
+    UsageError
+        Rows uneven in time, and too many of them for so many coefficients.
+    """
+    period, rows = times[-1] - times[0], len(times) - 1
+    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+    changes = slopes - np.roll(slopes, 1, axis=0)
+    at, numbers = (times[:-1] - times[0]) / period, np.arange(1, count)
+    found = np.zeros((count, values.shape[1]), complex)
+    found[0] = np.trapezoid(values, times, axis=0) / period
+    if np.allclose(at * rows, np.arange(rows), rtol=0.0, atol=1e-9 * rows):
+        impulses = np.fft.fft(changes, axis=0)[numbers % rows]
+    elif rows * count <= MOST_TERMS:
+        parts = np.array_split(numbers, 1 + rows * count // 10**6)
+        impulses = np.concatenate([np.exp(-2j * math.pi * np.outer(part, at)) @ changes for part in parts])
+    else:
+        raise UsageError(
+            f"load: {rows} rows that are not even in time are too many for a period of {period:g} s. Make them even."
+        )
+    found[1:] = impulses * (period / (2j * math.pi * numbers[:, None]) ** 2)
+    return found
 
 
 @dataclass(frozen=True)

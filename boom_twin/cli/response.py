@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..scene import Scene
@@ -21,6 +22,8 @@ from .statics import numbers
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
 
+Flags = NDArray[np.bool_]
+LOW, HIGH, POINTS, RATES, STEPS = 0.05, 30.0, 300, (0.2, 1.2, 201), 1
 FAR = 0.05  # of the reach: swings beyond are not in proportion to the load
 FAR_WORN = 1e-4  # m, the same on pins with clearance
 
@@ -51,11 +54,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     pump = "steady state under pump pulses: rate (Hz), height (N), change-over (s, default 0.1); vertical, up"
     load.add_argument("--pump", type=_pump, metavar="RATE:HEIGHT[:S]", help=pump)
     load.add_argument("--load", metavar="CSV", help="steady state under this force at the tip: t_s,fx_N,fy_N, one period")
-    parser.add_argument("--from", dest="low", type=float, default=0.05, metavar="F", help="lowest frequency, Hz (default 0.05)")
-    parser.add_argument("--to", dest="high", type=float, default=30.0, metavar="F", help="highest frequency, Hz (default 30)")
-    parser.add_argument("--points", type=int, default=300, metavar="N", help="frequencies, evenly in their logarithm (300)")
-    parser.add_argument("--rates", type=_rates, default=(0.2, 1.2, 201), metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
-    parser.add_argument("--steps", type=int, default=1, metavar="N", help="of a map, from each posture to the next (default 1)")
+    parser.add_argument("--from", dest="low", type=float, default=LOW, metavar="F", help="lowest frequency, Hz (default 0.05)")
+    parser.add_argument("--to", dest="high", type=float, default=HIGH, metavar="F", help="highest frequency, Hz (default 30)")
+    parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
+    parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
+    parser.add_argument(
+        "--steps",
+        type=int,
+        default=STEPS,
+        metavar="N",
+        help="of a map, from each posture to the next (default 1)",
+    )
     out = "folder for table and picture: new, empty, or of an earlier response"
     parser.add_argument("--out", metavar="DIR", help=out)
     add_json(parser)
@@ -90,6 +99,7 @@ def run(args: Namespace) -> int:
     from ..system.result_folder import RESPONSE, result_folder
 
     scene = open_scene(args.scene)
+    _check_options(args)
     if args.map is not None:
         answer = _map(scene, args)
     elif args.pump or args.load:
@@ -106,6 +116,17 @@ def run(args: Namespace) -> int:
         answer.lines.append(f"Written: {args.out}")
     print_result(args.json, answer.values | {"warnings": answer.doubts}, answer.lines)
     return 0
+
+
+def _check_options(args: Namespace) -> None:
+    """Refuse what would be passed over."""
+    grid = {"--from": args.low != LOW, "--to": args.high != HIGH, "--points": args.points != POINTS}
+    mapped = {"--rates": args.rates != RATES, "--steps": args.steps != STEPS}
+    is_map = args.map is not None
+    for option in [name for name, is_given in grid.items() if is_given and (is_map or args.pump or args.load)]:
+        raise UsageError(f"{option}: goes with a frequency response, not with --pump, --load or --map. Leave it out.")
+    for option in [name for name, is_given in mapped.items() if is_given and not is_map]:
+        raise UsageError(f"{option}: goes with --map. Leave it out.")
 
 
 def _place(args: Namespace) -> str:
@@ -125,10 +146,13 @@ def _response(scene: Scene, args: Namespace) -> Answer:
         )
     rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
-    frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural]))
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
-    found = frequency_response(scene, frequencies, args.strokes, args.posture, force, args.drive)
-    static = frequency_response(scene, np.zeros(1), args.strokes, args.posture, force, args.drive)
+    place = args.strokes, args.posture, force, args.drive
+    at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
+    bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
+    frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural[bounded]]))
+    found = frequency_response(scene, frequencies, *place)
+    static = frequency_response(scene, np.zeros(1), *place)
     if force is None:
         load, unit = f"drive of cylinder {args.drive}, 1 m", "m of stroke"
     else:
@@ -142,20 +166,33 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     return Answer(
         "response",
         values | {name: column for name, column in columns.items() if name != "frequency_Hz"},
-        [title, "", *_resonances(found, static, natural)],
+        [title, "", *_resonances(found, static, natural, bounded)],
         columns,
         lambda path: response_picture(path, title, unit, found, natural),
-        rest.doubts,
+        rest.doubts + _undamped(natural[~bounded]),
     )
 
 
 MODES = 40  # natural frequencies that are looked for within the band
+BESIDE, SHARP = (
+    1.0 + 1e-6,
+    3.0,
+)  # times a natural frequency; a peak that is so much higher than there is bounded by rounding alone
 
 
-def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Array) -> list[str]:
+def _undamped(frequencies: Array) -> tuple[str, ...]:
+    if not len(frequencies):
+        return ()
+    told = ", ".join(f"{frequency:.4f}" for frequency in frequencies)
+    return (
+        f"nothing damps the resonances at {told} Hz: there the answer has no bound, and is left out. Give the scene beta and d",
+    )
+
+
+def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Array, bounded: Flags) -> list[str]:
     """A line for the static limit and every natural frequency."""
     lines = ["frequency Hz   tip x m     tip y m     acceleration m/s2   largest cylinder force N   largest moment N m"]
-    rows = [(0.0, static, 0)] + [(f, found, int(np.searchsorted(found.frequencies, f))) for f in natural]
+    rows = [(0.0, static, 0)] + [(f, found, int(np.searchsorted(found.frequencies, f))) for f in natural[bounded]]
     for frequency, response, k in rows:
         tip, acceleration = np.abs(response.tip[k]), np.linalg.norm(response.tip_acceleration[k])
         forces, moments = np.abs(response.cylinder_forces[k]), np.abs(response.moments[k])
@@ -165,7 +202,7 @@ def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Ar
             f"{frequency:12.4f}   {tip[0]:.4e}  {tip[1]:.4e}  {acceleration:17.4e}   {forces[cylinder]:12.4g}, cylinder "
             f"{cylinder + 1}   {moment}"
         )
-    return lines
+    return lines + [f"{frequency:12.4f}   no bound: nothing damps this mode" for frequency in natural[~bounded]]
 
 
 def _steady(scene: Scene, args: Namespace) -> Answer:

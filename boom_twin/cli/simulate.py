@@ -69,6 +69,7 @@ def run(args: Namespace) -> int:
     check_target(Path(args.out), sources, _earlier(len(scene.joints)))
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
+    _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
     if args.samples is not None:
@@ -88,6 +89,14 @@ def run(args: Namespace) -> int:
     if args.orbits:
         _draw_orbits(args, scene, result)
     return 0
+
+
+def _check_targets(targets: dict[str, str | None]) -> None:
+    """Refuse two options that would write the same file."""
+    seen: dict[Path, str] = {}
+    for option, target in targets.items():
+        if target and seen.setdefault(Path(target).resolve(), option) != option:
+            raise UsageError(f"{option} {target}: is what {seen[Path(target).resolve()]} writes. Give it a file of its own.")
 
 
 def _check_sampling(args: Namespace) -> None:

@@ -68,6 +68,8 @@ class RainflowCounter:
 
     def add(self, stress: Array) -> None:
         """Take the next values, shape (k,), Pa."""
+        if not len(stress):
+            return
         series = np.concatenate([self._open, stress])
         left: set[int] = {0, len(series) - 1}
         for size, _, count, start, end in self._rainflow.extract_cycles(series):
@@ -80,7 +82,8 @@ class RainflowCounter:
     def cycles(self) -> list[tuple[float, float]]:
         """Range (Pa) and count of all so far above `SMALL`: closed cycles, and halves of those that have not closed."""
         found = Counter({size: float(count) for size, count in self._closed.items()})
-        for size, _, count, _, _ in self._rainflow.extract_cycles(self._open):
+        series = self._open if len(self._open) != 2 else np.insert(self._open, 1, self._open.mean())  # of two it counts none
+        for size, _, count, _, _ in self._rainflow.extract_cycles(series):
             found[round(size / BIN)] += count
         return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > SMALL]
 

@@ -105,9 +105,17 @@ def test_the_state_of_another_boom_is_refused(tmp_path):
     times, strokes, angles = held(SCENE, "arch", 0.1, 3)
     with pytest.raises(UsageError, match="of another boom"):
         simulate(SCENE, times, strokes, 1e-3, angles, start=undeflected(pendulum(), np.array([8.9])), **QUIET)
-    (tmp_path / "odd.json").write_text('{"coordinates": 3}')
-    with pytest.raises(UsageError, match="save-state"):
-        read_state(tmp_path / "odd.json")
+    for text, told in (
+        ('{"coordinates": 3}', "save-state"),
+        ("[" * 100_000, "save-state"),
+        ('{"coordinates": {"theta_1": [true, false]}, "pins": []}', r"theta_1 = \[True, False\]: must be 2 numbers"),
+        ('{"coordinates": {"theta_1": ["a", 0]}, "pins": []}', "theta_1 = .* must be 2 numbers"),
+        ('{"coordinates": {"theta_1": [1, 0], "theta_1": [2, 0]}, "pins": []}', "theta_1 is given twice"),
+        ('{"coordinates": {}}', "no 'pins'"),
+    ):
+        (tmp_path / "odd.json").write_text(text)
+        with pytest.raises(UsageError, match=told):
+            read_state(tmp_path / "odd.json")
 
 
 def test_the_command_starts_undeflected_saves_and_goes_on(tmp_path, capsys):
@@ -117,6 +125,8 @@ def test_the_command_starts_undeflected_saves_and_goes_on(tmp_path, capsys):
     np.savetxt(drive, table, delimiter=",", comments="", header=HEADER)
     common = ["simulate", "--posture", "horizontal", "--drive", str(drive), "--no-error-estimate"]
     begun = [*common, "--out", str(tmp_path / "a.csv"), "--start", "undeflected", "--joint-rates", "0,0,0,0.1"]
+    assert main([*begun, "--save-state", str(tmp_path / "." / "a.csv")]) == 1
+    assert "is what --out writes" in capsys.readouterr().err and not (tmp_path / "a.csv").exists()
     assert main([*begun, "--save-state", str(end), "--check"]) == 0
     assert "The balance is open by" in capsys.readouterr().out
     far = table[:, 1:] + np.array([0.02, 0.0, 0.0, 0.0])  # of no posture's strokes, as where a move was interrupted

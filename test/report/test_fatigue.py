@@ -42,6 +42,14 @@ def test_parts_of_a_session_count_like_the_whole(length):
     assert counted(parts) == pytest.approx(whole)
 
 
+def test_a_stress_that_begins_and_ends_at_its_extremes_is_half_a_cycle():
+    """A move that is still going on at the end of the session: the largest range of all."""
+    assert counted([[0.0, 130.0]]) == {130.0: 0.5} and counted([[0.0], [130.0], []]) == {130.0: 0.5}
+    ramp = [0.0, 40.0, 35.0, 80.0, 75.0, 130.0]
+    assert counted([ramp]) == {5.0: 2.0, 130.0: 0.5} == dict(rainflow.count_cycles(np.array(ramp)))
+    assert counted([ramp[:3], ramp[3:]]) == counted([ramp])
+
+
 def test_a_sine_does_the_damage_of_its_cycles():
     """100 periods of amplitude A: as many cycles of range 2 A, by the S-N curve's three branches."""
     for amplitude, category, expected in (

@@ -37,7 +37,8 @@ export class ResponseTab {
 
   get words() {
     if (this.loads.trouble) return `no response: ${this.loads.trouble}`;
-    const measured = this.spectrum ? `; dotted, right: root of the density of the acceleration ${this.lines.source}, last 40 s` : "; no spectrum yet, which needs 8 s";
+    const moved = this.lines.moved > 0 ? `; THE BOOM MOVED within them, a cylinder by ${(1000 * this.lines.moved).toFixed(0)} mm: the spectrum is not of this posture` : "";
+    const measured = this.spectrum ? `; dotted, right: root of the density of the acceleration ${this.lines.source}, last 40 s${moved}` : "; no spectrum yet, which needs 8 s";
     return `amplitude of the tip's acceleration, both directions, by each load in this posture; dashed: natural frequencies${measured}`;
   }
 
