@@ -77,7 +77,7 @@ ITEMS: tuple[tuple[str, str, str], ...] = (
     (R, "figure 3, (12) to (15) substructure B", "section 1"),
     (
         R,
-        "(16) to (20) overall matrix, 21 zeros of the boundary, found by bisection within 1e-7",
+        "(16) to (20) overall matrix, boundary vectors with 21 zero elements, solved by dichotomy with a tolerance of 1e-7",
         "section 2: equal to Newton's method",
     ),
     (R, "(21) a posture needs nothing but new angles", "`statics(posture=..)`: any strokes, no new matrices by hand"),

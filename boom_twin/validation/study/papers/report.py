@@ -240,9 +240,9 @@ def _zeros_text(found: PapersStudy) -> list[str]:
         rows.append((f"mode {k + 1}, Hz", f"{near:.9f}", f"{counted:.9f}", abs(near - counted), None))
     return [
         "## 2. Zeros of the boundary by bisection\n",
-        "As the second paper finds them, to an interval of 1e-7. Equilibrium: torque at the base pivot while section 1 is "
-        "held, "
-        "beside Newton's method. Frequencies: sign of the determinant at the base (interval 1e-7 of the frequency), beside "
+        "By dichotomy, as the second paper solves its equation (20). Its tolerance of 1e-7 has no unit there; here it is the "
+        "width of the interval that is left. Equilibrium: torque at the base pivot while section 1 is held, beside Newton's "
+        "method. Frequencies: sign of the determinant at the base (interval 1e-7 of the frequency), beside "
         "the count of Wittrick and Williams.\n",
         table(("zero", "bisection", "Newton, count", "difference", "halvings"), rows),
     ]
@@ -310,7 +310,8 @@ def _stops_text(found: PapersStudy) -> list[str]:
         "geometrically "
         f"exact beams, contact by functions of its own; its steps {1e3 * PEER_STEPS['ideal']:g} ms, with contact "
         f"{1e3 * PEER_STEPS['worn']:g} ms, ours 1 ms with sub-steps. Differences up to the first flight of a journal; after it "
-        "motions differ by where flights end.\n",
+        "motions differ by where flights end. Where accelerations with worn pins are several per cent apart the cause was not "
+        "sought; place and forces agree there.\n",
         table(head, rows),
         "![Stops in four postures](papers_postures.png)\n",
     ]
