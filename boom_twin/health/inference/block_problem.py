@@ -108,12 +108,16 @@ def joined(parts: list[Rows]) -> Rows:
 def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     """The rows of every block that they are of, with its number."""
     numbers = rows.stamps // BLOCK
-    if numbers[0] == numbers[-1] and (numbers == numbers[0]).all():
+    edges = np.flatnonzero(numbers[1:] != numbers[:-1]) + 1
+    if not len(edges):
         yield int(numbers[0]), rows
-        return
-    for number in sorted(set(numbers.tolist())):
-        own = numbers == number
-        yield number, type(rows)(*(column[own] for column in rows))
+    elif (numbers[1:] >= numbers[:-1]).all():
+        for first, end in zip([0, *edges.tolist()], [*edges.tolist(), len(numbers)], strict=True):
+            yield int(numbers[first]), type(rows)(*(column[first:end] for column in rows))
+    else:
+        for number in sorted(set(numbers.tolist())):
+            own = numbers == number
+            yield number, type(rows)(*(column[own] for column in rows))
 
 
 class BlockBuilder:

@@ -32,6 +32,7 @@ import numpy as np
 
 from ...types import Array
 from .fault_catalogue import Parameter, variances
+from .innovation_filter import correct
 from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
@@ -347,12 +348,11 @@ class Regression:
         spread : float
             Logarithm of the deviations that it had, in all.
         """
-        signature = white[:, 1:]
-        gain = signature @ self.covariance
-        root = np.linalg.cholesky(gain @ signature.T + np.eye(len(white)))
-        step = np.linalg.solve(root, np.column_stack([white[:, 0] - signature @ self.mean, gain]))
-        left = step[:, 0]
+        first, signature = np.ascontiguousarray(white[:, :1]), np.ascontiguousarray(white[:, 1:])
+        measured, (count, states) = np.arange(len(white)), signature.shape
+        mean, covariance = self.mean[:, None].copy(), self.covariance.copy()
+        left, scratch = np.empty((count, 1)), (np.empty((count, count)), np.empty((count, states)))
+        log = correct(measured, first, signature, np.eye(count), np.zeros(count), mean, covariance, *scratch, left)
         if learn and np.abs(left).max() < GATE:
-            self.mean = self.mean + step[:, 1:].T @ left
-            self.covariance = self.covariance - step[:, 1:].T @ step[:, 1:]
-        return left, float(np.log(np.diag(root)).sum())
+            self.mean, self.covariance = mean[:, 0], covariance
+        return left[:, 0], -log - 0.5 * float(left[:, 0] @ left[:, 0])
