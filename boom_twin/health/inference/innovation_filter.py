@@ -228,11 +228,10 @@ class InnovationFilter:
         rows = np.flatnonzero(np.isfinite(table[:, 0]))
         count, measured = len(self._level2), len(rows)
         white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed
-        root, gain = np.zeros((measured, measured)), np.zeros((measured, len(self._turn)))
-        for k in range(count):
-            predict(self._turn, self._least, self._driven, shaken[k], self._added[k], self._x[k], self._p[k], self._scratch)
-            own = shaken[k] * self._shaken + self._rough[k]
-            log[k] = correct(rows, table, self._shown, noise, own, self._x[k], self._p[k], root, gain, white[k])
+        root, gain, state = np.zeros((measured, measured)), np.zeros((measured, len(self._turn))), (self._x, self._p)
+        own = shaken[:, None] * self._shaken + self._rough
+        change = self._turn, self._least, self._driven, shaken, self._added
+        filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
         if not np.isfinite(log).all():
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
         return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
@@ -253,6 +252,14 @@ class InnovationFilter:
 
 
 @kernel
+def filter_block(turn, least, driven, shaking, added, rows, table, shown, noise, own, x, p, scratch, root, gain, white, log):
+    """`predict` and `correct` for every level, the first axis of what depends on it."""
+    for k in range(x.shape[0]):
+        predict(turn, least, driven, shaking[k], added[k], x[k], p[k], scratch)
+        log[k] = correct(rows, table, shown, noise, own[k], x[k], p[k], root, gain, white[k])
+
+
+@inner
 def predict(turn, least, driven, shaking, added, x, p, scratch):
     """State x, one in each column, and covariance p of the next block, before it is measured: p = turn p turn' + noise.
 
