@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import kernel
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, SensorKind, Stream, channels_of
+from .sensor_survey import survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -158,7 +158,7 @@ class SensorCheck:
         self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
         share, cut, outside = min(1.0, span / NOISY_WINDOW), (4.0 * NOISY * self._sigma) ** 2, np.zeros(count)
         variance, own = self._sigma**2, (self._power, self._run, self._since, self._missing, outside)
-        largest = survey(times, all_raw, left, self._low, self._high, share, cut, variance, *own)
+        largest = survey(times, all_raw, left, self._low, self._high, SILENT_FOR, share, cut, variance, *own)
         self._usual2 = self._usual_power()
         self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
         spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
@@ -222,59 +222,6 @@ class SensorCheck:
             calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
             sudden &= calm < 0.3 * np.abs(step)
         return np.where(sudden.any(axis=0), np.where(sudden, step, 0.0).sum(axis=0), 0.0)
-
-
-@kernel
-def survey(times, raw, left, low, high, share, cut, variance, power, run, since, missing, outside):
-    """Go on with what is known of every channel, and count readings out of range.
-
-    Parameters
-    ----------
-    times, raw, left : ndarray, shape (3 + k,), (3 + k, channels), (3 + k, channels)
-        Of the readings, the newest three before them first: s, as measured, less what the model has.
-    low, high : ndarray, shape (channels,)
-        Their range.
-    share, cut, variance : float
-        Weight of these readings; what a single outlier counts at most, and what noise is stated to have, as variances.
-    power, run, since, missing, outside : ndarray, shape (channels,)
-        Variance of the noise, by second differences; times that the newest reading was repeated, and since when (s); share of
-        readings that are missing; readings out of range.
-
-    Returns
-    -------
-    largest : float
-        The largest change of `left` from one reading to the next, but for those across a gap.
-    """
-    largest, count = 0.0, times.shape[0]
-    for i in range(power.shape[0]):
-        total, known, lacking = 0.0, 0, 0
-        for t in range(1, count):
-            step = abs(left[t, i] - left[t - 1, i])
-            if times[t] - times[t - 1] <= SILENT_FOR and step > largest:
-                largest = step
-            if t < 3:
-                continue
-            bend = left[t, i] - 2.0 * left[t - 1, i] + left[t - 2, i]
-            if not math.isnan(bend):
-                total += min(bend * bend / 6.0, cut)
-                known += 1
-            if math.isnan(raw[t, i]):
-                lacking += 1
-            elif raw[t, i] < low[i] or raw[t, i] > high[i]:
-                outside[i] += 1.0
-            if raw[t, i] == raw[t - 1, i]:
-                run[i] += 1
-            elif math.isfinite(raw[t, i]):
-                run[i], since[i] = 0, times[t]
-        missing[i] += share * (lacking / (count - 3) - missing[i])
-        if known == 0:
-            continue
-        heard = total / known
-        if math.isnan(power[i]):
-            power[i] = min(heard, variance)
-        else:
-            power[i] += share * (heard - power[i])
-    return largest
 
 
 def bends2(values: Array) -> Array:

@@ -61,7 +61,7 @@ class Suspicion:
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks = np.zeros(channels), 0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
-        self._before = deque([self._evidence], maxlen=RECENT + 1)  # the evidence after each of the recent blocks, and before them
+        self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
 
     @property
     def span(self) -> float:

@@ -156,7 +156,7 @@ def test_the_load_is_part_of_every_hypothesis():
     own = problem.evidence()
     under = np.array([1.0, 0.0])
     matrix, vector = under[:, None, None] * own.matrix, under[:, None] * own.vector
-    both = Evidence(matrix, vector, under * own.squares, own.rows, own.log + [0.0, 500.0])
+    both = Evidence(matrix, vector, under * own.squares, own.rows, own.log + np.array([0.0, 500.0]))
     args = problem.mean, problem.covariance, SPAN, {}
     alone, both = BANK.explain(own, *args), BANK.explain(both, *args)
     assert alone.strength > 20.0 and alone.level == 0

@@ -32,7 +32,7 @@ import numpy as np
 
 from ...types import Array
 from .fault_catalogue import Parameter, variances
-from .innovation_filter import correct
+from .kalman_update import correct
 from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
@@ -203,9 +203,7 @@ class HypothesisTest:
         self._priors = np.log([known[i].prior for i in self._places])
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
 
-    def explain(
-        self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]
-    ) -> Verdict:
+    def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
         """Weigh all faults.
 
         Parameters
@@ -226,7 +224,8 @@ class HypothesisTest:
         """
         healthy = evidence.given(mean, covariance)
         logs = healthy.log
-        fits = np.concatenate([self._steady(healthy), self._growing(healthy, span)], axis=2)  # (levels, numbers, shapes * places)
+        fits = np.concatenate([self._steady(healthy), self._growing(healthy, span)], axis=2)
+        # fits: (levels, numbers, shapes * places)
         factors = fits[:, 0] + (logs - logs.max())[:, None]
         squares = healthy.squares[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
