@@ -232,7 +232,7 @@ class InnovationFilter:
         own = shaken[:, None] * self._shaken + self._rough
         change = self._turn, self._least, self._driven, shaken, self._added
         filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
-        if not np.isfinite(log).all():
+        if np.isnan(log).any():
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
         return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
 
