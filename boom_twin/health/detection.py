@@ -49,11 +49,13 @@ class Detector:
     def take(self, normal: Array) -> None:
         """Innovations of one block, shape (channels,), NaN where nothing was measured."""
         self._count += 1
-        z = np.clip(np.nan_to_num(normal), -CUT, CUT)
+        measured = np.isfinite(normal)
+        z = np.where(measured, np.minimum(np.maximum(normal, -CUT), CUT), 0.0)
+        allowed = np.where(measured, ALLOWANCE, 0.0)
         for row, (sums, signed) in enumerate(((self._up, z), (self._down, -z))):
-            self._began[row] = np.where(sums == 0.0, self._count, self._began[row])
-            np.maximum(0.0, sums + np.where(np.isfinite(normal), signed - ALLOWANCE, 0.0), out=sums)
-        self._squares.append(np.minimum(np.nan_to_num(normal) ** 2, CUT**2))
+            self._began[row, sums == 0.0] = self._count
+            np.maximum(0.0, sums + (signed - allowed), out=sums)
+        self._squares.append(z**2)
 
     @property
     def levels(self) -> Array:

@@ -13,6 +13,8 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
+from .inference.hypotheses import Regression
+from .inference.innovation_filter import InnovationFilter, ModalStates
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, bends2, sensor_ranges
 
@@ -193,3 +195,13 @@ class HealthMonitor:
             return np.full(2, np.nan)
         by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + self._tip**2
         return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))
+
+
+def warm_up() -> None:
+    """Compile the kernels that judge a rig, on made-up readings of two channels."""
+    none, two = np.zeros((0, 0)), np.zeros((2, 2))
+    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
+    whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
+    whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
+    found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)
+    Regression(np.zeros(1), np.eye(1)).take(found.white, True)

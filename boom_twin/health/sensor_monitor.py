@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, SensorKind, Stream, channels_of
+from .sensor_survey import survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -155,19 +156,25 @@ class SensorCheck:
         times = np.concatenate([self._stamps, stamps])
         all_raw = np.concatenate([self._raw, raw])
         left = np.concatenate([self._left, raw - expected])
-        whole, span = bool(np.isfinite(raw.sum())), float(stamps[-1] - stamps[0])
+        whole, span = bool(np.isfinite(raw.sum())), max(float(stamps[-1] - stamps[0]), 1e-3)
         self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
-        self._listen(left[1:], span)
-        steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
-        noise = np.sqrt(np.fmax(self._power, self._sigma**2))
-        sudden = bool(np.fmax.reduce(np.abs(steps), axis=None) > SPIKE * self._sigma)
+        share, cut, outside = min(1.0, span / NOISY_WINDOW), (4.0 * NOISY * self._sigma) ** 2, np.zeros(count)
+        variance, own = self._sigma**2, (self._power, self._run, self._since, self._missing, outside)
+        largest = survey(times, all_raw, left, self._low, self._high, SILENT_FOR, share, cut, variance, *own)
+        self._usual2 = self._usual_power()
+        self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
+        spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
+        if largest > SPIKE * self._sigma:
+            steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
+            noise = np.sqrt(np.fmax(self._power, self._sigma**2))
+            spikes, jumped = self._spikes(steps, noise), self._jumps(times, all_raw, left, steps, noise)
         findings = SensorFindings(
-            stuck=self._stuck(times[2:], all_raw[2:]),
+            stuck=self._stuck(float(stamps[-1])),
             noisy=self._power > NOISY**2 * self._usual2,
-            spikes=self._spikes(steps, noise) if sudden else np.zeros(count, dtype=bool),
-            jumped=self._jumps(times, all_raw, left, steps, noise) if sudden else np.zeros(count),
-            silent=(now - self._heard > SILENT_FOR) | self._lacks(raw, span, whole),
-            outside=((raw < self._low) | (raw > self._high)).sum(axis=0) > 0.5 * len(raw),
+            spikes=spikes,
+            jumped=jumped,
+            silent=(now - self._heard > SILENT_FOR) | (self._missing > MISSING),
+            outside=outside > 0.5 * len(raw),
             level=left[-1],
         )
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
@@ -188,20 +195,6 @@ class SensorCheck:
             lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
         return np.asarray(lone.any(axis=0))
 
-    def _listen(self, left: Array, span: float) -> None:
-        """Power of the noise, by second differences of neighbours; single outliers are cut off."""
-        bend2 = np.minimum(bends2(left), (4.0 * NOISY * self._sigma) ** 2)
-        power = bend2.sum(axis=0) / len(bend2)
-        if not np.isfinite(power.sum()):
-            known = np.isfinite(bend2)
-            power = np.where(known.any(axis=0), np.nansum(bend2, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
-        share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
-        fresh = np.isnan(self._power)
-        mixed = np.where(fresh, np.minimum(power, self._sigma**2), self._power + share * (power - self._power))
-        self._power = np.where(np.isnan(power), self._power, mixed)
-        self._usual2 = self._usual_power()
-        self._lasting2 += min(1.0, max(span, 1e-3) / USUAL_WINDOW) * (self._usual2 - self._lasting2)
-
     def _usual_power(self) -> float:
         """Of the noise, as it is with most channels: a sensor is faulty that is noisier than its like, not than a data sheet.
 
@@ -211,22 +204,12 @@ class SensorCheck:
         middle = float(known[(len(known) - 1) // 2]) if len(known) > 1 else stated
         return min(max(middle, stated), NOISY**2 * stated)
 
-    def _lacks(self, raw: Array, span: float, whole: bool) -> Flags:
-        """Channels of which too many readings are missing, in messages that come."""
-        share = min(1.0, max(span, 1e-3) / NOISY_WINDOW)
-        self._missing += share * ((0.0 if whole else np.isnan(raw).mean(axis=0)) - self._missing)
-        return np.asarray(self._missing > MISSING)
-
-    def _stuck(self, times: Array, raw: Array) -> Flags:
-        """One reading again and again, while others of the stream are alive with noise."""
-        same, changed = raw[1:] == raw[:-1], np.isfinite(raw[1:]) & (raw[1:] != raw[:-1])
-        order = np.arange(1, len(raw))[:, None]
-        last = np.where(changed, order, 0).max(axis=0)
-        self._run = np.where(last > 0, 0, self._run) + (same & (order > last)).sum(axis=0)
-        self._since = np.where(last > 0, times[last], self._since)
+    def _stuck(self, newest: float) -> Flags:
+        """One reading again and again until `newest` (s), while others of the stream are alive with noise."""
         live = self._power > (QUIET * self._sigma) ** 2
-        witnessed = live.any() and len(live) > 1
-        return np.asarray((self._run >= self._patience) & (times[-1] - self._since >= REPEATS_FOR) & witnessed)
+        if len(live) < 2 or not live.any():
+            return np.zeros(len(live), dtype=bool)
+        return np.asarray((self._run >= self._patience) & (newest - self._since >= REPEATS_FOR))
 
     def _jumps(self, times: Array, raw: Array, left: Array, steps: Array, noise: Array) -> Array:
         """How far readings changed from one to the next, for good, while the model did not; 0 where they did not.
@@ -322,7 +305,7 @@ class SensorMonitor:
         """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended."""
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
-            if kind not in self._sensors.alarms:
+            if kind not in self._sensors.alarms or not flags.any():
                 continue
             for channel in np.flatnonzero(flags).tolist():
                 if kind == "jump" and self._is_wild(channel):

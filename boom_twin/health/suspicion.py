@@ -60,9 +60,8 @@ class Suspicion:
         channels, coefficients = len(errors2), 2 * len(mean)
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks = np.zeros(channels), 0
-        self._evidence = [Evidence.none(coefficients) for _ in levels]
-        self._calm = self._evidence
-        self._recent: deque[list[Evidence]] = deque(maxlen=RECENT)
+        self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
+        self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
 
     @property
     def span(self) -> float:
@@ -83,11 +82,10 @@ class Suspicion:
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
-        white, logs = self._filter.step(table, noise, crude, problem.shaking, problem.travel)
-        found = [Evidence.of(each, log) for each, log in zip(white, logs.tolist(), strict=True)]
-        self._evidence = [before + new for before, new in zip(self._evidence, found, strict=True)]
-        self._calm = [before + new.weighted(weight) for before, new in zip(self._calm, found, strict=True)]
-        self._recent.append(found)
+        found = Evidence.of(*self._filter.step(table, noise, crude, problem.shaking, problem.travel))
+        self._evidence += found
+        self._calm += found.weighted(weight)
+        self._before.append(self._evidence)
         self.blocks += 1
 
     def explain(self) -> Verdict:
@@ -112,7 +110,7 @@ class Suspicion:
             return False
         if self.blocks > LONGEST or verdict.excess > WHOLE_MISFIT:
             return True
-        recent = [sum(column, Evidence.none(2 * len(self.mean))) for column in zip(*self._recent, strict=True)]
+        recent = self._evidence + self._before[0].weighted(-1.0)
         best = verdict.best if verdict.strength > 0.0 else None
         logs, squares = self._bank.fit(recent, self._coefficients(best), self.mean, self.covariance)
         return bool(squares[verdict.level] > MISFIT or logs.max() - logs[verdict.level] > EXCITED)

@@ -16,7 +16,7 @@ from ..estimation.deviation_modes import DeviationModes
 from ..estimation.step_choice import choose_steps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
-from ..health.monitor import HealthMonitor
+from ..health.monitor import HealthMonitor, warm_up
 from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
@@ -207,6 +207,8 @@ class Twin:
             other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
         other.update(Sample(Stream.ANGLES, 0, middle))
         other.update(Sample(Stream.STROKES, 7_000_000, strokes))  # a late one is looked up among those before
+        if self.judge is not None:
+            warm_up()
 
     def update(self, sample: Sample) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.

@@ -40,12 +40,13 @@ class Problem:
         self.spread = np.eye(rows) + self.signature @ self.covariance @ self.signature.T
 
     def evidence(self) -> Evidence:
-        """In three parts."""
-        found = Evidence.none(2 * SIZE)
+        """In three parts; of one level of the load."""
+        found = Evidence.none(2 * SIZE, (1,))
         table = np.hstack([self.signature, self.times[:, None] * self.signature])
         for rows in np.array_split(np.arange(len(self.values)), 3):
             y = self.values[rows]
-            found += Evidence.of(np.column_stack([y, table[rows]]), log_density(y, np.zeros(len(y)), np.eye(len(y))))
+            log = log_density(y, np.zeros(len(y)), np.eye(len(y)))
+            found += Evidence.of(np.column_stack([y, table[rows]])[None], np.array([log]))
         return found
 
     def log(self, place: int | None = None, more: float = 0.0, value: float = 0.0) -> float:
@@ -55,7 +56,7 @@ class Problem:
         return log_density(self.values, at, self.spread + more * np.outer(column, column))
 
     def verdict(self):
-        return BANK.explain([self.evidence()], self.mean, self.covariance, SPAN, {})
+        return BANK.explain(self.evidence(), self.mean, self.covariance, SPAN, {})
 
 
 def explained(verdict, growing: bool = False):
@@ -70,13 +71,13 @@ def probability(verdict, name: str) -> float:
 def test_healthy_deviations_are_integrated_out(seed):
     problem = Problem(seed)
     healthy = problem.evidence().given(problem.mean, problem.covariance)
-    assert healthy.log == pytest.approx(problem.log(), abs=1e-9)
+    assert healthy.log[0] == pytest.approx(problem.log(), abs=1e-9)
     left = problem.values - problem.signature @ problem.mean
     solved = np.linalg.solve(problem.spread, np.column_stack([problem.signature, left]))
-    assert healthy.matrix[:SIZE, :SIZE] == pytest.approx(problem.signature.T @ solved[:, :-1], abs=1e-9)
-    assert healthy.vector[:SIZE] == pytest.approx(problem.signature.T @ solved[:, -1], abs=1e-9)
+    assert healthy.matrix[0, :SIZE, :SIZE] == pytest.approx(problem.signature.T @ solved[:, :-1], abs=1e-9)
+    assert healthy.vector[0, :SIZE] == pytest.approx(problem.signature.T @ solved[:, -1], abs=1e-9)
     growing = problem.times[:, None] * problem.signature
-    assert healthy.vector[SIZE:] == pytest.approx(growing.T @ solved[:, -1], abs=1e-7)
+    assert healthy.vector[0, SIZE:] == pytest.approx(growing.T @ solved[:, -1], abs=1e-7)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -144,7 +145,7 @@ def test_probabilities(seed):
 def test_what_was_known_before_counts():
     problem = Problem(1, {3: 2.0})
     carried = {"joint_2.sensor": -3.0}
-    first, later = problem.verdict(), BANK.explain([problem.evidence()], problem.mean, problem.covariance, SPAN, carried)
+    first, later = problem.verdict(), BANK.explain(problem.evidence(), problem.mean, problem.covariance, SPAN, carried)
     odds = [share / (1.0 - share) for share in (probability(first, "joint_2.sensor"), probability(later, "joint_2.sensor"))]
     assert odds[1] / odds[0] == pytest.approx(np.exp(-3.0), rel=1e-6)
 
@@ -152,10 +153,12 @@ def test_what_was_known_before_counts():
 def test_the_load_is_part_of_every_hypothesis():
     """Under a load that explains everything no fault is more probable than none; without it one is."""
     problem = Problem(2, {3: 4.0})
-    own, none = problem.evidence(), Evidence.none(2 * SIZE)
-    loaded = Evidence(none.matrix, none.vector, 0.0, own.rows, own.log + 500.0)
+    own = problem.evidence()
+    under = np.array([1.0, 0.0])
+    matrix, vector = under[:, None, None] * own.matrix, under[:, None] * own.vector
+    both = Evidence(matrix, vector, under * own.squares, own.rows, own.log + np.array([0.0, 500.0]))
     args = problem.mean, problem.covariance, SPAN, {}
-    alone, both = BANK.explain([own], *args), BANK.explain([own, loaded], *args)
+    alone, both = BANK.explain(own, *args), BANK.explain(both, *args)
     assert alone.strength > 20.0 and alone.level == 0
     assert both.strength < 1.0 and both.level == 1
 
@@ -194,11 +197,28 @@ def test_fit_of_a_known_fault():
     problem = Problem(6, {3: 2.0})
     best = explained(problem.verdict())[3]
     args = problem.mean, problem.covariance
-    logs, squares = BANK.fit([problem.evidence()], BANK.coefficients(best, SPAN), *args)
+    logs, squares = BANK.fit(problem.evidence(), BANK.coefficients(best, SPAN), *args)
     assert logs[0] == pytest.approx(problem.log(3, 0.0, best.value), abs=1e-8) and squares[0] < 2.0
     later = Problem(7, {})
-    logs, squares = BANK.fit([later.evidence()], BANK.coefficients(best, SPAN), later.mean, later.covariance)
+    logs, squares = BANK.fit(later.evidence(), BANK.coefficients(best, SPAN), later.mean, later.covariance)
     assert logs[0] < later.log() and squares[0] > 2.0, "the fault has gone"
+
+
+def test_levels_together_are_those_of_each_alone():
+    """The evidence of several levels of the load is weighed at once; each is as if it were alone."""
+    problems = Problem(8, {3: 1.0}), Problem(9, {0: 0.5})
+    each = [problem.evidence() for problem in problems]
+    both = Evidence(*(np.concatenate([getattr(one, name) for one in each]) for name in ("matrix", "vector", "squares")),
+                    each[0].rows, np.concatenate([one.log for one in each]))  # fmt: skip
+    mean, covariance = problems[0].mean, problems[0].covariance
+    coefficients = np.random.default_rng(3).normal(size=2 * SIZE)
+    logs, squares = BANK.fit(both, coefficients, mean, covariance)
+    alone = [BANK.fit(one, coefficients, mean, covariance) for one in each]
+    assert logs == pytest.approx(np.concatenate([log for log, _ in alone]), rel=1e-12)
+    assert squares == pytest.approx(np.concatenate([left for _, left in alone]), rel=1e-12)
+    assert both.given(mean, covariance).matrix == pytest.approx(
+        np.concatenate([one.given(mean, covariance).matrix for one in each]), rel=1e-12, abs=1e-12
+    )
 
 
 def test_coefficients_are_those_of_the_beginning():
@@ -214,6 +234,6 @@ def test_a_fault_below_its_least_value_explains_nothing():
         Parameter("tip_imu.sensor", "bias x", Form.IMU, 0, "m/s^2", 0.01, 0.5),
     )
     white = np.array([[-10.0, 1.0, 0.0, 0.0, 0.0], [-9.0, 0.0, 20.0, 0.0, 0.0]])
-    verdict = HypothesisTest(known).explain([Evidence.of(white, 0.0)], np.zeros(2), np.zeros((2, 2)), 1.0, {})
+    verdict = HypothesisTest(known).explain(Evidence.of(white[None], np.zeros(1)), np.zeros(2), np.zeros((2, 2)), 1.0, {})
     assert verdict.causes[0].name == "tip_imu.sensor"
     assert max(part.log_factor for cause in verdict.causes if cause.name == "line_fill" for part in cause.parts) < 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,11 +108,13 @@ def joined(parts: list[Rows]) -> Rows:
 def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     """The rows of every block that they are of, with its number."""
     numbers = rows.stamps // BLOCK
-    if numbers[0] == numbers[-1] and (numbers == numbers[0]).all():
+    steps: NDArray[np.int64] = np.diff(numbers)
+    if not steps.any():
         yield int(numbers[0]), rows
         return
-    for number in sorted(set(numbers.tolist())):
-        own = numbers == number
+    is_sorted, edges = bool((steps > -1).all()), [0, *(np.flatnonzero(steps) + 1).tolist(), len(numbers)]
+    for k, number in enumerate(numbers[edges[:-1]].tolist() if is_sorted else sorted(set(numbers.tolist()))):
+        own: Any = slice(edges[k], edges[k + 1]) if is_sorted else numbers == number
         yield number, type(rows)(*(column[own] for column in rows))
 
 

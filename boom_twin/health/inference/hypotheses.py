@@ -24,7 +24,7 @@ model that is not quite right is not quite sure.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log
 
@@ -32,6 +32,8 @@ import numpy as np
 
 from ...types import Array
 from .fault_catalogue import Parameter, variances
+from .kalman_update import correct
+from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
@@ -40,37 +42,38 @@ CRUDE = 0.001  # see above
 
 @dataclass(frozen=True)
 class Evidence:
-    """What some blocks say, of coefficients of faults.
+    """What some blocks say, of coefficients of faults, under one level of the load at the tip or several.
 
     Attributes
     ----------
-    matrix, vector : ndarray, shape (coefficients, coefficients), (coefficients,)
+    matrix, vector : ndarray, shape (..., coefficients, coefficients), (..., coefficients)
         L and l.
-    squares : float
+    squares : ndarray, shape (...)
         Sum of the squares of the innovations, all coefficients 0.
     rows : float
         Their number; less where they count less.
-    log : float
+    log : ndarray, shape (...)
         Logarithm of their probability with all coefficients 0.
     """
 
     matrix: Array
     vector: Array
-    squares: float
+    squares: Array
     rows: float
-    log: float
+    log: Array
 
     @staticmethod
-    def none(coefficients: int) -> Evidence:
+    def none(coefficients: int, levels: tuple[int, ...] = ()) -> Evidence:
         """Of no blocks."""
-        return Evidence(np.zeros((coefficients, coefficients)), np.zeros(coefficients), 0.0, 0, 0.0)
+        size = (*levels, coefficients)
+        return Evidence(np.zeros((*size, coefficients)), np.zeros(size), np.zeros(levels), 0, np.zeros(levels))
 
     @staticmethod
-    def of(white: Array, log: float) -> Evidence:
-        """Of one block, from whitened innovations, shape (rows, 1 + coefficients)."""
-        left, signature = white[:, 0], white[:, 1:]
-        matrix, vector = np.asarray(signature.T @ signature), np.asarray(signature.T @ left)
-        return Evidence(matrix, vector, float(left @ left), len(left), log)
+    def of(white: Array, log: Array) -> Evidence:
+        """Of blocks, from whitened innovations, shape (..., rows, 1 + coefficients)."""
+        left, signature = white[..., :1], white[..., 1:]
+        matrix, vector = signature.mT @ signature, (signature.mT @ left)[..., 0]
+        return Evidence(matrix, vector, (left.mT @ left)[..., 0, 0], white.shape[-2], log)
 
     def weighted(self, weight: float) -> Evidence:
         """Counting `weight` times as much."""
@@ -83,6 +86,13 @@ class Evidence:
             self.log + other.log,
         )  # fmt: skip
 
+    def about(self, coefficients: Array, count: int) -> Evidence:
+        """Where there is a fault of these coefficients: of deviations of the first `count` of them from it."""
+        by = self.matrix @ coefficients
+        explained = (2.0 * self.vector - by) @ coefficients
+        matrix, vector = self.matrix[..., :count, :count], (self.vector - by)[..., :count]
+        return Evidence(matrix, vector, self.squares - explained, self.rows, self.log + 0.5 * explained)
+
     def given(self, mean: Array, covariance: Array) -> Evidence:
         """With healthy deviations of the first coefficients integrated out: L', l', squares and logarithm that are then left.
 
@@ -92,15 +102,17 @@ class Evidence:
             Of the first k coefficients; the others have none.
         """
         k = len(mean)
-        vector = self.vector - self.matrix[:, :k] @ mean
-        spread = np.eye(k) + self.matrix[:k, :k] @ covariance
-        solved = np.linalg.solve(spread, np.column_stack([self.matrix[:k], vector[:k]]))
+        by = self.matrix[..., :k]
+        vector = self.vector - by @ mean
+        spread = np.eye(k) + by[..., :k, :] @ covariance
+        solved = np.linalg.solve(spread, np.concatenate([by.mT, vector[..., :k, None]], axis=-1))
         _, log_det = np.linalg.slogdet(spread)
-        way = self.matrix[:, :k] @ covariance
-        matrix, reduced = self.matrix - way @ solved[:, :-1], vector - way @ solved[:, -1]
-        fitted = float((self.vector + vector)[:k] @ mean) + float(vector[:k] @ covariance @ solved[:, -1])
-        log = self.log + 0.5 * (fitted - float(log_det))
-        return Evidence(np.asarray(0.5 * (matrix + matrix.T)), np.asarray(reduced), self.squares - fitted, self.rows, log)
+        taken = (by @ covariance) @ solved
+        matrix, reduced = self.matrix - taken[..., :-1], vector - taken[..., -1]
+        weighted = (vector[..., None, :k] @ (covariance @ solved[..., -1:]))[..., 0, 0]
+        fitted = (self.vector + vector)[..., :k] @ mean + weighted
+        log = self.log + 0.5 * (fitted - log_det)
+        return Evidence(0.5 * (matrix + matrix.mT), reduced, self.squares - fitted, self.rows, log)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,16 +201,15 @@ class HypothesisTest:
         self._faulty = variances(known, "faulty")[self._places]
         self._least = np.array([known[i].least for i in self._places])
         self._priors = np.log([known[i].prior for i in self._places])
+        self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
 
-    def explain(
-        self, evidence: Sequence[Evidence], mean: Array, covariance: Array, span: float, carried: Mapping[str, float]
-    ) -> Verdict:
+    def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
         """Weigh all faults.
 
         Parameters
         ----------
-        evidence : sequence of Evidence
-            By level of the load at the tip.
+        evidence : Evidence
+            Of all levels of the load at the tip, one axis.
         mean, covariance : ndarray
             Of the parameters while all was well.
         span : float
@@ -211,15 +222,14 @@ class HypothesisTest:
         Verdict
             How well each fault explains the evidence, and how large it would be.
         """
-        healthy = [each.given(mean, covariance) for each in evidence]
-        logs = np.array([each.log for each in healthy])
-        steady = np.array([self._steady(each) for each in healthy])
-        growing = np.array([self._growing(each, span) for each in healthy])
-        fits = np.concatenate([steady, growing], axis=2)  # (levels, numbers, shapes * places)
+        healthy = evidence.given(mean, covariance)
+        logs = healthy.log
+        fits = np.concatenate([self._steady(healthy), self._growing(healthy, span)], axis=2)
+        # fits: (levels, numbers, shapes * places)
         factors = fits[:, 0] + (logs - logs.max())[:, None]
-        squares = np.array([each.squares for each in healthy])[:, None] - fits[:, 1]
+        squares = healthy.squares[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
-        excess = max(1.0, float(squares[best]) / max(healthy[0].rows, 1.0))
+        excess = max(1.0, float(squares[best]) / max(healthy.rows, 1.0))
         priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
         weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
         shares = np.exp(weights - weights.max())
@@ -230,39 +240,37 @@ class HypothesisTest:
             for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
         ]
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
-        none_excess = max(1.0, healthy[none].squares / max(healthy[none].rows, 1.0))
+        none_excess = max(1.0, float(healthy.squares[none]) / max(healthy.rows, 1.0))
         return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
 
     def _steady(self, healthy: Evidence) -> Array:
-        """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (6, places)."""
-        matrix, vector = np.diag(healthy.matrix)[self._places], healthy.vector[self._places]
+        """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (levels, 6, places)."""
+        matrix, vector = healthy.matrix.diagonal(axis1=-2, axis2=-1)[..., self._places], healthy.vector[..., self._places]
         spread = self._faulty / (1.0 + self._faulty * matrix)
         values, sigmas = spread * vector, np.sqrt(spread)
         factors = 0.5 * vector * values - 0.5 * np.log1p(self._faulty * matrix) + self._sided(values, sigmas)
         none = np.zeros_like(values)
-        return np.stack([factors, vector * values, values, sigmas, none, none])
+        return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
 
     def _growing(self, healthy: Evidence, span: float) -> Array:
         """Likewise of faults that grow; values are those at the end of `span` (s)."""
         count = len(self.known)
         pairs = np.stack([self._places, self._places + count], axis=1)
-        vector = healthy.vector[pairs]
-        prior = np.stack([self._faulty, self._faulty / GROWN**2], axis=1)
-        matrix = healthy.matrix[pairs[:, :, None], pairs[:, None, :]]
-        scaled = np.eye(2) + np.sqrt(prior)[:, :, None] * matrix * np.sqrt(prior)[:, None, :]
-        spread = np.sqrt(prior)[:, :, None] * np.linalg.inv(scaled) * np.sqrt(prior)[:, None, :]
-        found = (spread @ vector[:, :, None])[:, :, 0]
-        explained = (vector * found).sum(axis=1)
+        vector = healthy.vector[..., pairs]
+        prior = np.sqrt(np.stack([self._faulty, self._faulty / GROWN**2], axis=1))
+        matrix = healthy.matrix[..., pairs[:, :, None], pairs[:, None, :]]
+        scaled = np.eye(2) + prior[:, :, None] * matrix * prior[:, None, :]
+        spread = prior[:, :, None] * np.linalg.inv(scaled) * prior[:, None, :]
+        found = (spread @ vector[..., None])[..., 0]
+        explained = (vector * found).sum(axis=-1)
         now = np.array([1.0, span])
-        values, sigmas = found @ now, np.sqrt(np.einsum("i,pij,j->p", now, spread, now))
+        values, sigmas = found @ now, np.sqrt(spread @ now @ now)
         factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + log(GROWING_PRIOR)
-        return np.stack([factors, explained, values, sigmas, found[:, 1], np.sqrt(spread[:, 1, 1])])
+        return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
     def _sided(self, values: Array, sigmas: Array) -> Array:
         """What it adds to the log factor that faults have a least value."""
-        from scipy.special import log_ndtr  # a twin that is well need not wait for it
-
-        return np.asarray(log_ndtr((values - self._least) / sigmas) - log_ndtr(-self._least / np.sqrt(self._faulty)))
+        return log_normal_below((values - self._least) / sigmas) - self._none_sided
 
     def _grouped(self, found: list[Explanation], shares: Array) -> tuple[Cause, ...]:
         groups: dict[str, list[int]] = {}
@@ -271,7 +279,7 @@ class HypothesisTest:
         causes = [Cause(name, float(shares[at].sum()), tuple(found[i] for i in at)) for name, at in groups.items()]
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
-    def fit(self, evidence: Sequence[Evidence], coefficients: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
+    def fit(self, evidence: Evidence, coefficients: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
         """How well faults of known coefficients, shape (2 * parameters,), go with evidence.
 
         Returns
@@ -279,11 +287,8 @@ class HypothesisTest:
         logs, squares : ndarray, shape (levels,)
             By level of the load: ln of how probable the measurements are, and squares left over those that noise leaves.
         """
-        healthy = [level.given(mean, covariance) for level in evidence]
-        fitted = np.array([2.0 * each.vector @ coefficients - coefficients @ each.matrix @ coefficients for each in healthy])
-        logs = np.array([each.log for each in healthy]) + 0.5 * fitted
-        squares = np.array([each.squares for each in healthy]) - fitted
-        return logs, squares / max(healthy[0].rows, 1.0)
+        healthy = evidence.about(coefficients, len(mean)).given(mean, covariance)
+        return healthy.log, healthy.squares / max(healthy.rows, 1.0)
 
     def coefficients(self, each: Explanation, span: float) -> Array:
         """Of the fault alone, `span` (s) after its evidence began; shape (2 * parameters,)."""
@@ -342,12 +347,11 @@ class Regression:
         spread : float
             Logarithm of the deviations that it had, in all.
         """
-        signature = white[:, 1:]
-        gain = signature @ self.covariance
-        root = np.linalg.cholesky(gain @ signature.T + np.eye(len(white)))
-        step = np.linalg.solve(root, np.column_stack([white[:, 0] - signature @ self.mean, gain]))
-        left = step[:, 0]
+        first, signature = np.ascontiguousarray(white[:, :1]), np.ascontiguousarray(white[:, 1:])
+        measured, (count, states) = np.arange(len(white)), signature.shape
+        mean, covariance = self.mean[:, None].copy(), self.covariance.copy()
+        left, scratch = np.empty((count, 1)), (np.empty((count, count)), np.empty((count, states)))
+        log = correct(measured, first, signature, np.eye(count), np.zeros(count), mean, covariance, *scratch, left)
         if learn and np.abs(left).max() < GATE:
-            self.mean = self.mean + step[:, 1:].T @ left
-            self.covariance = self.covariance - step[:, 1:].T @ step[:, 1:]
-        return left, float(np.log(np.diag(root)).sum())
+            self.mean, self.covariance = mean[:, 0], covariance
+        return left[:, 0], -log - 0.5 * float(left[:, 0] @ left[:, 0])

@@ -38,6 +38,7 @@ from ...estimation.sensor_model import Reading, specific_force
 from ...estimation.tip_estimate import oscillate
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
+from .kalman_update import filter_block
 
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
@@ -160,12 +161,11 @@ class InnovationFilter:
 
     def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float | Array = 0.0) -> None:
         self._block, self._detuning2, self._channels = block, detuning**2, channels
-        self._level2 = np.asarray(level, float)[..., None] ** 2
-        self._levels = self._level2.shape[:-1]
-        others = LOAD + channels
-        self._x, self._p = np.zeros((*self._levels, others, columns)), np.zeros((*self._levels, others, others))
+        self._levels, self._level2 = np.shape(level), np.ravel(level)[:, None] ** 2
+        count, others = len(self._level2), LOAD + channels
+        self._x, self._p = np.zeros((count, others, columns)), np.zeros((count, others, others))
         self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
-        self._p[..., :LOAD, :LOAD] = _diagonal(self._stationary)
+        self._p[:, :LOAD, :LOAD] = _diagonal(self._stationary)
         self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
         self._posture: ModalStates | None = None
@@ -179,23 +179,26 @@ class InnovationFilter:
         kept = min(size, old)
         places = [*range(kept), *range(old, old + others)]
         at = [*range(kept), *range(size, size + others)]
-        x = np.zeros((*self._levels, size + others, self._x.shape[-1]))
-        p = np.zeros((*self._levels, size + others, size + others))
-        p[..., :size, :size] = modes.rest
+        count, states, columns = len(self._level2), size + others, self._x.shape[-1]
+        x, p = np.zeros((count, states, columns)), np.zeros((count, states, states))
+        p[:, :size, :size] = modes.rest
         (to, across), (of, beside) = np.ix_(at, at), np.ix_(places, places)
-        x[..., at, :], p[..., to, across] = self._x[..., places, :], self._p[..., of, beside]
+        x[:, at], p[:, to, across] = self._x[:, places], self._p[:, of, beside]
         self._x, self._p, self._size = x, p, size
-        self._least, self._driven = modes.least, self._detuning2 * modes.driven
         self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         at_once = self._level2 * (modes.lifted**2).sum(axis=1)
-        self._rough, self._pushed = ROUGH**2 * at_once, at_once[..., -2:].sum(axis=-1, keepdims=True)
-        self._turn = np.eye(size + LOAD)
+        self._rough, self._pushed = ROUGH**2 * at_once, at_once[:, -2:].sum(axis=1)
+        self._turn, self._least, self._driven = np.eye(states), np.zeros((states, states)), np.zeros((states, states))
         self._turn[:size, :size] = modes.turn
-        self._turn[:size, size:] = np.hstack([modes.pushed, modes.pushed])
-        self._turn[size:, size:] = np.diag(self._kept)
+        self._turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
+        self._turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
+        self._least[:size, :size], self._driven[:size, :size] = modes.least, self._detuning2 * modes.driven
+        self._added = np.zeros((count, states))
+        self._added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
+        self._scratch = np.zeros((states, max(states, columns)))
         if is_first:
-            self._p[..., :size, :size] += _swung(modes, self._level2)
+            self._p[:, :size, :size] += _swung(modes, self._level2)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
         """Innovations of one block.
@@ -218,22 +221,20 @@ class InnovationFilter:
         Innovations
             Of the channels that were measured, and the probability of the residuals among them.
         """
-        shaken = shaking + self._pushed
-        self._go_on(errors2, shaken, travel)
-        rows = np.isfinite(table[:, 0])
-        if not rows.any():
-            return Innovations(np.zeros((*self._levels, 0, table.shape[1])), np.zeros(self._levels))
-        shown = self._shown[rows]
-        cross = self._p @ shown.T
-        own = (noise + _diagonal(shaken * self._shaken + self._rough))[..., rows, :][..., rows]
-        root = np.linalg.cholesky(shown @ cross + own)
-        white = np.linalg.solve(root, np.concatenate([table[rows] - shown @ self._x, cross.mT], axis=-1))
-        innovation, cross = white[..., : table.shape[1]], white[..., table.shape[1] :]
-        self._x = self._x + cross.mT @ innovation
-        self._p = self._p - cross.mT @ cross
-        left = innovation[..., :1]
-        log = -0.5 * (left.mT @ left)[..., 0, 0] - np.log(root.diagonal(axis1=-2, axis2=-1)).sum(axis=-1)
-        return Innovations(innovation, np.asarray(log))
+        kept, rest = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH), self._size + LOAD
+        self._fresh = False
+        self._turn[rest:, rest:] = kept * np.eye(self._channels)
+        self._added[:, rest:] = (1.0 - kept * kept) * errors2
+        rows = np.flatnonzero(np.isfinite(table[:, 0]))
+        count, measured = len(self._level2), len(rows)
+        white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed
+        root, gain, state = np.zeros((measured, measured)), np.zeros((measured, len(self._turn))), (self._x, self._p)
+        own = shaken[:, None] * self._shaken + self._rough
+        change = self._turn, self._least, self._driven, shaken, self._added
+        filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
+        if np.isnan(log).any():
+            raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
+        return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
 
     def load(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
         """Force at the tip along x and y, shape (..., 2), and its covariance, shape (..., 2, 2); N, after the newest block.
@@ -244,25 +245,10 @@ class InnovationFilter:
             Of the parameters of the first k signatures.
         """
         here = slice(self._size, self._size + LOAD)
-        by, k = BOTH @ self._x[..., here, 1:], len(mean)
-        force = (BOTH @ self._x[..., here, :1])[..., 0] - by[..., :k] @ mean
-        return force, BOTH @ self._p[..., here, here] @ BOTH.T + by[..., :k] @ covariance @ by[..., :k].mT
-
-    def _go_on(self, errors2: Array, shaking: Array, travel: float) -> None:
-        """To the next block, before it is measured; `shaking` has the shape (..., 1)."""
-        m, at = self._size, self._size + LOAD
-        kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
-        self._fresh = False
-        x, p = self._x, self._p
-        x[..., :at, :] = self._turn @ x[..., :at, :]
-        x[..., at:, :] *= kept
-        p[..., :at, :] = self._turn @ p[..., :at, :]
-        p[..., :at] = p[..., :at] @ self._turn.T
-        p[..., at:, :] *= kept
-        p[..., at:] *= kept
-        p[..., :m, :m] += self._least + shaking[..., None] * self._driven
-        p[..., m:at, m:at] += _diagonal((1.0 - self._kept**2) * self._stationary)
-        p[..., at:, at:] += np.diag((1.0 - kept * kept) * errors2)
+        by, k = BOTH @ self._x[:, here, 1:], len(mean)
+        force = (BOTH @ self._x[:, here, :1])[..., 0] - by[..., :k] @ mean
+        spread = BOTH @ self._p[:, here, here] @ BOTH.T + by[..., :k] @ covariance @ by[..., :k].mT
+        return force.reshape(*self._levels, 2), spread.reshape(*self._levels, 2, 2)
 
 
 def _diagonal(values: Array) -> Array:

@@ -1,0 +1,40 @@
+"""Kernels of health are compiled before the first sample, not while samples wait."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
+CODE = """
+import sys
+from pathlib import Path
+from boom_twin.bag.reader import scan
+from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of
+from boom_twin.health.inference.kalman_update import correct, filter_block
+from boom_twin.health.sensor_survey import survey
+from boom_twin.offline.reader_process import items_of
+from boom_twin.twin.blocks import ReportBlock, SampleBlock
+from boom_twin.twin.twin import Twin
+
+path = Path(sys.argv[1])
+scene, topics = scene_of(path, None).scene, mapping_of(path, None, 4, "").topics
+twin = Twin(scene, baseline=baseline_of(path, None).baseline)
+twin.warm_up()
+kernels = filter_block, correct, survey
+ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
+session = scan(path)
+wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]
+told = 0
+for item in items_of(path, topics, wanted, 4):
+    if isinstance(item, SampleBlock) and told < 3:
+        found = [each for each in twin.update_block(item) if isinstance(each, ReportBlock)]
+        told += sum(len(each.health) for each in found)
+print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)
+"""
+
+
+def test_nothing_is_compiled_while_a_session_runs():
+    found = subprocess.run([sys.executable, "-c", CODE, str(SESSION)], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[1, 1, 1] [1, 1, 1] 3"
