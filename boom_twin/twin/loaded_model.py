@@ -84,6 +84,12 @@ class ModelPreparation:
             self._thread = None
             self._go_on()
 
+    def finish(self) -> None:
+        """Wait until all that was asked for is ready, and ask for it: where no sample waits."""
+        while self._thread is not None:
+            self._thread.join()
+            self.take_in()
+
     def close(self) -> None:
         """Ask for nothing any more; returns when the other thread has ended."""
         if self._thread is not None:

@@ -78,6 +78,16 @@ def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_
     assert twin.settings.gap == 0.3 and makers[0] == "MainThread" and set(makers[1:]) == {"model"}
 
 
+def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> None:
+    twin = Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"payload": 40.0})
+    preparation.tune({"payload": 20.0})
+    preparation.finish()
+    assert twin.requests.settings.payload == 20.0 and twin.requests.due
+    assert twin.update(samples(1)[0]).accepted and twin.settings.payload == 20.0 and makers == ["MainThread", "model", "model"]
+
+
 def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
     twin = Twin(load_scene())
     preparation = ModelPreparation(twin)

@@ -94,6 +94,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from the next full stroke sample, and listen."""
         assert self._twin is not None
+        self._preparation.finish()
         self._twin.reset()
         self._diagnostics.start()
         gc.collect()
