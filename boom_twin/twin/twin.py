@@ -151,7 +151,22 @@ class Twin:
         return found
 
     def model(self, settings: Settings) -> LoadedModel:
-        """The model under the load of `settings`; nothing of the twin changes, so that a thread of its own can make it."""
+        """The model under the load of `settings`; nothing of the twin changes, so that a thread of its own can make it.
+
+        Parameters
+        ----------
+        settings : Settings
+
+        Returns
+        -------
+        LoadedModel
+            What `ModelPreparation` gives to `requests.tune`.
+
+        Raises
+        ------
+        UsageError
+            The load cannot be.
+        """
         return loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
 
     def _adopt(self, model: LoadedModel) -> None:
