@@ -138,7 +138,7 @@ class Requests:
     due : bool
         Whether anything waits.
     model : LoadedModel or None
-        Of the load of `settings`, if it was made beforehand.
+        Of `settings`, if it was made beforehand.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -155,10 +155,7 @@ class Requests:
         UsageError
             A value is out of bounds, or cannot change while the twin runs.
         """
-        settings = self.settings.tuned(live)
-        if model is not None or settings.load != self.settings.load:
-            self.model = model
-        self.settings, self.due = settings, True
+        self.settings, self.model, self.due = self.settings.tuned(live), model, True
 
     def zero(self, values: Mapping[str, float]) -> None:
         """Other zeros of some sensors."""

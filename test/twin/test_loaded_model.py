@@ -88,6 +88,17 @@ def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> No
     assert twin.update(samples(1)[0]).accepted and twin.settings.payload == 20.0 and makers == ["MainThread", "model", "model"]
 
 
+def test_a_model_counts_only_with_the_settings_that_it_was_made_for(makers: list[str]) -> None:
+    twin = Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"payload": 40.0})
+    preparation.finish()
+    assert twin.requests.model is not None
+    preparation.tune({"stroke_rate": 0.2})  # before any strokes have come; health is judged by it too
+    assert twin.update(samples(1)[0]).accepted and twin.settings.stroke_rate == 0.2 and twin.settings.payload == 40.0
+    assert makers == ["MainThread", "model", "MainThread"]
+
+
 def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
     twin = Twin(load_scene())
     preparation = ModelPreparation(twin)
