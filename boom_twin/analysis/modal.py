@@ -29,17 +29,21 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
-from ..kernels.tables import OK, SENTENCES, Condensed, Motion, State, Work
-from ..kernels.transfer.clearance_pins import load_pins
+from ..kernels.tables import OK, SENTENCES, State, Work
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from ..kernels.transfer.natural_frequency import (
+    NOT_COUNTED,
+    bisect_frequency,
+    count_below,
+    inertia_response,
+    position_change,
+)
 from ..types import Array
 
 HIGHEST = 1e7  # rad/s; no mode is looked for above
 RELATIVE_WIDTH = 1e-11  # of the last bracket
 SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
 LOAD = 1e-9  # m, displacement whose inertia forces load the boom for that
-TRIES = 20  # frequencies, each a little beside the last, where one meets a pivot that is zero
 ABSURD = "Look for values in the scene that are too large or too small by many orders of magnitude."
 NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
 
@@ -73,46 +77,55 @@ def constraints(plan: Plan) -> int:
 
 def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
     """Negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
-    place(plan.tables, state, work)
-    return _pivots_about(plan, state, work, omega, work.position.copy(), drive_at_rest(plan, state, work))
+    return _AtRest(plan, state, work).count_below(omega)
 
 
-def _pivots_about(plan: Plan, state: State, work: Work, omega: float, position: Array, drive: Array) -> int:
-    """As `negative_pivots` does, of a boom that was placed; `position` and `drive` (m) are those of its equilibrium."""
-    still = np.zeros_like(position)
-    for _ in range(TRIES):
-        status, negative, condensed = _condense(plan, state, work, Motion(-omega * omega, 0.0, position, still), drive)
-        if status == OK:
-            return negative + _negative_eigenvalues(condensed.blocks) + _negative_eigenvalues(condensed.ends)
-        omega = omega * (1.0 + 1e-12) + 1e-12
-    raise SolverError(f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed: {SENTENCES[status]}. {ABSURD}")
+class _AtRest:
+    """A boom in equilibrium, as `boom_twin.kernels.transfer.natural_frequency` takes it, with scratch."""
+
+    def __init__(self, plan: Plan, state: State, work: Work) -> None:
+        place(plan.tables, state, work)
+        position, inner = work.position.copy(), work.condensed.blocks.shape[1]
+        still = np.zeros_like(position)
+        self._boom = plan.tables, state, work, position, drive_at_rest(plan, state, work), still
+        self._scratch, self._hat = np.zeros((inner + 1, inner)), np.zeros_like(position)
+
+    def count_below(self, omega: float) -> int:
+        """Natural frequencies below `omega` (rad/s), plus forces among the unknowns."""
+        place(*self._boom[:3])
+        _, count = _checked(*count_below(*self._boom, omega, self._scratch))
+        return count
+
+    def frequency(self, base: int, number: int, low: float, width: float) -> float:
+        """The frequency (rad/s), above `low`, at which the count less `base` rises from at most `number` to more."""
+        omega, _ = _checked(*bisect_frequency(*self._boom, base, number, low, width, self._scratch))
+        return omega
+
+    def response(self, omega: float, load: Array) -> Array:
+        """Solve (K - omega^2 M) dz = M load, up to a factor.
+
+        Half the difference of two small loads: the tangent holds forces too, so a large one would change K, and what the
+        state lacks to equilibrium cancels.
+        """
+        found = np.zeros_like(self._boom[1].z)
+        inertia_response(*self._boom, omega, load, LOAD, self._hat, found)
+        return found
 
 
-def _condense(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> tuple[int, int, Condensed]:
-    """Sweep the whole boom in; status, negative pivots of beams, and what was condensed, valid until the next sweep."""
-    clear_cut(work, FREE)
-    load_pins(plan.tables, state, work, motion)
-    operations, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, negative, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, operations, FREE, work.condensed)
-    return int(status), int(negative), work.condensed
+def _checked(status: int, count: int, omega: float) -> tuple[float, int]:
+    """A frequency (rad/s), and the count there; SolverError if it could not be counted."""
+    if status != OK:
+        told = f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed"
+        raise SolverError(f"{told}: {SENTENCES[status]}. {ABSURD}")
+    if count == NOT_COUNTED:
+        raise SolverError(f"the stiffness of the boom is not finite. {ABSURD}")
+    return omega, count
 
 
 def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
     """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
     cylinders, (compliances, _) = plan.tables.cylinders, plan.compliances_and_lags(state.drives[0])
     return np.asarray(work.position[cylinders.history] - compliances * state.z[cylinders.z])
-
-
-def _negative_eigenvalues(blocks: Array) -> int:
-    """Of small symmetric matrices (k, m, m) whose rows differ by many orders of magnitude: balanced first, signs stay."""
-    with np.errstate(all="ignore"):
-        for _ in range(6 if len(blocks) else 0):
-            size = np.sqrt(np.abs(blocks).max(axis=2))
-            size[size == 0.0] = 1.0
-            blocks = blocks / (size[:, :, None] * size[:, None, :])
-    if not np.isfinite(blocks).all():
-        raise SolverError(f"the stiffness of the boom is not finite. {ABSURD}")
-    return int(np.sum(np.linalg.eigvalsh(blocks) < 0.0))
 
 
 def natural_modes(
@@ -122,39 +135,19 @@ def natural_modes(
 
     `width` is the relative accuracy of the frequencies. The state stays as it is.
     """
-    base = negative_pivots(plan, state, work, 0.0)
-    place(plan.tables, state, work)
-    position, drive = work.position.copy(), drive_at_rest(plan, state, work)
-
-    def below(omega: float) -> int:
-        place(plan.tables, state, work)
-        return _pivots_about(plan, state, work, omega, position, drive) - base
-
+    boom = _AtRest(plan, state, work)
+    base = boom.count_below(0.0)
     modes: list[Mode] = []
     low = 0.0
-    for k in range(min(count, below(highest))):
-        omega = _bisect(below, k, low, width)
-        modes.append(_mode(plan, state, work, omega, modes))
+    for k in range(min(count, boom.count_below(highest) - base)):
+        omega = boom.frequency(base, k, low, width)
+        modes.append(_mode(plan, state, work, boom, omega, modes))
         low = omega * (1.0 - 1e-9)
     place(plan.tables, state, work)
     return tuple(modes)
 
 
-def _bisect(below: Callable[[float], int], k: int, low: float, width: float) -> float:
-    """The frequency (rad/s) at which the count rises from at most k to more."""
-    high = max(2.0 * low, 1.0)
-    while below(high) <= k:
-        low, high = high, 2.0 * high
-    while high - low > width * high:
-        middle = 0.5 * (low + high)
-        if below(middle) > k:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
-
-
-def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode]) -> Mode:
+def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:
     """Inverse iteration from a random inertial load, a little beside `omega`, free of the `lower` modes."""
     rng = np.random.default_rng(1)
     motion = rng.standard_normal(len(plan.masses)) * (plan.masses > 0.0)
@@ -162,30 +155,13 @@ def _mode(plan: Plan, state: State, work: Work, omega: float, lower: list[Mode])
     for _ in range(3):
         for mode in lower:
             motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
-        increments = _response(plan, state, work, omega * (1.0 - SHIFT), motion)
-        motion = along(plan, state, work, increments, lambda: work.position.copy())
+        increments, motion = boom.response(omega * (1.0 - SHIFT), motion), np.zeros_like(motion)
+        position_change(plan.tables, state, work, state.z.copy(), increments, _nudge(plan, increments), motion)
         size = math.sqrt(float(plan.masses @ motion**2))
         if not 0.0 < size < math.inf:
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
         motion, increments = motion / size, increments / size
     return Mode(omega / (2.0 * math.pi), increments, motion, state.drives[0].copy())
-
-
-def _response(plan: Plan, state: State, work: Work, omega: float, load: Array) -> Array:
-    """Solve (K - omega^2 M) dz = M load, up to a factor.
-
-    Half the difference of two small loads: the tangent holds forces too, so a large one would change K, and what the state
-    lacks to equilibrium cancels.
-    """
-    place(plan.tables, state, work)
-    position, still = work.position.copy(), np.zeros_like(work.position)
-    drive, sides = drive_at_rest(plan, state, work), []
-    for size in (LOAD, -LOAD):
-        motion = Motion(-omega * omega, 0.0, position + size * load, still)
-        _, _, condensed = _condense(plan, state, work, motion, drive)
-        sweep_out(plan.tables, state, work, condensed, ROOT, np.int64(len(plan.tables.operations)), FREE)
-        sides.append(work.dz.copy())
-    return np.asarray(sides[0] - sides[1])
 
 
 def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
@@ -196,8 +172,7 @@ def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
     """Derivative of what `read` returns along `increments` of the unknowns, by central differences."""
     z = state.z.copy()
-    size = NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
-    sides = []
+    size, sides = _nudge(plan, increments), []
     for sign in (1.0, -1.0):
         state.z[:] = z + sign * size * increments
         place(plan.tables, state, work)
@@ -205,6 +180,11 @@ def along(plan: Plan, state: State, work: Work, increments: Array, read: Callabl
     state.z[:] = z
     place(plan.tables, state, work)
     return np.asarray((sides[0] - sides[1]) / (2.0 * size))
+
+
+def _nudge(plan: Plan, increments: Array) -> float:
+    """Of how many `increments` of the unknowns derivatives are taken."""
+    return NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
 
 
 SWUNG = 0.3  # of the tip's deflection: how far a boom at work swings
@@ -356,9 +336,10 @@ def damping_ratio(plan: Plan, mode: Mode) -> float:
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
     compliances, lags = plan.compliances_and_lags(mode.drives)
     loss = sum((lags * compliances * mode.increments[t.cylinders.z] ** 2).tolist())
-    for row, beam in enumerate(t.beams):
-        q = mode.increments[beam.z : beam.z + beam.bending]
-        loss += beam.beta * float(q @ t.stiffness[row, : len(q), : len(q)] @ q)
-        if beam.axial:
-            loss += beam.beta * beam.axial_stiffness * mode.increments[beam.z + beam.bending] ** 2
+    columns = (t.beams[name].tolist() for name in ("z", "bending", "beta", "axial", "axial_stiffness"))
+    for row, (z, bending, beta, axial, stiffness) in enumerate(zip(*columns, strict=True)):
+        q = mode.increments[z : z + bending]
+        loss += beta * float(q @ t.stiffness[row, :bending, :bending] @ q)
+        if axial:
+            loss += beta * stiffness * mode.increments[z + bending] ** 2
     return float(loss / (2.0 * omega))

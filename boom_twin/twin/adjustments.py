@@ -11,6 +11,7 @@ from ..config.settings import Settings
 from ..errors import UsageError
 from ..types import SECOND, SENSORS, Array, Change, Stream
 from .blocks import CODES
+from .loaded_model import LoadedModel
 from .state import COUNT, FIRST, NONE, RECENT, STROKES, ZEROS, Ring, TwinState, zeros_at
 
 
@@ -136,22 +137,25 @@ class Requests:
         Whether a start from rest is asked for.
     due : bool
         Whether anything waits.
+    model : LoadedModel or None
+        Of `settings`, if it was made beforehand.
     """
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.zeros: dict[str, float] = {}
         self.from_rest = self.due = False
+        self.model: LoadedModel | None = None
 
-    def tune(self, live: Mapping[str, float]) -> None:
-        """Other live settings.
+    def tune(self, live: Mapping[str, float], model: LoadedModel | None = None) -> None:
+        """Other live settings, whose `model` may have been made beforehand, see `ModelPreparation`.
 
         Raises
         ------
         UsageError
             A value is out of bounds, or cannot change while the twin runs.
         """
-        self.settings, self.due = self.settings.tuned(live), True
+        self.settings, self.model, self.due = self.settings.tuned(live), model, True
 
     def zero(self, values: Mapping[str, float]) -> None:
         """Other zeros of some sensors."""
@@ -163,10 +167,10 @@ class Requests:
 
     def repeat(self, change: Change) -> None:
         """All that was done to another twin with the sample of that stamp; UsageError as for `tune`."""
-        self.settings = self.settings.tuned(change.settings)
+        self.tune(change.settings)
         self.zeros, self.from_rest, self.due = change.zeros, change.from_rest, True
 
     def take(self) -> bool:
         """Nothing waits any more; tells whether a start from rest was asked for."""
-        from_rest, self.from_rest, self.due = self.from_rest, False, False
+        from_rest, self.from_rest, self.due, self.model = self.from_rest, False, False, None
         return from_rest

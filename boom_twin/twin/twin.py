@@ -11,14 +11,10 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
-from ..estimation.boom_predictor import BoomPredictor
-from ..estimation.deviation_modes import DeviationModes
-from ..estimation.step_choice import choose_steps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
-from ..health.monitor import HealthMonitor, warm_up
+from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
-from ..scene.edit import loaded
 from ..scene.kinematics import stroke_curve
 from ..scene.source import SceneSource, as_scene
 from ..types import LIMIT, NANO, Array, Change, Mount, Report, Sample, Stream, channels_of
@@ -27,6 +23,7 @@ from .block_update import CAPACITY, BlockUpdate, limits_of
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
 from .expected_readings import Deviations
 from .load_shedding import LoadShedding
+from .loaded_model import LoadedModel, loaded_model
 from .run import Run
 from .sample_check import SHORTEST, SampleCheck
 from .stamp_check import (
@@ -99,7 +96,7 @@ class Twin:
         self._widths = [len(names) for names in self._channels.values()]
         self._state = new_state(len(scene.joints), np.array(self._widths))
         self._state.clock[NEWEST] = NONE
-        self._build()
+        self._adopt(self.model(self.settings))
         self._edge = SampleCheck(self._channels)
         self._run: Run | None = None
         self._failed: int | None = None
@@ -154,17 +151,30 @@ class Twin:
         self.requests.zero(found)
         return found
 
-    def _build(self) -> None:
-        """The model under the present load."""
-        scene = loaded(self.scene, *self.settings.load)
-        self._boom = BoomPredictor(scene)
+    def model(self, settings: Settings) -> LoadedModel:
+        """The model under the load of `settings`; nothing of the twin changes, so that a thread of its own can make it.
+
+        Parameters
+        ----------
+        settings : Settings
+
+        Returns
+        -------
+        LoadedModel
+            What `ModelPreparation` gives to `requests.tune`.
+
+        Raises
+        ------
+        UsageError
+            The load cannot be.
+        """
+        return loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
+
+    def _adopt(self, model: LoadedModel) -> None:
+        """Go on with this model, which is of the present load."""
+        self._boom, self.judge, self._modes, self.steps = model.boom, model.judge, model.modes, model.steps
         self.plan = self._boom.plan
-        self.judge = None
-        if self.baseline is not None:
-            self.judge = HealthMonitor(scene, self.settings, self.mounts, self.baseline, self._on_block)
-        self._modes = DeviationModes(scene, self.plan, self.settings, self.mounts)
-        self.steps = choose_steps(scene, self.plan, self.settings)
-        limits = limits_of(scene, self.plan, self.settings, self.steps, self.mounts)
+        limits = limits_of(model.scene, self.plan, self.settings, self.steps, self.mounts)
         parts = self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge
         self._compiled = BlockUpdate(*parts, self.counts, self.shedding)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
@@ -172,6 +182,7 @@ class Twin:
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
+        model = asked.model
         from_rest, self.settings = asked.take(), asked.settings
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
@@ -187,7 +198,7 @@ class Twin:
             self._begin_anew()
             keep_waiting(self._state, stamp, -NONE)
         if "load" in events:
-            self._build()
+            self._adopt(model or self.model(self.settings))
         return events
 
     def _begin_anew(self) -> None:

@@ -30,12 +30,12 @@ PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
 ESTIMATES = [Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD]
 SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES, *ESTIMATES]
 ASKED: dict[int, Callable[[Any], Any]] = {
-    500: lambda remote: remote.set("payload", 35.0),
+    300: lambda remote: remote.set("payload", 35.0),  # the model is made beside the samples, which takes its time
     900: lambda remote: remote.trigger("rezero/joint_2"),
     1200: lambda remote: remote.trigger("reset"),
     1500: lambda remote: remote.set("gap", 0.2),
     1800: lambda remote: remote.trigger("rezero/cylinder_1"),
-    2100: lambda remote: remote.set("line_fill", 8.0),
+    1950: lambda remote: remote.set("line_fill", 8.0),
     2200: lambda remote: remote.trigger("acknowledge"),
 }
 """What is done after so many messages."""

@@ -20,6 +20,7 @@ from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
 from ...twin.driver import drive
+from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Stream
 from ..log import Log
@@ -93,6 +94,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from the next full stroke sample, and listen."""
         assert self._twin is not None
+        self._preparation.finish()
         self._twin.reset()
         self._diagnostics.start()
         gc.collect()
@@ -149,7 +151,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
-        self._twin, self._decoder = twin, SampleDecoder(joints, topics)
+        self._twin, self._decoder, self._preparation = twin, SampleDecoder(joints, topics), ModelPreparation(twin)
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
@@ -164,7 +166,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
             self.queue.catch_up()
-            self._twin.requests.tune(asked)
+            self._preparation.tune(asked)
 
     def _stop_listening(self) -> None:
         self._diagnostics.stop()
@@ -179,6 +181,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs.clear()
         if self._twin is not None:
             self._twin_services.close()
+            self._preparation.close()
         self._twin = None
         if self._page is not None:
             self._page.close()
@@ -196,6 +199,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
         assert self._twin is not None
+        self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
         self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
         for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg)):

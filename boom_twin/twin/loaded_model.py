@@ -1,0 +1,117 @@
+"""The twin's model under one load, and its preparation in a thread while samples go on through the present one.
+
+A model takes some hundredths of a second, and depends on scene and settings alone. A sample would wait for it; prepared beside,
+it is taken in between two samples. The `Change` of the stroke sample that it takes effect with is recorded, as any other, and a
+replay makes the same model at the same sample.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from threading import Thread
+from typing import TYPE_CHECKING
+
+from ..config.settings import Settings
+from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.deviation_modes import DeviationModes
+from ..estimation.step_choice import StepChoice, choose_steps
+from ..health.baseline import Baseline
+from ..health.inference.block_problem import BlockProblem
+from ..health.monitor import HealthMonitor
+from ..scene.edit import loaded
+from ..scene.schema import Scene
+from ..types import Mount
+
+if TYPE_CHECKING:
+    from .twin import Twin
+
+SWITCH = 5e-4
+"""Most time (s) that a sample waits for the interpreter while a model is prepared in the other thread."""
+
+
+@dataclass(frozen=True)
+class LoadedModel:
+    """All that depends on the load; `scene` has it."""
+
+    scene: Scene
+    boom: BoomPredictor
+    judge: HealthMonitor | None
+    modes: DeviationModes
+    steps: StepChoice
+
+
+def loaded_model(
+    scene: Scene,
+    settings: Settings,
+    mounts: Sequence[Mount | None],
+    baseline: Baseline | None,
+    on_block: Callable[[BlockProblem], object] | None,
+) -> LoadedModel:
+    """The model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
+    scene = loaded(scene, *settings.load)
+    boom = BoomPredictor(scene)
+    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block)
+    modes = DeviationModes(scene, boom.plan, settings, mounts)
+    return LoadedModel(scene, boom, judge, modes, choose_steps(scene, boom.plan, settings))
+
+
+class ModelPreparation:
+    """Asks a twin for live settings as soon as the model that they need is there.
+
+    Parameters
+    ----------
+    twin : Twin
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self._twin = twin
+        self._asked: dict[str, float] = {}
+        self._thread: Thread | None = None
+        self._made: tuple[Settings, LoadedModel | None] | None = None
+
+    def tune(self, live: Mapping[str, float]) -> None:
+        """Other live settings; UsageError, and nothing asked, if a value is out of bounds."""
+        self._twin.requests.settings.tuned({**self._asked, **live})
+        self._asked.update(live)
+        if self._thread is None:
+            self._go_on()
+
+    def take_in(self) -> None:
+        """Ask for what is ready; to be called between two samples, in the thread that updates the twin."""
+        if self._thread is not None and not self._thread.is_alive():
+            self._thread = None
+            self._go_on()
+
+    def finish(self) -> None:
+        """Wait until all that was asked for is ready, and ask for it: where no sample waits."""
+        while self._thread is not None:
+            self._thread.join()
+            self.take_in()
+
+    def close(self) -> None:
+        """Ask for nothing any more; returns when the other thread has ended."""
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _go_on(self) -> None:
+        """Ask if no other model is needed, or the one that is has been made; else make it."""
+        requests, made = self._twin.requests, self._made
+        settings = requests.settings.tuned(self._asked)
+        if settings.load == requests.settings.load or (made is not None and made[0] == settings):
+            requests.tune(self._asked, made[1] if made is not None and made[0] == settings else None)
+            self._asked, self._made = {}, None
+            return
+        self._thread = Thread(target=self._make, args=(settings,), name="model")
+        self._thread.start()
+
+    def _make(self, settings: Settings) -> None:
+        self._made = settings, None  # should it fail, the twin makes it, and fails, at a sample
+        usual = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH)
+        try:
+            self._made = settings, self._twin.model(settings)
+        finally:
+            sys.setswitchinterval(usual)

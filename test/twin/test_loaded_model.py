@@ -1,0 +1,112 @@
+"""The model of another load is made beside the samples, and a twin that repeats the change gives the same to the bit."""
+
+from __future__ import annotations
+
+from threading import current_thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boom_twin import Report, Sample, Stream, Twin, load_scene
+from boom_twin.errors import UsageError
+from boom_twin.health.baseline import load_baseline
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.twin import loaded_model
+from boom_twin.twin.loaded_model import ModelPreparation
+
+from .test_changes import equal
+
+STEP = 5_000_000  # ns
+
+
+@pytest.fixture
+def makers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The threads in which models are made."""
+    found: list[str] = []
+    original = loaded_model.BoomPredictor
+
+    def noted(*arguments: Any) -> Any:
+        found.append(current_thread().name)
+        return original(*arguments)
+
+    monkeypatch.setattr(loaded_model, "BoomPredictor", noted)
+    return found
+
+
+def samples(count: int) -> list[Sample]:
+    strokes, noise = strokes_of_posture(load_scene(), "arch"), np.random.default_rng(2).normal(0.0, 2e-5, (count, 4))
+    return [Sample(Stream.STROKES, k * STEP, strokes + noise[k]) for k in range(count)]
+
+
+def driven(twin: Twin, preparation: ModelPreparation, asked: dict[int, Any], rows: list[Sample]) -> list[Report]:
+    """Asks before samples of these numbers; at the 100th the model is waited for."""
+    reports = []
+    for k, sample in enumerate(rows):
+        if k in asked:
+            preparation.tune(asked[k])
+        if k == 100 and preparation._thread is not None:
+            preparation._thread.join()
+        preparation.take_in()
+        reports.append(twin.update(sample))
+    return reports
+
+
+def test_no_sample_waits_for_the_model_of_another_load_and_a_replay_repeats_it(makers: list[str]) -> None:
+    rows, twin = samples(160), Twin(load_scene(), baseline=load_baseline())
+    reports = driven(twin, ModelPreparation(twin), {50: {"payload": 40.0}}, rows)
+    assert makers == ["MainThread", "model"]
+    changes = [report.change for report in reports if report.change is not None]
+    assert [change.settings["payload"] for change in changes] == [-1.0, 40.0]
+    assert 50 * STEP <= changes[1].stamp <= 100 * STEP and changes[1].from_rest
+    other = Twin(load_scene(), baseline=load_baseline())
+    for sample, report in zip(rows, reports, strict=True):
+        if report.change is not None:
+            other.requests.repeat(report.change)
+        assert equal(report, other.update(sample))
+
+
+def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_once(makers: list[str]) -> None:
+    rows, twin = samples(130), Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"payload": 40.0})
+    preparation.tune({"gap": 0.3})
+    preparation.tune({"payload": 20.0})
+    while twin.settings.payload != 20.0:
+        preparation.take_in()
+        twin.update(rows.pop(0)) if twin.requests.due else None
+    assert twin.settings.gap == 0.3 and makers[0] == "MainThread" and set(makers[1:]) == {"model"}
+
+
+def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> None:
+    twin = Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"payload": 40.0})
+    preparation.tune({"payload": 20.0})
+    preparation.finish()
+    assert twin.requests.settings.payload == 20.0 and twin.requests.due
+    assert twin.update(samples(1)[0]).accepted and twin.settings.payload == 20.0 and makers == ["MainThread", "model", "model"]
+
+
+def test_a_model_counts_only_with_the_settings_that_it_was_made_for(makers: list[str]) -> None:
+    twin = Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"payload": 40.0})
+    preparation.finish()
+    assert twin.requests.model is not None
+    preparation.tune({"stroke_rate": 0.2})  # before any strokes have come; health is judged by it too
+    assert twin.update(samples(1)[0]).accepted and twin.settings.stroke_rate == 0.2 and twin.settings.payload == 40.0
+    assert makers == ["MainThread", "model", "MainThread"]
+
+
+def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
+    twin = Twin(load_scene())
+    preparation = ModelPreparation(twin)
+    preparation.tune({"gap": 0.3})
+    assert twin.requests.due and makers == ["MainThread"]
+    with pytest.raises(UsageError, match="payload"):
+        preparation.tune({"payload": -2.0})
+    preparation.tune({"payload": 10.0})
+    preparation.close()
+    preparation.take_in()
+    assert twin.requests.settings.payload == -1.0
