@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -104,6 +105,38 @@ def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str,
     assert path in faults and words in str(faults[path]), str(caught.value)
     line = EXAMPLE.replace(old, new).splitlines()[(faults[path].line or 0) - 1]
     assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
+
+
+def test_a_joint_that_cannot_do_its_range_is_refused_with_the_range_that_it_can_do(tmp_path: Path) -> None:
+    old = "range_deg: [-165, 10], bore: 200 mm"
+    assert EXAMPLE.count(old) == 1
+    with pytest.raises(SceneError) as caught:
+        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-179.5, 10], bore: 200 mm, closed_length: 1.3, max_stroke: 1.25"))
+    (fault,) = caught.value.faults  # and none of postures, which the table does not name
+    assert fault.path == "joints[1].range_deg" and "range_deg: [-179.5, 10]" in EXAMPLE.replace(old, "range_deg: [-179.5, 10]")
+    assert (fault.line or 0) == EXAMPLE[: EXAMPLE.index(old)].count("\n") + 1
+    assert "do not meet at -179.5 to" in fault.bound or "turns back at" in fault.bound
+    low = float(fault.remedy.partition("[")[2].partition(",")[0])
+    scene_of(tmp_path, EXAMPLE.replace(old, f"range_deg: [{low}, 10], bore: 200 mm"))  # is not refused
+
+
+def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
+    changed = EXAMPLE.replace("pipe: 25 kg/m", "pipe: 2500 kg/m").replace("7100 mm]", "6550 mm]")
+    _, _, oddities = scene_of(tmp_path, changed)
+    lines = changed.splitlines()
+    told = {oddity.path: oddity for oddity in oddities}
+    assert "pipe: 2500 kg/m" in lines[(told["pipe"].line or 0) - 1] and "sections[0].rho_A = 2621" in told["pipe"].bound
+    assert "6550 mm" in lines[(told["sections[1].beam"].line or 0) - 1]
+    assert len([oddity for oddity in oddities if oddity.path == "pipe"]) == 1
+
+
+def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> None:
+    rows = CSV.splitlines()
+    spaced = "\n".join([rows[0], rows[1], ",,,", rows[2].replace("7100", "6550")])  # the empty row counts in the spreadsheet
+    (oddity,) = scene_of(tmp_path, spaced, "table.csv")[2]
+    assert str(oddity).startswith("line 4: sections[1].beam (cells B4, C4) = [0.55, 6.55]")
+    with pytest.raises(SceneError, match=re.escape("line 3: sections[1].wall (cell F3) = 6.0: two walls fill")):
+        scene_of(tmp_path, CSV.replace("wall [mm]", "wall").replace("420,8", "420,0.008"), "table.csv")
 
 
 @pytest.mark.parametrize(

@@ -96,8 +96,8 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
                     f"stretched out, the boom loads the cylinder with about {force / 1e3:.3g} kN, and its oil gives way by "
                     f"{1e3 * force / k:.3g} mm; expected at most {1e3 * most:.3g} mm, 2 % of its stroke"
                 )
-                key = "k" if joint.cylinder.oil is None else "oil"
-                yield warning(draft, ("joints", i, "cylinder", key), k, bound, "Check k (N/m), and the masses.")
+                key, remedy = ("k", "k (N/m)") if joint.cylinder.oil is None else ("oil", "bore and rod (diameters, m)")
+                yield warning(draft, ("joints", i, "cylinder", key), k, bound, f"Check {remedy}, and the masses.")
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
