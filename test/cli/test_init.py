@@ -80,11 +80,11 @@ def test_links_that_cannot_meet_end_with_exit_code_1_and_no_scene(capsys: pytest
     main(["init", "--example-table"])
     table = capsys.readouterr().out
     assert "range_deg: [-165, 10], bore: 200 mm" in table
-    wider = table.replace("range_deg: [-165, 10], bore: 200", "range_deg: [-185, 10], bore: 200")
+    wider = table.replace("range_deg: [-165, 10], bore: 200", "range_deg: [-200, 10], bore: 200")
     Path("table.yaml").write_text(wider, encoding="utf-8")
     assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
     out, err = capsys.readouterr()
-    assert out == "" and "joints[1].range_deg = [-185.0, 10.0]" in err and "Narrow range_deg to [" in err
+    assert out == "" and "joints[1].range_deg = [-200.0, 10.0]" in err and "Narrow range_deg to [" in err
     assert [file.name for file in folder.iterdir()] == ["table.yaml"]
 
 

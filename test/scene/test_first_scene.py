@@ -23,7 +23,7 @@ CSV = """length [mm],beam_start [mm],beam_end [mm],height [mm],width [mm],wall [
 range_deg_high,bore [mm],rod [mm],C_x [mm],C_y [mm],D_x [mm],D_y [mm],E_x [mm],E_y [mm],lL [mm],lR [mm],mL,mR,\
 cylinder_pin_x,cylinder_pin_y,pivot_x,pivot_y,pipe,payload
 8300,1320,7800,560,420,8,1.32,-0.264,A,-5,85,180,125,,,,,,,,,,,0.99,-2.75,0,0,25,60
-7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1795,396,-308,-88,264,136,924,829,35,28,,,,,25,
+7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1644,337,-375,-35,252,236,930,831,35,28,,,,,25,
 """.replace("\\\n", "")
 
 
@@ -91,8 +91,8 @@ def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
         ("bore: 180 mm", "bore: 180", "joints[0].bore", "not be more than 1"),
         ("rod: 120 mm", "rod: 220 mm", "joints[1].rod", "thinner than the bore"),
         ("height: 450 mm", "hight: 450 mm", "sections[1].hight", "nearest known key here is `height`"),
-        ("lL: 924 mm", "lL: 92.4 mm", "joints[1].range_deg", "do not meet at any angle"),
-        ("D: [-308 mm, -88 mm],", "", "joints[1].D", "needs it"),
+        ("lL: 930 mm", "lL: 93 mm", "joints[1].range_deg", "do not meet at any angle"),
+        ("D: [-375 mm, -35 mm],", "", "joints[1].D", "needs it"),
         ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are worked out with it"),
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
     ],
@@ -111,11 +111,11 @@ def test_a_joint_that_cannot_do_its_range_is_refused_with_the_range_that_it_can_
     old = "range_deg: [-165, 10], bore: 200 mm"
     assert EXAMPLE.count(old) == 1
     with pytest.raises(SceneError) as caught:
-        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-179.5, 10], bore: 200 mm, closed_length: 1.3, max_stroke: 1.25"))
+        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-200, 10], bore: 200 mm"))
     (fault,) = caught.value.faults  # and none of postures, which the table does not name
-    assert fault.path == "joints[1].range_deg" and "range_deg: [-179.5, 10]" in EXAMPLE.replace(old, "range_deg: [-179.5, 10]")
+    assert fault.path == "joints[1].range_deg"
     assert (fault.line or 0) == EXAMPLE[: EXAMPLE.index(old)].count("\n") + 1
-    assert "do not meet at -179.5 to" in fault.bound or "turns back at" in fault.bound
+    assert "do not meet at -200.0 to" in fault.bound or "turns back at" in fault.bound
     low = float(fault.remedy.partition("[")[2].partition(",")[0])
     scene_of(tmp_path, EXAMPLE.replace(old, f"range_deg: [{low}, 10], bore: 200 mm"))  # is not refused
 

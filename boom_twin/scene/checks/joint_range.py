@@ -62,10 +62,15 @@ def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Iterator[Findi
         yield from _narrower(draft, i, joint, row, degrees, lengths)
 
 
+def grid_of(joint: Joint) -> Array:
+    """Angles (deg) over the range of a joint."""
+    low, high = joint.range_deg
+    return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
+
+
 def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
     """Angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
-    low, high = joint.range_deg
-    degrees = np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
+    degrees = grid_of(joint)
     with np.errstate(invalid="ignore"):
         return degrees, cylinder_length(row, np.radians(degrees))[0]
 
@@ -90,7 +95,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
         angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
         reasons.append(f"the stroke turns back at {angles} deg: one stroke then belongs to two angles")
     if reasons:
-        low, high = _usable(degrees, within)
+        low, high = usable(degrees, within)
         remedy = ", or ".join([f"Narrow range_deg to [{low:g}, {high:g}]", *(remedies or ["check the pins"])])
         yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
 
@@ -117,7 +122,7 @@ def _turns(lengths: Array) -> NDArray[np.int64]:
     return np.flatnonzero(slope[1:] * slope[:-1] < 0) + 1
 
 
-def _usable(degrees: Array, lengths: Array) -> tuple[float, float]:
+def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
     """The longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
     slope = np.nan_to_num(np.sign(np.diff(lengths)))
     edges = np.flatnonzero(np.diff(slope, prepend=2.0, append=2.0))
