@@ -23,7 +23,7 @@ CSV = """length [mm],beam_start [mm],beam_end [mm],height [mm],width [mm],wall [
 range_deg_high,bore [mm],rod [mm],C_x [mm],C_y [mm],D_x [mm],D_y [mm],E_x [mm],E_y [mm],lL [mm],lR [mm],mL,mR,\
 cylinder_pin_x,cylinder_pin_y,pivot_x,pivot_y,pipe,payload
 8300,1320,7800,560,420,8,1.32,-0.264,A,-5,85,180,125,,,,,,,,,,,0.99,-2.75,0,0,25,60
-7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1644,337,-375,-35,252,236,930,831,35,28,,,,,25,
+7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1738,544,-362,-55,223,209,974,836,35,28,,,,,25,
 """.replace("\\\n", "")
 
 
@@ -91,8 +91,8 @@ def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
         ("bore: 180 mm", "bore: 180", "joints[0].bore", "not be more than 1"),
         ("rod: 120 mm", "rod: 220 mm", "joints[1].rod", "thinner than the bore"),
         ("height: 450 mm", "hight: 450 mm", "sections[1].hight", "nearest known key here is `height`"),
-        ("lL: 930 mm", "lL: 93 mm", "joints[1].range_deg", "do not meet at any angle"),
-        ("D: [-375 mm, -35 mm],", "", "joints[1].D", "needs it"),
+        ("lL: 974 mm", "lL: 97.4 mm", "joints[1].range_deg", "do not meet at any angle"),
+        ("D: [-362 mm, -55 mm],", "", "joints[1].D", "needs it"),
         ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are worked out with it"),
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
     ],
