@@ -13,7 +13,7 @@ from ..errors import ABSENT, Fault, SceneError
 from .block_reader import validated
 from .format import Format
 from .glossary import MEANING
-from .schema import Base, Bore, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
+from .schema import Base, Bore, BulkModulus, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
 from .yaml_reader import NUMBER, Document, Place, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
@@ -60,7 +60,7 @@ class BoomTable(Part):
     material: Material = STEEL
     base: Base
     pipe: NotNegative = 0.0
-    bulk_modulus: Positive = 1.4e9
+    bulk_modulus: BulkModulus = 1.4e9
     damping_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.01
     payload: NotNegative | None = None
     line_fill: NotNegative | None = None

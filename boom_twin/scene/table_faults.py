@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from ..errors import ABSENT, Fault
 from .yaml_reader import Document, Place
 
 ORIGINS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (r"(sections\[\d+\])\.(A|I|rho_I)", (r"\1.height",)),
+    (r"(sections\[\d+\])\.(A|I|rho_I)", (r"\1.wall",)),
     (r"(sections\[\d+\])\.rho_A", (r"\1.pipe", "pipe", r"\1.wall")),
     (r"(sections\[\d+\])\.(root|head)\b.*", (r"\1.beam",)),
     (r"sections\[\d+\]\.beta", ("damping_ratio",)),
@@ -24,17 +24,15 @@ ORIGINS: tuple[tuple[str, tuple[str, ...]], ...] = (
 """Paths of a scene, and the keys of a table that they come from, of which the first that is there is told."""
 
 
-def in_table(faults: Iterable[Fault], table: Document) -> list[Fault]:
+def in_table(faults: Sequence[Fault], table: Document) -> list[Fault]:
     """The faults with paths, values and lines of the table, in the order of these; one of each value that others come from."""
-    told: list[Fault] = []
+    told = [table.fault(place_of(each.path), each.value, each.bound, each.remedy) for each in faults if not _origins(each.path)]
+    blocks = {place_of(each.path)[:2] for each in told}
     of_origins: dict[str, Fault] = {}
     for fault in faults:
-        places = _origins(fault.path)
-        if places:
+        if (places := _origins(fault.path)) and place_of(fault.path)[:2] not in blocks:  # else it follows from what is told
             moved = _at_origin(fault, places, table)
             of_origins.setdefault(moved.path, moved)
-        else:
-            told.append(table.fault(place_of(fault.path), fault.value, fault.bound, fault.remedy))
     return sorted([*told, *of_origins.values()], key=lambda fault: fault.line or 0)
 
 

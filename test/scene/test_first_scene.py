@@ -95,6 +95,11 @@ def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
         ("D: [-362 mm, -55 mm],", "", "joints[1].D", "needs it"),
         ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are worked out with it"),
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
+        ("bulk_modulus: 1.4 GPa", "bulk_modulus: 14000", "bulk_modulus", "it must not be less than 1e+07"),
+        ("damping_ratio: 0.01", "damping_ratio: 1", "damping_ratio", "it must be less than 1."),
+        ("range_deg: [-165, 10], bore: 140 mm", "range_deg: [-10, 165], bore: 140 mm", "joints[2].range_deg",
+         "give `side: right`, C, D, E and R with the other sign"),
+        ("kind: B1, range", "kind: B1, side: right, range", "joints[1].range_deg", "give `side: left`, if it folds that way"),
     ],
 )
 def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
@@ -128,6 +133,26 @@ def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
     assert "pipe: 2500 kg/m" in lines[(told["pipe"].line or 0) - 1] and "sections[0].rho_A = 2621" in told["pipe"].bound
     assert "6550 mm" in lines[(told["sections[1].beam"].line or 0) - 1]
     assert len([oddity for oddity in oddities if oddity.path == "pipe"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path", "words"),
+    [
+        ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
+        ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
+        ("payload: 60 kg", "payload: 0.06", "payload", "tonnes?"),
+    ],
+)
+def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
+    assert EXAMPLE.count(old) == 1
+    oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
+    (told,) = [oddity for oddity in oddities if oddity.path == path]
+    assert words in str(told) and len(oddities) <= 2, [str(oddity) for oddity in oddities]
+
+
+def test_what_follows_from_a_warned_pin_is_not_told_again(tmp_path: Path) -> None:
+    oddities = scene_of(tmp_path, EXAMPLE.replace("C: [-1738 mm, 544 mm]", "C: [-1738, 544]"))[2]
+    assert {oddity.path for oddity in oddities} == {"joints[1].C"}
 
 
 def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from .geometry import TOLERANCE
 from .values import NEEDED
 
 STEP_DEG = 0.1
+MIRRORED = ("side", "cy", "dy", "ey", "left")  # numbers of a linkage that change their sign
 UNMET = "the links lL and lR, between D and E, do not meet at"
 Mask = NDArray[np.bool_]
 
@@ -96,8 +97,25 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
         reasons.append(f"the stroke turns back at {angles} deg: one stroke then belongs to two angles")
     if reasons:
         low, high = usable(degrees, within)
-        remedy = ", or ".join([f"Narrow range_deg to [{low:g}, {high:g}]", *(remedies or ["check the pins"])])
+        remedies = [_turned_over(joint, row, degrees), *(remedies or ["check the pins"])]
+        remedy = ", or ".join([f"Narrow range_deg to [{low:g}, {high:g}]", *filter(None, remedies)])
         yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
+
+
+def _turned_over(joint: Joint, row: np.record, degrees: Array) -> str:
+    """What would let the six-bar do the whole range if it were meant the other way up; nothing if that does not help."""
+    if joint.kind == "A":
+        return ""
+    side = "left" if joint.side == "right" else "right"
+    for signs, words in ((("side",), ""), (MIRRORED, ", C, D, E and R with the other sign of their second number")):
+        other = row.copy()
+        for key in signs:
+            other[key] = -other[key]
+        with np.errstate(invalid="ignore"):
+            lengths = cylinder_length(other, np.radians(degrees))[0]
+        if np.isfinite(lengths).all() and not _turns(lengths).size:
+            return f"give `side: {side}`{words}, if it folds that way"
+    return ""
 
 
 def _reach_words(joint: Joint, shortest: float, longest: float) -> str:
