@@ -62,7 +62,7 @@ class Envelope:
 
     def posture(self, row: int) -> str:
         """A posture in words: its name, or its section angles."""
-        return self.names[row] or "[" + ", ".join(f"{angle:.0f}" for angle in self.angles[row] + 0.0) + "]"
+        return self.names[row] or "[" + ", ".join(f"{round(angle)}" for angle in self.angles[row].tolist()) + "]"
 
 
 def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, total: None) -> Envelope:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +13,7 @@ from .main import add_json, add_scene, open_scene, print_result
 
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
+    from ..offline.replay import ProgressBar
     from ..types import Array
 
 
@@ -36,18 +36,19 @@ class Quantity(NamedTuple):
 
 def run(args: Namespace) -> int:
     """Compute, print and write."""
-    from tqdm import tqdm
-
     from ..analysis.envelope import envelope
+    from ..offline.progress import progress_of
 
     scene = open_scene(args.scene)
-    with tqdm(unit=" postures", file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
+    bars: list[ProgressBar] = []
 
-        def progress(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
+    def progress(done: int, total: int) -> None:
+        if not bars:
+            bars.append(progress_of(total, "postures", "envelope"))
+        bars[0].update(1)
 
-        found = envelope(scene, progress)
+    found = envelope(scene, progress)
+    bars[0].close()
     quantities = quantities_of(found)
     values, lines = _summary(found, quantities), _report(found, quantities)
     if args.out is not None:

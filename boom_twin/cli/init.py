@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from ..scene.boom_table import TABLE, checked_table, frozen, read_table
 from ..scene.checks.values import NEEDED
 from ..scene.first_scene import first_scene
 from ..scene.yaml_reader import NUMBER, Document, Place, words
-from ..system.atomic_files import check_new, write_atomic
+from ..system.atomic_files import check_new, check_target, write_atomic
 from .main import tell
 
 KEPT = ".table.yaml"
@@ -28,6 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("--table", metavar="FILE", help="dimensions in YAML or CSV; without it, they are asked for")
     parser.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")
+    parser.add_argument("--force", action="store_true", help="replace a scene that is there, after the table was mended")
     parser.add_argument("--example-table", action="store_true", help="print a table to start from, and do no more")
 
 
@@ -39,7 +41,7 @@ def run(args: Namespace) -> int:
     if args.out is None:
         raise UsageError("--out is absent: it names the scene to write, for example --out my_boom.yaml.")
     sources = [Path(args.table)] if args.table else []
-    check_new(args.out, sources)
+    (check_target if args.force else check_new)(args.out, sources)
     if args.table:
         table, document = read_table(Path(args.table))
         source = args.table
@@ -52,9 +54,19 @@ def run(args: Namespace) -> int:
         table, source = checked_table(document, str(kept)), str(kept)
     text, scene, oddities = first_scene(table, document, source)
     write_atomic(args.out, text)
-    tell(oddities, str(args.out))
-    print(f"Written: {args.out}, {len(scene.sections)} sections, {scene.reach:.2f} m. Next: boom_twin check {args.out}")
+    tell(oddities, source)
+    print(f"Written: {args.out}, {len(scene.sections)} sections, {scene.reach:.2f} m. {_next(args.out, source, len(oddities))}")
     return 0
+
+
+def _next(scene: Path, source: str, warnings: int) -> str:
+    """What to do after the scene is written."""
+    if not warnings:
+        picture = str(scene.with_suffix(".png"))
+        check = shlex.join(["boom_twin", "check", str(scene), "--strict", "--picture", picture])
+        return f"Next: {check}, and look at {picture}."
+    again = shlex.join(["boom_twin", "init", "--table", source, "--out", str(scene), "--force"])
+    return f"Next: mend {source} where it is warned of, then {again}"
 
 
 def _asked() -> dict[str, Any]:

@@ -16,10 +16,12 @@ from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
 
 COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}
 """Of bars, by unit."""
-ROOM = 0.6  # for words beside the bars, of what they span
+GAP = 16.0  # pixels between a bar, its words and the edge
+LEAST_SHARE = 0.1  # of the width, that is left for bars however long the words are
 
 
 def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
@@ -39,9 +41,13 @@ def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tup
     with picture(path, "Envelope over the working range", note, (18.0, 11.0)) as figure:
         grid = figure.add_gridspec(len(units) or 1, 2, width_ratios=[1.35, 1.0])
         _tips(figure.add_subplot(grid[:, 0]), scene, found)
+        bars = []
         for row, unit in enumerate(units):
             own = [(words.rpartition(", ")[0], values) for words, values in ranges if words.rpartition(", ")[2] == unit]
-            _bars(figure.add_subplot(grid[row, 1]), found, own, unit)
+            bars.append((axes := figure.add_subplot(grid[row, 1]), _bars(axes, found, own, unit)))
+        figure.draw_without_rendering()
+        for axes, labels in bars:
+            _make_room(axes, labels)
 
 
 def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
@@ -61,23 +67,39 @@ def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
     draw_base(axes, np.array(scene.base.pivot), 0.035 * scene.reach)
     axes.set_xlabel("x forward, m")
     axes.set_ylabel("y up, m")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize=11)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=11)
 
 
-def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> None:
-    """From the least to the greatest value, one bar a quantity, with the posture of each end."""
+def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> list[Annotation]:
+    """From the least to the greatest value, one bar a quantity; the labels of its ends, value and posture."""
+    labels = []
     for place, (_, values) in enumerate(own):
         low, high = int(values.argmin()), int(values.argmax())
         axes.barh(place, values[high] - values[low], left=values[low], height=0.5, color=COLOURS.get(unit, GREY), alpha=0.8)
         for row, side in ((low, "right"), (high, "left")):
             gap = -4 if side == "right" else 4
-            axes.annotate(
-                f"{values[row]:.3g} {found.posture(row)}", (values[row], place), (gap, 0), textcoords="offset points",
-                ha=side, va="center", fontsize=9, color=INK,
+            label = axes.annotate(
+                f"{float(f'{values[row]:.3g}'):g} {found.posture(row)}", (values[row], place), (gap, 0),
+                textcoords="offset points", ha=side, va="center", fontsize=9, color=INK,
             )  # fmt: skip
+            label.set_in_layout(False)  # it has its room within the axes
+            labels.append(label)
     axes.set_yticks(range(len(own)), [words for words, _ in own])
     axes.invert_yaxis()
-    low, high = min(values.min() for _, values in own), max(values.max() for _, values in own)
-    axes.set_xlim(low - ROOM * (high - low or 1.0), high + ROOM * (high - low or 1.0))
     axes.grid(False, axis="y")
     axes.set_xlabel(unit)
+    return labels
+
+
+def _make_room(axes: Axes, labels: list[Annotation]) -> None:
+    """Limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
+    width = axes.get_window_extent().width
+    ends = np.array([label.xy[0] for label in labels])
+    room = np.array([label.get_window_extent().width + GAP for label in labels])
+    sides = np.array([-1.0 if label.get_horizontalalignment() == "right" else 1.0 for label in labels])
+    span = float(np.ptp(ends)) or 1.0
+    for share in np.linspace(1.0, LEAST_SHARE, 50):  # of the width, for what the bars span
+        reach = ends + sides * room * span / (share * width)
+        if np.ptp(reach) <= span / share:
+            break
+    axes.set_xlim(reach.min(), reach.max())

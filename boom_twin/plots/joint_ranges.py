@@ -104,7 +104,9 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
 
 
 def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
-    """One position; names of the pins where it has a colour."""
+    """One position; names of the pins where it has a colour, bright around them, for links and cylinders lie below."""
+    from matplotlib.patheffects import withStroke
+
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
     draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
     if i > 0:
@@ -119,8 +121,9 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
     for name, pin in _named(joint).items():
         draw_pin(axes, pin, 5.0, colour)
         axes.annotate(
-            name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12
-        )
+            name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12,
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
+        )  # fmt: skip
 
 
 def _named(joint: JointPins) -> dict[str, Array]:
@@ -145,4 +148,4 @@ def _stroke(axes: Axes, scene: Scene, i: int) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_xlabel(f"joint {i + 1}, deg")
     axes.set_ylabel("stroke, m")
-    axes.legend(loc="upper center", fontsize=10)
+    axes.legend(loc="best", fontsize=10)

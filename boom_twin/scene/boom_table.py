@@ -13,7 +13,7 @@ from ..errors import ABSENT, Fault, SceneError
 from .block_reader import validated
 from .format import Format
 from .glossary import MEANING
-from .schema import Base, Bore, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
+from .schema import Base, Bore, BulkModulus, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
 from .yaml_reader import NUMBER, Document, Place, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
@@ -60,7 +60,7 @@ class BoomTable(Part):
     material: Material = STEEL
     base: Base
     pipe: NotNegative = 0.0
-    bulk_modulus: Positive = 1.4e9
+    bulk_modulus: BulkModulus = 1.4e9
     damping_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.01
     payload: NotNegative | None = None
     line_fill: NotNegative | None = None
@@ -172,7 +172,8 @@ def csv_document(text: str, source: str) -> Document:
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
     columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
-    for i, row in enumerate(row for row in rows[1:] if any(cell.strip() for cell in row)):
+    filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
+    for i, (line, row) in enumerate(filled):
         document.values["sections"].append({})
         document.values["joints"].append({})
         for number, (column, cell) in enumerate(zip(columns, row, strict=False)):
@@ -180,9 +181,15 @@ def csv_document(text: str, source: str) -> Document:
                 name, known = rows[0][number], ", ".join(_columns())
                 raise SceneError(source, (Fault("header", name, "no such column", f"Known are {known}.", 1),))
             if cell.strip() and not (place[0] not in ("sections", "joints") and i > 0):
-                _put(document, place, _value(cell.strip(), column[3]), i + 2)
+                _put(document, place, _value(cell.strip(), column[3]), line)
+                document.cells[place] = f"{_letters(number)}{line}"
     document.values = frozen(document.values)
     return document
+
+
+def _letters(column: int) -> str:
+    """What a spreadsheet calls a column, counted from 0: A to Z, AA, .."""
+    return (_letters(column // 26 - 1) if column > 25 else "") + chr(ord("A") + column % 26)
 
 
 def _columns() -> list[str]:

@@ -7,8 +7,8 @@ frequency, which `boom_twin.scene.straight_boom` estimates.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -22,35 +22,46 @@ from .load import examine_text
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, Joint, Oil, Scene, Section
 from .straight_boom import straight_boom
-from .yaml_reader import Document, with_end_mark, words
+from .table_faults import in_table
+from .yaml_reader import Document, with_end_mark
 
 ENDS = 1.2  # mass per metre of a rigid end against the beam's
 TUBE = 0.12  # wall of a barrel over its bore
 SPARE = 0.02  # of the travel, at each end of the stroke
 GRID = 721  # angles of a joint's range
 WIDTH = 46  # where comments begin
+RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 
 
 def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str, Scene, list[Fault]]:
-    """Text of the scene, the scene, and what `boom_twin.scene.load.examine` warns of.
+    """Text of the scene, the scene, and what `boom_twin.scene.load.examine` warns of, told at the table's keys and lines.
 
     Raises
     ------
     SceneError
-        The boom of the table cannot be: pins that do not meet, postures out of reach.
+        The boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
     """
+    text, scene, faults, odd = _examined(table, source)
+    narrower = [each for each in odd if RANGE.fullmatch(each.path)]
+    if narrower:  # a fault here: the stroke and the postures that are worked out hang on the range
+        odd = [each for each in odd if each not in narrower]
+        faults = narrower + [each for each in faults if table.postures or not each.path.startswith("postures")]
+    oddities = in_table(odd, document)
+    if faults or scene is None:
+        raise SceneError(source, tuple(in_table(faults, document)), tuple(oddities))
+    return text, scene, oddities
+
+
+def _examined(table: BoomTable, source: str) -> tuple[str, Scene | None, list[Fault], list[Fault]]:
+    """Text of the scene, the scene, None if it cannot be used, its faults and its warnings."""
     try:
         scene, _ = examine_text(_text(table, source, None), source)
         found = straight_boom(scene, _straight_stiffnesses(scene))
         text = _text(table, source, float(found.frequencies[0]) if len(found.frequencies) else None)
-        return text, *examine_text(text, source)
+        scene, odd = examine_text(text, source)
+        return text, scene, [], odd
     except SceneError as error:
-        lines = {words(place): line for place, line in document.lines.items()}
-        faults, odd = (
-            [replace(each, line=lines.get(each.path, lines.get(each.path.rpartition(".")[0]))) for each in told]
-            for told in (error.faults, error.oddities)
-        )
-        raise SceneError(source, tuple(faults), tuple(odd)) from None
+        return "", None, list(error.faults), list(error.oddities)
 
 
 def _straight_stiffnesses(scene: Scene) -> Array:

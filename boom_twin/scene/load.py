@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import Fault, SceneError, SceneWarning
 from .block_reader import validated
-from .checks import clearance, cross_sections, geometry, rigid_bodies, stretched_boom, values
+from .checks import clearance, cross_sections, cylinder_clearance, geometry, joint_range, rigid_bodies, stretched_boom, values
 from .checks.findings import Draft, Finding
 from .format import SCENE
 from .glossary import BLOCKS
@@ -55,7 +55,7 @@ CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     geometry.thin_parts,
     geometry.centres,
     clearance.pins,
-    geometry.joints,
+    joint_range.joints,
     values.suspects,
 )
 
@@ -65,6 +65,7 @@ PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
     cross_sections.beams,
     rigid_bodies.rigid_parts,
     rigid_bodies.moving_parts,
+    cylinder_clearance.clear_cylinders,
 )
 """Of a scene without faults: parts against each other."""
 

@@ -100,6 +100,7 @@ class CylinderPart(Part):
 
 
 Bore = Annotated[float, Field(ge=1e-3, le=1.0, allow_inf_nan=False)]
+BulkModulus = Annotated[float, Field(ge=1e7, le=1e11)]
 """Diameter of a piston, m. One of more than 1 m is in no boom: it was given in mm."""
 
 
@@ -108,7 +109,7 @@ class Oil(Part):
 
     bore: Bore
     rod: Positive
-    bulk_modulus: Annotated[float, Field(ge=1e7, le=1e11)]
+    bulk_modulus: BulkModulus
     cap_line: NotNegative
     rod_line: NotNegative
 

@@ -41,11 +41,12 @@ def words(place: Place) -> str:
 
 @dataclass
 class Document:
-    """Values of a YAML text, the line (from 1) of every place in it, and what was wrong with the writing."""
+    """Values of a text, line (from 1) and cell of a spreadsheet of the places in it, and what was wrong with the writing."""
 
     values: Any = None
     lines: dict[Place, int] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
+    cells: dict[Place, str] = field(default_factory=dict)
 
     def line(self, place: Place) -> int | None:
         """Line of a place; of the nearest block around it if the place itself is not in the text."""
@@ -65,7 +66,12 @@ class Document:
 
     def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
         """A fault at a place of this text."""
-        return Fault(words(place), value, bound, remedy, self.line(place))
+        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place))
+
+    def _cells_at(self, place: Place) -> str:
+        """`` (cell C3)`` of a place, or of both its numbers; nothing of a block."""
+        cells = [cell for own, cell in self.cells.items() if own[: len(place)] == place and len(own) - len(place) <= 1]
+        return f" (cell{'s' * (len(cells) > 1)} {', '.join(cells)})" if 0 < len(cells) <= 2 else ""
 
 
 def read_text(path: Path) -> str:

@@ -87,7 +87,9 @@ def test_the_command_names_worst_postures_and_writes_files(
 ) -> None:
     out = tmp_path / "out"
     assert main(["envelope", str(rigid), "--out", str(out), "--json"]) == 0
-    values = json.loads(capsys.readouterr().out)
+    captured = capsys.readouterr()
+    values, told = json.loads(captured.out), re.findall(r"^envelope: (.*)%,", captured.err, re.MULTILINE)
+    assert told == [f"{share} " for share in range(10, 101, 10)]
     assert json.loads((out / "envelope.json").read_text(encoding="utf-8")) == values
     with (out / "envelope.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))

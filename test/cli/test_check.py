@@ -113,8 +113,8 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["--help"])
     assert stop.value.code == 0
-    out = capsys.readouterr().out
-    assert all(name in out and purpose in out for name, purpose in COMMANDS.items())
+    out = " ".join(capsys.readouterr().out.split())  # Python 3.13 breaks other lines
+    assert all(f"{name} {purpose}" in out for name, purpose in COMMANDS.items())
 
 
 @pytest.mark.parametrize("name", COMMANDS)

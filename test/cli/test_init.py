@@ -60,7 +60,7 @@ def test_the_example_table_makes_a_scene_that_passes_strict(capsys: pytest.Captu
     Path("table.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
     assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 0
     out, err = capsys.readouterr()
-    assert "Next: boom_twin check boom.yaml" in out and err == ""
+    assert "Next: boom_twin check boom.yaml --strict --picture boom.png" in out and err == ""
     assert main(["check", "boom.yaml", "--strict"]) == 0
 
 
@@ -74,6 +74,33 @@ def test_nothing_is_written_over(capsys: pytest.CaptureFixture[str]) -> None:
     assert Path("boom.yaml").read_text(encoding="utf-8") == "mine"
     assert main(["init", "--table", "table.yaml"]) == 1
     assert "--out is absent" in capsys.readouterr().err
+
+
+def test_links_that_cannot_meet_end_with_exit_code_1_and_no_scene(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    main(["init", "--example-table"])
+    table = capsys.readouterr().out
+    assert "range_deg: [-165, 10], bore: 200 mm" in table
+    wider = table.replace("range_deg: [-165, 10], bore: 200", "range_deg: [-200, 10], bore: 200")
+    Path("table.yaml").write_text(wider, encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and "joints[1].range_deg = [-200.0, 10.0]" in err and "Narrow range_deg to [" in err
+    assert [file.name for file in folder.iterdir()] == ["table.yaml"]
+
+
+def test_a_warned_table_is_mended_and_written_anew(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["init", "--example-table"])
+    table = capsys.readouterr().out
+    Path("table.yaml").write_text(table.replace("7100 mm]", "6550 mm]"), encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 0
+    out, err = capsys.readouterr()
+    assert err.startswith("warning: table.yaml: line ") and "sections[1].beam" in err
+    again = out.rpartition("then ")[2].split()
+    assert again[0] == "boom_twin" and again[-1] == "--force"
+    Path("table.yaml").write_text(table, encoding="utf-8")
+    assert main(again[1:]) == 0
+    assert "sections[1].beam" not in capsys.readouterr().err
+    assert main(["check", "boom.yaml", "--strict"]) == 0
 
 
 def test_answers_make_a_scene_and_are_kept(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

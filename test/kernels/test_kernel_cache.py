@@ -173,7 +173,7 @@ def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: 
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
-            (tmp_path / name).parent.mkdir(exist_ok=True)
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, tmp_path / name)
     before = source_hash(tmp_path)
     assert before == source_hash()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ CSV = """length [mm],beam_start [mm],beam_end [mm],height [mm],width [mm],wall [
 range_deg_high,bore [mm],rod [mm],C_x [mm],C_y [mm],D_x [mm],D_y [mm],E_x [mm],E_y [mm],lL [mm],lR [mm],mL,mR,\
 cylinder_pin_x,cylinder_pin_y,pivot_x,pivot_y,pipe,payload
 8300,1320,7800,560,420,8,1.32,-0.264,A,-5,85,180,125,,,,,,,,,,,0.99,-2.75,0,0,25,60
-7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1795,396,-308,-88,264,136,924,829,35,28,,,,,25,
+7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1738,544,-362,-55,223,209,974,836,35,28,,,,,25,
 """.replace("\\\n", "")
 
 
@@ -90,10 +91,15 @@ def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
         ("bore: 180 mm", "bore: 180", "joints[0].bore", "not be more than 1"),
         ("rod: 120 mm", "rod: 220 mm", "joints[1].rod", "thinner than the bore"),
         ("height: 450 mm", "hight: 450 mm", "sections[1].hight", "nearest known key here is `height`"),
-        ("lL: 924 mm", "lL: 92.4 mm", "joints[1].range_deg", "do not meet at any angle"),
-        ("D: [-308 mm, -88 mm],", "", "joints[1].D", "needs it"),
+        ("lL: 974 mm", "lL: 97.4 mm", "joints[1].range_deg", "do not meet at any angle"),
+        ("D: [-362 mm, -55 mm],", "", "joints[1].D", "needs it"),
         ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are worked out with it"),
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
+        ("bulk_modulus: 1.4 GPa", "bulk_modulus: 14000", "bulk_modulus", "it must not be less than 1e+07"),
+        ("damping_ratio: 0.01", "damping_ratio: 1", "damping_ratio", "it must be less than 1."),
+        ("range_deg: [-165, 10], bore: 140 mm", "range_deg: [-10, 165], bore: 140 mm", "joints[2].range_deg",
+         "give `side: right`, C, D, E and R with the other sign"),
+        ("kind: B1, range", "kind: B1, side: right, range", "joints[1].range_deg", "give `side: left`, if it folds that way"),
     ],
 )
 def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
@@ -104,6 +110,58 @@ def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str,
     assert path in faults and words in str(faults[path]), str(caught.value)
     line = EXAMPLE.replace(old, new).splitlines()[(faults[path].line or 0) - 1]
     assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
+
+
+def test_a_joint_that_cannot_do_its_range_is_refused_with_the_range_that_it_can_do(tmp_path: Path) -> None:
+    old = "range_deg: [-165, 10], bore: 200 mm"
+    assert EXAMPLE.count(old) == 1
+    with pytest.raises(SceneError) as caught:
+        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-200, 10], bore: 200 mm"))
+    (fault,) = caught.value.faults  # and none of postures, which the table does not name
+    assert fault.path == "joints[1].range_deg"
+    assert (fault.line or 0) == EXAMPLE[: EXAMPLE.index(old)].count("\n") + 1
+    assert "do not meet at -200.0 to" in fault.bound or "turns back at" in fault.bound
+    low = float(fault.remedy.partition("[")[2].partition(",")[0])
+    scene_of(tmp_path, EXAMPLE.replace(old, f"range_deg: [{low}, 10], bore: 200 mm"))  # is not refused
+
+
+def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
+    changed = EXAMPLE.replace("pipe: 25 kg/m", "pipe: 2500 kg/m").replace("7100 mm]", "6550 mm]")
+    _, _, oddities = scene_of(tmp_path, changed)
+    lines = changed.splitlines()
+    told = {oddity.path: oddity for oddity in oddities}
+    assert "pipe: 2500 kg/m" in lines[(told["pipe"].line or 0) - 1] and "sections[0].rho_A = 2621" in told["pipe"].bound
+    assert "6550 mm" in lines[(told["sections[1].beam"].line or 0) - 1]
+    assert len([oddity for oddity in oddities if oddity.path == "pipe"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path", "words"),
+    [
+        ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
+        ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
+        ("payload: 60 kg", "payload: 0.06", "payload", "tonnes?"),
+    ],
+)
+def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
+    assert EXAMPLE.count(old) == 1
+    oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
+    (told,) = [oddity for oddity in oddities if oddity.path == path]
+    assert words in str(told) and len(oddities) <= 2, [str(oddity) for oddity in oddities]
+
+
+def test_what_follows_from_a_warned_pin_is_not_told_again(tmp_path: Path) -> None:
+    oddities = scene_of(tmp_path, EXAMPLE.replace("C: [-1738 mm, 544 mm]", "C: [-1738, 544]"))[2]
+    assert {oddity.path for oddity in oddities} == {"joints[1].C"}
+
+
+def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> None:
+    rows = CSV.splitlines()
+    spaced = "\n".join([rows[0], rows[1], ",,,", rows[2].replace("7100", "6550")])  # the empty row counts in the spreadsheet
+    (oddity,) = scene_of(tmp_path, spaced, "table.csv")[2]
+    assert str(oddity).startswith("line 4: sections[1].beam (cells B4, C4) = [0.55, 6.55]")
+    with pytest.raises(SceneError, match=re.escape("line 3: sections[1].wall (cell F3) = 6.0: two walls fill")):
+        scene_of(tmp_path, CSV.replace("wall [mm]", "wall").replace("420,8", "420,0.008"), "table.csv")
 
 
 @pytest.mark.parametrize(

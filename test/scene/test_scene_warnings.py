@@ -52,8 +52,9 @@ UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
 
 GEOMETRY: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (j(0, "range_deg"), [-5, 95], "joints[0].range_deg",
-     ("out of reach at 87.8 to 95.0 deg", "Within reach at -5.0 to 87.7 deg", "narrow range_deg")),
-    (j(1, "lL"), 0.55, "joints[1].range_deg", ("do not meet at", "They meet at -115.3 to 10.0 deg", "narrow")),
+     ("out of reach at 87.8 to 95.0 deg", "Narrow range_deg to [-5, 87]", "closed_length 1.086 and max_stroke 0.812")),
+    (j(1, "lL"), 0.55, "joints[1].range_deg", ("do not meet at -165.0 to -115.4 deg",
+      "Narrow range_deg to [-49, 10]", "|lL - lR| = 0.173 m must be less")),
     (s(0, "rod_pin"), [0.61, -0.12], "sections[0].rod_pin", ("splits the beam 10 mm from its end", "x = 0.61")),
     (s(1, "head", "com"), [-3.18, 0.0], "sections[1].head.com", ("far outside", "inboard pivot")),
     (s(1, "root", "com"), [0.12, 2.0], "sections[1].root.com", ("far outside",)),
@@ -80,7 +81,22 @@ def test_a_stroke_that_turns_back_warns(bench: Any) -> None:
 
     (oddity,) = bench.oddities(edit)
     assert oddity.path == "joints[0].range_deg"
-    assert "turns back at -58.9 deg" in oddity.bound and "two angles" in oddity.bound and "one side" in oddity.remedy
+    assert "turns back at -58.9 deg" in oddity.bound and "two angles" in oddity.bound
+    assert "Narrow range_deg to [-58, 85]" in oddity.remedy
+
+
+def test_one_warning_tells_all_that_is_wrong_with_a_range_and_its_remedy_mends_it(bench: Any) -> None:
+    def edit(values: Any, low: float) -> None:
+        values["postures"] = {"straight": [0, 0, 0, 0]}
+        values["joints"][1].update(range_deg=[low, 10], lL=0.5)
+        values["joints"][1]["cylinder"].update(closed_length=0.7, max_stroke=0.6)
+
+    (oddity,) = bench.oddities(lambda values: edit(values, -179))
+    assert oddity.path == "joints[1].range_deg"
+    assert all(words in oddity.bound for words in ("do not meet at", "turns back at"))
+    low = float(oddity.remedy.partition("[")[2].partition(",")[0])
+    assert bench.oddities(lambda values: edit(values, low)) == []
+    assert len(bench.oddities(lambda values: edit(values, low - 2))) == 1
 
 
 def test_a_joint_range_in_radians_warns(bench: Any) -> None:

@@ -6,10 +6,15 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from boom_twin.cli.main import main
-from boom_twin.scene.load import clearance_text, default_text, examine, examine_text
+from boom_twin.scene.checks.cylinder_clearance import passes_of
+from boom_twin.scene.edit import text_of
+from boom_twin.scene.kinematics import skeleton
+from boom_twin.scene.load import clearance_text, default_text, examine, examine_text, example_names, example_text
 from boom_twin.scene.yaml_reader import with_end_mark
 
 Place = tuple[str | int, ...]
@@ -78,12 +83,48 @@ def test_a_slip_is_warned_of_at_its_key(bench: Any, slip: str) -> None:
     assert len(told) <= 2, [str(oddity) for oddity in told.values()]
 
 
+PASSING = {
+    "mirrored": (2, (1.37, 0.75), {"C": [-1.994, -0.146], "D": [-0.301, 0.032], "E": [0.25, -0.285], "lL": 0.791, "lR": 0.629},
+                 ("0.115 m", "[-5, ")),
+    "left": (1, (2.40, 1.18), {"C": [-3.019, 0.475], "D": [-0.164, -0.196], "E": [0.05, 0.355], "lL": 0.669, "lR": 0.599},
+             ("0.135 m", "[-165, 5]")),
+}  # fmt: skip
+"""Six-bars of the Z fold, with bore and rod known, whose rods pass the pivot: what is needed, and the range to narrow to."""
+
+
+@pytest.mark.parametrize("case", PASSING)
+def test_a_rod_that_passes_a_pin_is_warned_of(case: str) -> None:
+    i, (closed, stroke), keys, words = PASSING[case]
+    values = YAML(typ="safe", pure=True).load(example_text("five_section_z_fold"))
+    values["joints"][i].update(keys)
+    values["joints"][i]["cylinder"].update(closed_length=closed, max_stroke=stroke)
+    (told,) = examine_text(text_of(values), "scene")[1]
+    assert told.path == f"joints[{i}].C"
+    assert all(word in str(told) for word in (*words, "of cylinder", "from the pivot")), str(told)
+    low, high = (float(angle) for angle in told.remedy.rpartition("[")[2].rstrip("].").split(","))
+    values["joints"][i]["range_deg"], values["postures"] = [low, high], {"arch": values["postures"]["arch"]}
+    assert examine_text(text_of(values), "scene")[1] == []
+
+
+def test_a_rod_is_as_far_from_the_pins_as_the_skeleton_says() -> None:
+    scene, _ = examine_text(example_text("five_section_z_fold"), "scene")
+    joint = scene.joints[2]
+    assert joint.cylinder.oil is not None
+    phi = np.radians([-5.0, 60.0, 178.0])
+    passed = {each.pin: each for each in passes_of(scene, 2, joint.cylinder, joint.cylinder.oil, phi)}
+    for k, angle in enumerate(phi):
+        pins = skeleton(scene, np.array([0.0, 0.0, angle, 0.0, 0.0])).joints[2]
+        stations = pins.barrel_pin + np.linspace(0.0, 1.0, 20001)[:, None] * (pins.rod_pin - pins.barrel_pin)
+        for name, pin in (("the pivot", pins.pivot), ("D", pins.d), ("E", pins.e), ("Q", pins.q)):
+            assert passed[name].distance[k] == pytest.approx(np.hypot(*(stations - pin).T).min(), abs=1e-6)
+
+
 def test_sound_scenes_have_no_warning() -> None:
     guide = (Path(__file__).parents[2] / "docs/your_boom.md").read_text(encoding="utf-8")
     whole = re.findall(r"```yaml\n(.*?)```", guide, re.DOTALL)[-1]
     clearance = with_end_mark(f"{default_text()}\n{clearance_text()}")
     loaded = with_end_mark(f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}")
-    for text in (default_text(), clearance, whole, loaded):
+    for text in (default_text(), clearance, whole, loaded, *map(example_text, example_names())):
         assert [str(oddity) for oddity in examine_text(text, "scene")[1]] == []
 
 

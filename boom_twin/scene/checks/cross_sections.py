@@ -11,7 +11,7 @@ from .findings import Draft, Finding, warning
 
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
 GYRATION_BY_LENGTH = (0.004, 0.05)
-COMPACTNESS = (0.12, 5.0)  # A^2 / I: a box with walls of about 1/170 and of a quarter of its height
+COMPACTNESS = (0.12, 2.0)  # A^2 / I: a box with walls of about 1/170 and of a tenth of its height
 MASS_BY_STEEL, SLACK = (1.0, 4.0), 1e-3  # of a value that was rounded
 ROTARY_BY_STEEL = (0.3, 30.0)
 TAPER = (1 / 40, 1.5)  # of EI against the section before

@@ -68,6 +68,7 @@ BOUNDS = {
     "finite_number": "it must be a finite number",
     "greater_than": "it must be greater than {gt:g}",
     "greater_than_equal": "it must not be less than {ge:g}",
+    "less_than": "it must be less than {lt:g}",
     "less_than_equal": "it must not be more than {le:g}",
     "literal_error": "it must be {expected}",
     "string_type": "text is needed, not {what}",

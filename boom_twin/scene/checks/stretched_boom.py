@@ -17,6 +17,7 @@ FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
 DAMPING = (1e-3, 0.2)  # ratio of the first mode
 PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
 QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
+PRESSURE = 4.5e7  # Pa; placing booms have 30 to 40 MPa
 GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
 TINY = 1e-300
 MOST_PAYLOAD = 0.5  # of the boom's mass
@@ -29,13 +30,13 @@ TAKES = frozenset({"E", "A", "I", "k", "rho_A", "mass", "mL", "mR", "payload", "
 def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Finding]:
     """What only all parts together tell, estimated by `boom_twin.scene.straight_boom`; `odd` are paths that are told already.
 
-    The first of payload, oil, frequency and damping that is odd is told: it is the cause of what follows.
+    The first of payload, pressure, oil, frequency and damping that is odd is told: it is the cause of what follows.
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
     stiffnesses = np.array([middle_stiffness(joint.cylinder) for joint in scene.joints])
     found = straight_boom(scene, stiffnesses)
-    checks = (_payload, _give, _frequency, _damping)
+    checks = (_payload, _pressure, _give, _frequency, _damping)
     return next((told for check in checks if (told := list(check(draft, scene, found)))), [])
 
 
@@ -86,6 +87,22 @@ def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple
         yield warning(draft, part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
 
 
+def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+    """Of the oil under the weight of the boom, on the side of the piston that bears it."""
+    for i, joint in enumerate(scene.joints):
+        oil, lever = joint.cylinder.oil, float(found.levers[i])
+        if oil is not None and lever != 0.0:
+            side, area = ("cap", oil.cap_area) if lever > 0.0 else ("rod", oil.rod_area)
+            pressure = float(found.moments[i]) / abs(lever) / area
+            if pressure > PRESSURE:
+                bound = (
+                    f"stretched out, the boom needs {pressure / 1e6:.3g} MPa on the {side} side; "
+                    f"expected at most {PRESSURE / 1e6:.0f} MPa"
+                )
+                remedy = "Give bore and rod as diameters, not radii (m), and check pins and masses."
+                yield warning(draft, ("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
+
+
 def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
     for i, joint in enumerate(scene.joints):
         k, lever = middle_stiffness(joint.cylinder), abs(float(found.levers[i]))
@@ -96,8 +113,8 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
                     f"stretched out, the boom loads the cylinder with about {force / 1e3:.3g} kN, and its oil gives way by "
                     f"{1e3 * force / k:.3g} mm; expected at most {1e3 * most:.3g} mm, 2 % of its stroke"
                 )
-                key = "k" if joint.cylinder.oil is None else "oil"
-                yield warning(draft, ("joints", i, "cylinder", key), k, bound, "Check k (N/m), and the masses.")
+                key, remedy = ("k", "k (N/m)") if joint.cylinder.oil is None else ("oil", "bore and rod (diameters, m)")
+                yield warning(draft, ("joints", i, "cylinder", key), k, bound, f"Check {remedy}, and the masses.")
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:

@@ -229,6 +229,8 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
+    elif key == "payload" and 0.0 < value < 1.0:
+        yield warning(draft, place, value, "less than 1 kg: tonnes?", f"Give kg: {value:g} t are {value * 1000:g}.")
     elif key in MASSES and value > 1e5:
         yield warning(draft, place, value, "more than 1e5 kg: grams?", f"Give kg: {value:g} g are {value / 1000:g}.")
     elif key in LENGTHS and max(map(abs, value if isinstance(value, tuple) else (value,))) > 200:

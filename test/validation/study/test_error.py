@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import re
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +31,10 @@ def report(tmp_path_factory) -> Path:
     """The quick report, made by the command."""
     pytest.importorskip("exudyn")
     out = tmp_path_factory.mktemp("report")
-    assert main(["study", "error", "--quick", "--out", str(out)]) == 0
+    with redirect_stderr(io.StringIO()) as told:
+        assert main(["study", "error", "--quick", "--out", str(out)]) == 0
+    shares = re.findall(r"^study error: (\d+) %, ", told.getvalue(), re.MULTILINE)  # and no bar, for this is no terminal
+    assert shares == [str(share) for share in range(10, 101, 10)] and "\r" not in told.getvalue()
     return out
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from ....analysis.motions import DURATION, motion_of
+from ....offline.progress import progress_of
 from ....plots.study import methods_picture, work_precision_picture
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
@@ -156,8 +154,10 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
 def _rows(problem: Problem, quick: bool) -> list[Row]:
     cases: list[Case] = [*own_cases(problem.scene, quick), *(peer_cases(quick) if problem.exudyn else ()), *stiff_cases(quick)]
     rounds = 1 if quick else ROUNDS
-    with tqdm(total=rounds * len(cases), desc="study error", file=sys.stderr, unit="case") as bar:
-        return Runner(problem).rows(cases, rounds, bar.update)
+    bar = progress_of(rounds * len(cases), "cases", "study error")
+    found = Runner(problem).rows(cases, rounds, lambda: bar.update(1))
+    bar.close()
+    return found
 
 
 def _duel(problem: Problem, rows: list[Row], turns: int) -> PairedTiming | None:

@@ -1,0 +1,101 @@
+"""Whether a cylinder stays clear of the pins of its joint and of the section that carries it, over the range of the joint.
+
+A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
+bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` tells them: a cylinder with `k` is not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels.elements.linkage import LINK_L, link_angles
+from ...kernels.plane_algebra import turned
+from ...types import Array
+from ..kinematics import linkage
+from ..schema import Cylinder, Oil, Scene
+from ..yaml_reader import Place
+from .findings import Draft, Finding, warning
+from .joint_range import grid_of, usable
+
+WALL = 0.12  # of a barrel, over its bore
+PIN = 0.5  # diameter over the bore
+BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
+
+
+class Pass(NamedTuple):
+    """A pin that a cylinder passes: its name, and at each angle the distance (m), what is needed, and whether of the barrel."""
+
+    pin: str
+    distance: Array
+    needed: Array
+    at_barrel: Array
+
+
+def clear_cylinders(draft: Draft, scene: Scene) -> Iterator[Finding]:
+    """All cylinders that have `oil`; of each the pin that is closest against what it needs."""
+    for i, joint in enumerate(scene.joints):
+        if joint.cylinder.oil is not None:
+            degrees = grid_of(joint)
+            passes = list(passes_of(scene, i, joint.cylinder, joint.cylinder.oil, np.radians(degrees)))
+            worst = min(passes, key=lambda each: float(np.nanmin(each.distance / each.needed)), default=None)
+            if worst is not None and np.nanmin(worst.distance / worst.needed) < 1.0:
+                clear = np.all([each.distance >= each.needed for each in passes], axis=0)
+                yield _finding(draft, scene, i, worst, degrees, clear)
+
+
+def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Finding:
+    at = int(np.nanargmin(worst.distance / worst.needed))
+    part, size = ("barrel", "half the barrel") if worst.at_barrel[at] else ("rod", "half the rod")
+    bound = (
+        f"at {degrees[at]:.0f} deg the {part} of cylinder {i + 1} passes {worst.distance[at]:.3f} m from {worst.pin}, where a "
+        f"boom has a pin; expected at least {worst.needed[at]:.3f} m, {size} and half a pin of half the bore"
+    )
+    pins = "C, D, E or the lengths of the links" if i else "cylinder_pin or rod_pin"
+    low, high = usable(degrees, np.where(clear, degrees, np.nan))
+    narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
+    place: Place = ("joints", i, "C") if i else ("base", "cylinder_pin")
+    value = scene.joints[i].C if i else scene.base.cylinder_pin
+    return warning(draft, place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
+
+
+def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
+    """The pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    row = linkage(scene, i)
+    foot = complex(row.cx, row.cy)
+    rod_pin, pins = _pins(scene, i, row, phi)
+    along = rod_pin - foot
+    length = np.abs(along)
+    for name, pin in pins.items():
+        place = np.clip(((pin - foot) * along.conj()).real / length**2, 0.0, 1.0)
+        at_barrel = place * length < BARREL * cylinder.closed_length
+        radius = np.where(at_barrel, (0.5 + WALL) * oil.bore, 0.5 * oil.rod)
+        yield Pass(name, np.abs(pin - foot - place * along), radius + 0.5 * PIN * oil.bore, at_barrel)
+
+
+def _pins(scene: Scene, i: int, row: np.record, phi: Array) -> tuple[Array, dict[str, Array]]:
+    """The rod pin and, by name, the other pins, each shape as `phi`; NaN where the links do not meet."""
+    e = _complex(turned(phi, row.ex, row.ey))
+    pins = {"the pivot": np.zeros_like(e)}
+    if i == 0:
+        return e, pins
+    carrier, before = scene.sections[i - 1], scene.joints[i - 1]
+    inner = carrier.rod_pin if i == 1 else before.E
+    pins["the pivot before"] = np.full_like(e, -carrier.length)
+    if inner is not None:
+        pins["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.full_like(e, complex(*inner) - carrier.length)
+    with np.errstate(invalid="ignore"):
+        left, right = link_angles(row, phi)
+    d = complex(row.dx, row.dy)
+    q = d + row.length_l * np.exp(1j * left)
+    base, angle = (d, left) if row.mount == LINK_L else (e, right)
+    pins |= {"D": np.full_like(e, d), "E": e}
+    if scene.joints[i].kind != "B1":  # there the rod pin is Q
+        pins["Q"] = q
+    return np.asarray(base + _complex(turned(angle, row.along, row.left))), pins
+
+
+def _complex(point: tuple[Array, Array]) -> Array:
+    return np.asarray(point[0] + 1j * point[1])

@@ -1,0 +1,218 @@
+"""Checks of a joint over its range: links that meet, strokes within reach and unique, named postures in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernels.elements.linkage import cylinder_length
+from ...types import Array
+from ..kinematics import linkage_of
+from ..schema import Joint
+from ..yaml_reader import Place
+from .findings import Draft, Finding, fault, warning
+from .geometry import TOLERANCE
+from .values import NEEDED
+
+STEP_DEG = 0.1
+MIRRORED = ("side", "cy", "dy", "ey", "left")  # numbers of a linkage that change their sign
+UNMET = "the links lL and lR, between D and E, do not meet at"
+Mask = NDArray[np.bool_]
+
+
+def joints(draft: Draft) -> Iterator[Finding]:
+    """Every joint with its range_deg: closing, reach and uniqueness over it, and the named postures in it."""
+    for i, joint in enumerate(draft.joints):
+        if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
+            continue
+        row = geometry_of(draft, i)
+        findings = [] if row is None else list(_curve(draft, i, joint, row))
+        yield from findings
+        blocked = row is None or any(not finding.odd for finding in findings)
+        for name, degrees in _postures(draft, i):
+            yield from _posture(draft, (name, i), joint, degrees, None if blocked else row)
+
+
+def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Iterator[Finding]:
+    """The cylinder's length over range_deg: faults where there is no use of the joint at all, else one warning."""
+    place: Place = ("joints", i, "range_deg")
+    degrees, lengths = lengths_over(joint, row)
+    if not np.isfinite(lengths).any():
+        bound = f"{UNMET} any angle of it"
+        remedy = f"Check D, E, lL and lR, their signs and their units: {_sizes_to_meet(row, degrees)}."
+        yield fault(draft, place, joint.range_deg, bound, remedy)
+        return
+    shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
+    if longest - shortest < 1e-6:
+        bound = f"over it the cylinder stays {longest:.4g} m long, so it cannot turn the joint"
+        remedy = "Check the pins: one of them lies on an axis of rotation."
+        yield fault(draft, place, joint.range_deg, bound, remedy)
+    elif not _reached(joint, lengths).any() and not np.isfinite(lengths).all():
+        met = np.isfinite(lengths)
+        bound = f"{UNMET} {intervals(degrees, ~met)}; where they do, at {intervals(degrees, met)}, the cylinder is not as long"
+        yield fault(draft, place, joint.range_deg, bound, f"Change links or pins: {_sizes_to_meet(row, degrees)}.")
+    elif not _reached(joint, lengths).any():
+        remedy = "Give closed_length and max_stroke that cover this, or check the pins."
+        place = ("joints", i, "cylinder", "closed_length")
+        yield fault(draft, place, joint.cylinder.closed_length, _reach_words(joint, shortest, longest), remedy)
+    else:
+        yield from _narrower(draft, i, joint, row, degrees, lengths)
+
+
+def grid_of(joint: Joint) -> Array:
+    """Angles (deg) over the range of a joint."""
+    low, high = joint.range_deg
+    return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
+
+
+def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
+    """Angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
+    degrees = grid_of(joint)
+    with np.errstate(invalid="ignore"):
+        return degrees, cylinder_length(row, np.radians(degrees))[0]
+
+
+def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Iterator[Finding]:
+    """One warning of all that a part of the range is not good for, with the part that is."""
+    closed, reached = np.isfinite(lengths), _reached(joint, lengths)
+    shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
+    within = np.where(reached, lengths, np.nan)
+    turns = _turns(within)
+    reasons, remedies = [], []
+    if not closed.all():
+        reasons.append(f"{UNMET} {intervals(degrees, ~closed)}")
+        remedies.append(f"change links or pins: {_sizes_to_meet(row, degrees)}")
+    if (closed & ~reached).any():
+        beyond = intervals(degrees, closed & ~reached)
+        reasons.append(f"{_reach_words(joint, shortest, longest)}: stroke out of reach at {beyond}")
+        if closed.all() and longest < 2.0 * shortest:
+            closed_length, max_stroke = _down(shortest), _up(longest - _down(shortest))
+            remedies.append(f"give closed_length {closed_length:g} and max_stroke {max_stroke:g} m if the nameplate says so")
+    if turns.size:
+        angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
+        reasons.append(f"the stroke turns back at {angles} deg: one stroke then belongs to two angles")
+    if reasons:
+        low, high = usable(degrees, within)
+        remedies = [_turned_over(joint, row, degrees), *(remedies or ["check the pins"])]
+        remedy = ", or ".join([f"Narrow range_deg to [{low:g}, {high:g}]", *filter(None, remedies)])
+        yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
+
+
+def _turned_over(joint: Joint, row: np.record, degrees: Array) -> str:
+    """What would let the six-bar do the whole range if it were meant the other way up; nothing if that does not help."""
+    if joint.kind == "A":
+        return ""
+    side = "left" if joint.side == "right" else "right"
+    for signs, words in ((("side",), ""), (MIRRORED, ", C, D, E and R with the other sign of their second number")):
+        other = row.copy()
+        for key in signs:
+            other[key] = -other[key]
+        with np.errstate(invalid="ignore"):
+            lengths = cylinder_length(other, np.radians(degrees))[0]
+        if np.isfinite(lengths).all() and not _turns(lengths).size:
+            return f"give `side: {side}`{words}, if it folds that way"
+    return ""
+
+
+def _reach_words(joint: Joint, shortest: float, longest: float) -> str:
+    closed, stroke = joint.cylinder.closed_length, joint.cylinder.max_stroke
+    need = f"over range_deg the cylinder is {shortest:.4g} to {longest:.4g} m from pin to pin"
+    return f"{need}, but it can be {closed:.4g} to {closed + stroke:.4g} m long"
+
+
+def _sizes_to_meet(row: np.record, degrees: Array) -> str:
+    """Which lengths of the links do not fit the distances of D and E over the range."""
+    apart = np.abs((row.ex + 1j * row.ey) * np.exp(1j * np.radians(degrees)) - (row.dx + 1j * row.dy))
+    least, most = float(apart.min()), float(apart.max())
+    total, difference = float(row.length_l + row.length_r), abs(float(row.length_l - row.length_r))
+    needed = [f"lL + lR = {total:.4g} m must be more"] if total <= most else []
+    needed += [f"|lL - lR| = {difference:.4g} m must be less"] if difference >= least else []
+    return f"D and E are {least:.4g} to {most:.4g} m apart, {' and '.join(needed)}"
+
+
+def _turns(lengths: Array) -> NDArray[np.int64]:
+    """Where lengths, NaN out of reach, stop growing or shrinking."""
+    slope = np.sign(np.diff(lengths))
+    return np.flatnonzero(slope[1:] * slope[:-1] < 0) + 1
+
+
+def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
+    """The longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
+    slope = np.nan_to_num(np.sign(np.diff(lengths)))
+    edges = np.flatnonzero(np.diff(slope, prepend=2.0, append=2.0))
+    first, last = max(
+        ((start, stop) for start, stop in pairwise(edges) if slope[start] != 0.0),
+        key=lambda part: int(part[1] - part[0]),
+        default=(0, 0),
+    )
+    low, high = float(degrees[first]), float(degrees[last])
+    whole_low = low if first == 0 else math.ceil(low)
+    whole_high = high if last == len(degrees) - 1 else math.floor(high)
+    return (whole_low, whole_high) if whole_low < whole_high else (low, high)
+
+
+def _down(length: float) -> float:
+    """To whole millimetres below."""
+    return math.floor(1e3 * length) / 1e3
+
+
+def _up(length: float) -> float:
+    """To whole millimetres above."""
+    return math.ceil(1e3 * length) / 1e3
+
+
+def geometry_of(draft: Draft, i: int) -> np.record | None:
+    """Geometry of joint `i`; None if it is not complete."""
+    joint, first = draft.joints[i], draft.section(0)
+    if joint is None or (i == 0) != (joint.kind == "A"):
+        return None
+    if joint.kind == "A":
+        complete = draft.base is not None and first is not None and first.rod_pin is not None
+    else:
+        complete = all(getattr(joint, key) is not None for key in NEEDED[joint.kind])
+    return linkage_of(joint, draft.base, first) if complete else None
+
+
+def _reached(joint: Joint, lengths: Array) -> Mask:
+    """Where the cylinder can be as long as the geometry asks; False where links do not meet."""
+    strokes = lengths - joint.cylinder.closed_length
+    return (strokes >= -TOLERANCE) & (strokes <= joint.cylinder.max_stroke + TOLERANCE)
+
+
+def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
+    """Names of the complete postures, and the angle (deg) at which each holds joint `i`."""
+    for name, angles in draft.postures.items():
+        if len(angles) == len(draft.joints):
+            yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
+
+
+def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Iterator[Finding]:
+    """Joint `who[1]` in posture `who[0]`: its angle in range_deg and, where its geometry is known, its stroke."""
+    name, i = who
+    place, value = ("postures", name, i), draft.postures[name][i]
+    low, high = joint.range_deg
+    says = f"posture `{name}` turns joint {i + 1} to {degrees:g} deg"
+    if not low - TOLERANCE <= degrees <= high + TOLERANCE:
+        bound = f"{says}, outside its range_deg [{low:g}, {high:g}]"
+        remedy = "Change the posture or the range; a joint angle is the difference of neighbouring section angles."
+        yield fault(draft, place, value, bound, remedy)
+    elif row is not None:
+        most = joint.cylinder.max_stroke
+        with np.errstate(invalid="ignore"):
+            stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
+        if math.isnan(stroke):
+            yield fault(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
+        elif not -TOLERANCE <= stroke <= most + TOLERANCE:
+            bound = f"{says}, a stroke of {stroke:.4g} m; cylinder {i + 1} has 0 to {most:g} m"
+            yield fault(draft, place, value, bound, "Change the posture, closed_length or max_stroke.")
+
+
+def intervals(degrees: Array, mask: Mask) -> str:
+    """Where on a grid of angles a mask holds: ``-5 to 12.3 deg, 40 to 85 deg``."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return ", ".join(f"{degrees[first]:.1f} to {degrees[last]:.1f} deg" for first, last in pairs)

@@ -1,0 +1,63 @@
+"""Picture of an envelope: words beside the bars fit into their axes, the legend covers no point, angles have no minus zero."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import boom_twin.plots.envelope as drawing
+from boom_twin.analysis.envelope import Envelope
+from boom_twin.scene import load_scene
+
+COUNT = 40
+
+
+def envelope_of(scene: Any) -> Envelope:
+    """Made-up numbers as a boom of 28 m has them, one posture next to 0 degrees from below."""
+    rng = np.random.default_rng(4)
+    n = len(scene.sections)
+    angles = rng.uniform(-400.0, 180.0, (COUNT, n))
+    angles[0] = -0.3
+    tips = rng.uniform(-15.0, 15.0, (COUNT, 2))
+    forces = rng.uniform(-1430e3, 973e3, (COUNT, n)) * np.array([0.2, 1.0, 0.3, 0.1])
+    stresses = rng.uniform(8e4, 1.7e8, (COUNT, n))
+    frequencies = np.sort(rng.uniform(0.5, 6.0, (COUNT, 3)))
+    deflections = rng.uniform(0.0, 1.4, COUNT)
+    return Envelope(("",) * COUNT, angles, tips, deflections, forces, frequencies, stresses * 1e-3, stresses, {})
+
+
+def test_words_fit_beside_their_bars_and_the_legend_covers_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Any] = []
+    picture = drawing.picture
+
+    @contextmanager
+    def kept(*args: Any) -> Iterator[Any]:
+        with picture(*args) as figure:
+            yield figure
+            figures.append(figure)
+
+    monkeypatch.setattr(drawing, "picture", kept)
+    scene = load_scene()
+    found = envelope_of(scene)
+    ranges = [(f"cylinder {i + 1} force, kN", 1e-3 * found.forces[:, i]) for i in range(4)]
+    ranges += [(f"section {i + 1} bending stress, MPa", 1e-6 * found.stresses[:, i]) for i in range(4)]
+    drawing.envelope_picture(tmp_path / "envelope.png", scene, found, ranges)
+    (figure,) = figures
+    figure.draw_without_rendering()
+    tips, *bars = [axes for axes in figure.axes if axes.get_ylabel() == "y up, m" or axes.get_xlabel() in ("kN", "MPa")]
+    assert len(bars) == 2 and tips.get_legend().get_window_extent().y0 >= tips.get_window_extent().y1
+    for axes in bars:
+        frame, labels = axes.get_window_extent(), [text for text in axes.texts if text.get_text()]
+        assert len(labels) == 8 and not any("e+" in label.get_text() for label in labels)
+        for label in labels:
+            extent = label.get_window_extent()
+            assert frame.x0 <= extent.x0 and extent.x1 <= frame.x1, label.get_text()
+
+
+def test_an_angle_next_to_zero_has_no_minus() -> None:
+    assert envelope_of(load_scene()).posture(0) == "[0, 0, 0, 0]"
