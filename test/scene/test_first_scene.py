@@ -97,8 +97,12 @@ def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
         ("bulk_modulus: 1.4 GPa", "bulk_modulus: 14000", "bulk_modulus", "it must not be less than 1e+07"),
         ("damping_ratio: 0.01", "damping_ratio: 1", "damping_ratio", "it must be less than 1."),
-        ("range_deg: [-165, 10], bore: 140 mm", "range_deg: [-10, 165], bore: 140 mm", "joints[2].range_deg",
-         "give `side: right`, C, D, E and R with the other sign"),
+        (
+            "range_deg: [-165, 10], bore: 140 mm",
+            "range_deg: [-10, 165], bore: 140 mm",
+            "joints[2].range_deg",
+            "give `side: right`, C, D, E and R with the other sign",
+        ),
         ("kind: B1, range", "kind: B1, side: right, range", "joints[1].range_deg", "give `side: left`, if it folds that way"),
     ],
 )
