@@ -250,10 +250,9 @@ def _moments(subject: Subject, folder: Path) -> list[str]:
     told = (
         "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
         "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M / W with W = 2 I / h, of "
-        "bending "
-        "alone: no axial force, no notches, no welds. What a load at the tip adds that only sensors know of is its static "
-        "share, "
-        "with its standard deviation. "
+        "bending alone: no axial force, no notches, no welds. What a load at the tip adds that only sensors know of is its "
+        "static share, with the standard deviation of that share. VIBRATION THAT SUCH A LOAD EXCITES IS IN NEITHER: under a "
+        "pump it can be several times as much; `boom_twin response --pump` tells it. "
     )
     told += "Heights as given." if subject.has_heights else ASSUMED
     head = (
@@ -280,10 +279,9 @@ def _fatigue(found: Evaluation) -> list[str]:
         return []
     told = (
         f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * SMALL:g} MPa; damage by the S-N "
-        f"curve "
-        f"of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial factors. "
-        f"Damage grows "
-        "with the third to fifth power of stress. The load that only sensors know of is not in it."
+        f"curve of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial factors. "
+        "Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that a pump "
+        "shakes this counts the moves alone, and the damage is more."
     )
     rows = [
         (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, 1.0 / row.damage if row.damage else None)
