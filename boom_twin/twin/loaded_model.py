@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
 from typing import TYPE_CHECKING
 
 from ..config.settings import Settings
+from ..errors import BoomTwinError
 from ..estimation.boom_predictor import BoomPredictor
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.step_choice import StepChoice, choose_steps
@@ -112,6 +114,7 @@ class ModelPreparation:
         usual = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH)
         try:
-            self._made = settings, self._twin.model(settings)
+            with suppress(BoomTwinError):
+                self._made = settings, self._twin.model(settings)
         finally:
             sys.setswitchinterval(usual)
