@@ -67,6 +67,9 @@ def run(args: Namespace) -> int:
             _check_listeners(unmatched, player.unmatched(), len(player.topics), args)
         try:
             _play(player, args, length)
+            if late := player.deliver():
+                told = "some listener did not acknowledge all of"
+                print(f"warning: {told} {', '.join(late)}: a recording of it may lack its end", file=sys.stderr)
         except KeyboardInterrupt:
             if not args.loop:
                 raise

@@ -60,6 +60,9 @@ class Process:
             assert self._child.poll() is None and time.monotonic() < end, f"no {text!r} in:\n{self.said()}"
             time.sleep(0.05)
 
+    def send(self, number: signal.Signals) -> None:
+        self._child.send_signal(number)
+
     def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
         """Exit code after a signal."""
         self._child.send_signal(number)

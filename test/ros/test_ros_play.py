@@ -23,11 +23,13 @@ from sensor_msgs.msg import JointState
 
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.metadata import Recorded, offered_qos
-from boom_twin.bag.reader import scan
-from boom_twin.bag.writer import BagWriter
+from boom_twin.bag.reader import read_both, scan
+from boom_twin.bag.writer import BagWriter, SessionWriter
+from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Qos
 from boom_twin.ros.bag.player import Player
+from boom_twin.types import Stream
 
 
 def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path, motion: dict[str, Any]) -> None:
@@ -55,6 +57,34 @@ def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path
         assert list(msg.position) == motion["strokes"][rows[stamp_of(msg)]].tolist()
     assert 70 <= len(ticks) <= 81
     assert {after - before for before, after in pairwise(ticks)} == {25_000_000}
+
+
+def test_it_ends_only_when_reliable_listeners_have_everything(
+    spawn: Callable[..., Any], domain: None, bag: Path, tmp_path: Path
+) -> None:
+    """A recorder that stands still for a while misses nothing, for the player is still there when it goes on."""
+    mapping, session, out = tmp_path / "mapping.yaml", tmp_path / "session", tmp_path / "out"
+    mapping.write_text("inputs: {tip_imu: {qos: {reliability: reliable}}}\n")
+    topic = load_mapping(mapping).inputs[Stream.IMU]
+    with SessionWriter(session, {topic.absolute: topic}) as writer:
+        for name, log, data, _ in read_both(scan(bag), {topic.absolute: topic.type}):
+            writer.write_encoded(name, log, data)
+    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--mapping", str(mapping))
+    player = Player(scan(session), [topic.absolute])
+    assert player.wait(60.0) == []
+    recorder.send(signal.SIGSTOP)
+    for _ in player.play(rate=8.0):
+        pass
+    assert player.deliver(0.5) == [topic.absolute]
+    recorder.send(signal.SIGCONT)
+    assert player.deliver(60.0) == []
+    player.close()
+    end, size = time.monotonic() + 60.0, -1
+    while size != (size := sum(path.stat().st_size for path in out.iterdir())) and time.monotonic() < end:
+        time.sleep(2.0)  # it writes what it has
+    assert recorder.stop(signal.SIGINT) == 0
+    found = scan(out).find(topic.absolute)
+    assert found is not None and found.count == player.played.sent[topic.absolute] == 800
 
 
 def test_nobody_listens(spawn: Callable[..., Any], bag: Path) -> None:

@@ -41,8 +41,10 @@ BOOMS = {"front": "0.0", "rear": "1.0"}
 COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)]
 ORDERED = (Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD)
 """What depends on the order in which samples of several streams are taken. Where DDS sends a lost packet again, to the recorder
-or to the node, the two have not seen the same order; that their bits are equal where they have is for `test_ros_live`."""
+or to the node, the two have not seen the same order; that their bits are equal where they have is for `test_ros_live`. Here the
+recording is brought into the order of its stamps: angles 2 s behind the strokes are a dropout of their sensors."""
 JUDGED = (Output.HEALTH, Output.TIP_UNCERTAINTY)
+"""Told when there is news, or after a second; an overloaded node leaves out looks, a replay none."""
 NODES = ("boom_twin", "boom_twin_recorder", "boom_twin_monitor")
 SLOWLY = ("--namespace", "front", "--rate", "0.01", "--wait", "0")
 PLAYED = ("cylinder_strokes", "joint_angles", "tip_imu", "rosout", "parameter_events")
@@ -214,7 +216,10 @@ def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, An
     inputs = {topic.absolute: stream for stream, topic in topics.inputs.items() if stream is not Stream.FORCES}  # none is sent
     session = scan(path)
     with SessionWriter(tmp_path / "bag", {stream.value: topic for stream, topic in topics.inputs.items()}) as writer:
-        for topic, log, data, msg in read_both(session, {each: TYPES[stream] for each, stream in inputs.items()}):
+        rows = [*read_both(session, {each: TYPES[stream] for each, stream in inputs.items()})]
+        for log, (topic, _, data, msg) in zip(
+            [row[1] for row in rows], sorted(rows, key=lambda row: stamp_of(row[3])), strict=True
+        ):
             if inputs[topic] is not Stream.STROKES or stamp_of(msg) in answered:
                 writer.write_encoded(inputs[topic].value, log, data)
     (tmp_path / "bag" / "session.yaml").write_text((path / "session.yaml").read_text())
@@ -223,8 +228,8 @@ def test_its_recording_replays_to_what_its_node_published(recorded: dict[str, An
         live = published(path, topics, key)
         assert len(live) > (0 if key in RARE else 100)
         replayed = published(tmp_path / "out" / "bag", topics, key)
-        if key in JUDGED:  # told when there is news, or a second after; an overloaded node leaves out looks, a replay none
-            assert causes(path, topics) == causes(tmp_path / "out" / "bag", topics)
+        if key in JUDGED:
+            assert not causes(tmp_path / "out" / "bag", topics)
         elif key in ORDERED:
             assert [stamp for stamp, _ in live] == [stamp for stamp, _ in replayed], key
         else:

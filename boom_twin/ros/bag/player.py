@@ -10,6 +10,7 @@ from typing import Any
 
 import rclpy
 from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
@@ -25,6 +26,8 @@ CLOCK = "/clock"
 NAME = "boom_twin_player"
 LOOK = 0.05
 """Time (s) between looks for listeners."""
+DELIVERY = 10.0
+"""Time (s) in which reliable listeners are to acknowledge what was sent, at the end."""
 SETTLE = 0.5
 """Time (s) from the match with the last listener to the first message."""
 
@@ -176,6 +179,19 @@ class Player:
     def played(self) -> Played:
         """What all calls of `play` published."""
         return Played(dict(self._sent), self._wall, self._latest)
+
+    def deliver(self, timeout: float = DELIVERY) -> list[str]:
+        """Wait until all reliable listeners have everything; gives the topics of which some have not.
+
+        A lost packet is sent again only while its publisher lives: one that is taken away with its last message may take
+        seconds of messages with it.
+        """
+        end = time.monotonic() + timeout
+        return [
+            name
+            for name, each in self._publishers.items()
+            if not each.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+        ]
 
     def close(self) -> None:
         """Take the publishers away."""
