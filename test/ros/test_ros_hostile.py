@@ -52,6 +52,10 @@ def test_every_good_sample_is_answered_and_no_other(spawn_node: Callable[..., An
     while publisher.get_subscription_count() < 1 or bench.count_publishers("/boom_twin/tip/position") < 1:
         assert time.monotonic() < end
         rclpy.spin_once(bench, timeout_sec=0.05)
+    settled = time.monotonic() + 2.0  # the node may know of the two ends a moment after they know of it
+    while time.monotonic() < settled:
+        rclpy.spin_once(bench, timeout_sec=0.05)
+    end = time.monotonic() + 60.0
     stamps = motion["stamps_ns"][:100].tolist()
     for number, stamp in enumerate(stamps):
         values = motion["strokes"][number].tolist()
