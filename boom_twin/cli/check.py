@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +50,10 @@ def run(args: Namespace) -> int:
     sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
+    drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
     if args.strict and oddities:
+        for line in drawn:  # the picture shows what the warnings are about
+            print(line, file=sys.stderr)
         raise SceneError(name, tuple(oddities))
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
@@ -64,12 +68,14 @@ def run(args: Namespace) -> int:
         told, rows = accuracy.table(scene, sensors)
         values |= told
         lines += rows
-    if args.picture is not None:
-        from ..plots.joint_ranges import joint_ranges_picture
-
-        lines.append(f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}")
-    print_result(args.json, values, lines)
+    print_result(args.json, values, lines + drawn)
     return 0
+
+
+def _draw(path: Path, scene: Scene, name: str) -> Path:
+    from ..plots.joint_ranges import joint_ranges_picture
+
+    return joint_ranges_picture(path, scene, Path(name).name)
 
 
 def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:

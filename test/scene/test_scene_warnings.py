@@ -53,8 +53,8 @@ UNITS: list[tuple[Place, Any, str, tuple[str, ...]]] = [
 GEOMETRY: list[tuple[Place, Any, str, tuple[str, ...]]] = [
     (j(0, "range_deg"), [-5, 95], "joints[0].range_deg",
      ("out of reach at 87.8 to 95.0 deg", "Narrow range_deg to [-5, 87]", "closed_length 1.086 and max_stroke 0.812")),
-    (j(1, "lL"), 0.55, "joints[1].range_deg", ("do not meet at -165.0 to -115.4 deg",
-      "Narrow range_deg to [-49, 10]", "|lL - lR| = 0.173 m must be less")),
+    (j(1, "lL"), 0.55, "joints[1].range_deg",
+     ("do not meet at -165.0 to -115.4 deg", "Narrow range_deg to [-49, 10]", "|lL - lR| = 0.173 m must be less")),
     (s(0, "rod_pin"), [0.61, -0.12], "sections[0].rod_pin", ("splits the beam 10 mm from its end", "x = 0.61")),
     (s(1, "head", "com"), [-3.18, 0.0], "sections[1].head.com", ("far outside", "inboard pivot")),
     (s(1, "root", "com"), [0.12, 2.0], "sections[1].root.com", ("far outside",)),

@@ -132,7 +132,8 @@ def test_strict_makes_warnings_errors(bench: Any, capsys: pytest.CaptureFixture[
     path = str(bench.edited(lambda values: values["joints"][0]["cylinder"].update(k=40e3)))
     assert main(["check", path]) == 0
     assert "Warnings: 1" in capsys.readouterr().out
-    assert main(["check", path, "--strict"]) == 1
+    picture = Path(path).with_name("pins.png")  # it shows what the warnings are about
+    assert main(["check", path, "--strict", "--picture", str(picture)]) == 1 and picture.is_file()
     out, err = capsys.readouterr()
     assert out == "" and "1 fault" in err and "joints[0].cylinder.k = 40000.0" in err
     assert main(["check", "--strict"]) == 0
