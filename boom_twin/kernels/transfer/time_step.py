@@ -97,7 +97,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             left -= 1
             if keep:
                 status = newton_status(work, solved, size, 0.0, 0)
-                if status == NOT_CONVERGED and is_converged(t, state, work, size, before, renew, tolerance):
+                if status == NOT_CONVERGED and is_converged(t, state, work, size, before, renew, tolerance, now.gain):
                     status = OK
                 before = size
             else:
