@@ -17,6 +17,7 @@ from ..errors import Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
 from .boom_table import BoomTable, BoxSection, DrawnJoint
+from .checks.joint_range import NEXT_TO
 from .kinematics import linkage_of, stroke_curve
 from .load import examine_text
 from .oil_spring import middle_stiffness, stiffness
@@ -42,7 +43,7 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
         The boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
     """
     text, scene, faults, odd = _examined(table, source)
-    narrower = [each for each in odd if RANGE.fullmatch(each.path)]
+    narrower = [each for each in odd if RANGE.fullmatch(each.path) and not each.bound.startswith(NEXT_TO)]
     if narrower:  # a fault here: the stroke and the postures that are worked out hang on the range
         odd = [each for each in odd if each not in narrower]
         faults = narrower + [each for each in faults if table.postures or not each.path.startswith("postures")]
