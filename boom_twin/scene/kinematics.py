@@ -66,7 +66,7 @@ def transmission_angles(row: np.record, angles: Array) -> Array:
 
 
 def levers_and_transmission(scene: Scene, index: int, samples: int) -> tuple[float, float, float | None]:
-    """Least and greatest lever ds/dphi (m) over the range of joint `index`, and the least transmission angle (rad) of a six-bar."""
+    """Least and greatest lever ds/dphi (m) over the range of joint `index`; least transmission angle (rad) of a six-bar."""
     row, angles = linkage(scene, index), np.radians(np.linspace(*scene.joints[index].range_deg, samples))
     with np.errstate(invalid="ignore"):
         levers = np.abs(cylinder_length(row, angles)[1])
