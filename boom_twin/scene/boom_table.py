@@ -158,6 +158,27 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
     return found
 
 
+def lying_boxes(table: BoomTable, document: Document) -> list[Fault]:
+    """A warning of every box that is wider than high: it would be stiffer in the plane of the boom the other way round."""
+    found = []
+    for i, section in enumerate(table.sections):
+        if section.width > section.height:
+            softer = second_moment(section.width, section.height, section.wall)
+            softer /= second_moment(section.height, section.width, section.wall)
+            bound = (
+                f"it is less than width = {section.width:g} m; booms are higher than wide, and this box bends "
+                f"{softer:.3g} times as much in the plane as one of {section.width:g} by {section.height:g} m"
+            )
+            remedy = f"Give height: {section.width:g} and width: {section.height:g}, if they are swapped."
+            found.append(document.fault(("sections", i, "height"), section.height, bound, remedy))
+    return found
+
+
+def second_moment(height: float, width: float, wall: float) -> float:
+    """I (m^4) of a box about the axis across the plane of the boom."""
+    return (width * height**3 - (width - 2 * wall) * (height - 2 * wall) ** 3) / 12
+
+
 def csv_document(text: str, source: str) -> Document:
     """A CSV text as the values of a table: a header, then a row for every section with its joint.
 

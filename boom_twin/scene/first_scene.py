@@ -16,7 +16,7 @@ from ..config.yaml_text import yaml_text
 from ..errors import Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
-from .boom_table import BoomTable, BoxSection, DrawnJoint
+from .boom_table import BoomTable, BoxSection, DrawnJoint, lying_boxes, second_moment
 from .checks.joint_range import NEXT_TO
 from .kinematics import linkage_of, stroke_curve
 from .load import examine_text
@@ -47,7 +47,10 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
     if narrower:  # a fault here: the stroke and the postures that are worked out hang on the range
         odd = [each for each in odd if each not in narrower]
         faults = narrower + [each for each in faults if table.postures or not each.path.startswith("postures")]
-    oddities = in_table(odd, document)
+    lying = lying_boxes(table, document)
+    boxes = {each.path.removesuffix("height") for each in lying}  # of which the second moment is odd too
+    told = [each for each in in_table(odd, document) if not each.path.startswith(tuple(boxes))]
+    oddities = sorted([*lying, *told], key=lambda each: each.line or 0)
     if faults or scene is None:
         raise SceneError(source, tuple(in_table(faults, document)), tuple(oddities))
     return text, scene, oddities
@@ -100,7 +103,7 @@ Row = tuple[str, str, str]
 def _section(table: BoomTable, section: BoxSection, first: float | None) -> list[Row]:
     h, b, t, rho = section.height, section.width, section.wall, table.material.rho or 0.0
     area = h * b - (h - 2 * t) * (b - 2 * t)
-    inertia = (b * h**3 - (b - 2 * t) * (h - 2 * t) ** 3) / 12
+    inertia = second_moment(h, b, t)
     pipe = table.pipe if section.pipe is None else section.pipe
     per_metre = rho * area + pipe
     rows = [

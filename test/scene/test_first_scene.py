@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from boom_twin.errors import SceneError
-from boom_twin.scene.boom_table import read_table
+from boom_twin.scene.boom_table import BoomTable, read_table
 from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.load import examine
@@ -145,6 +145,7 @@ def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
         ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
         ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
         ("payload: 60 kg", "payload: 0.06", "payload", "tonnes?"),
+        ("height: 450 mm, width: 340 mm", "height: 340 mm, width: 450 mm", "sections[1].height", "bends 1.53 times as much"),
     ],
 )
 def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
@@ -152,6 +153,19 @@ def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: st
     oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
     (told,) = [oddity for oddity in oddities if oddity.path == path]
     assert words in str(told) and len(oddities) <= 2, [str(oddity) for oddity in oddities]
+
+
+def test_the_example_table_names_what_a_table_may_hold_of_the_whole_boom(tmp_path: Path) -> None:
+    written = set(re.findall(r"^(\w+):", EXAMPLE, re.MULTILINE))
+    assert written == set(BoomTable.model_fields) - {"postures"}
+    _, full, (heavy,) = scene_of(tmp_path, EXAMPLE.replace("line_fill: 0 kg/m", "line_fill: 29 kg/m"))
+    assert full.line_fill == 29.0 and heavy.path == "joints[1].bore", "surrogate pins: cylinder 2 is too small for a full line"
+    assert scene_of(tmp_path, EXAMPLE)[1].line_fill is None
+
+
+def test_a_square_box_is_not_warned_of(tmp_path: Path) -> None:
+    square = EXAMPLE.replace("height: 240 mm, width: 190 mm", "height: 210 mm, width: 210 mm")
+    assert scene_of(tmp_path, square)[2] == []
 
 
 def test_what_follows_from_a_warned_pin_is_not_told_again(tmp_path: Path) -> None:

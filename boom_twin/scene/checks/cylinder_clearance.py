@@ -16,7 +16,7 @@ from ..linkage_range import PIN, distances_to, joint_pins, rod_pin_of
 from ..schema import Cylinder, Oil, Scene
 from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
-from .joint_range import grid_of, usable
+from .joint_range import Mask, grid_of, usable
 
 WALL = 0.12  # of a barrel, over its bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
@@ -28,7 +28,7 @@ class Pass(NamedTuple):
     pin: str
     distance: Array
     needed: Array
-    at_barrel: Array
+    at_barrel: Mask
 
 
 def clear_cylinders(draft: Draft, scene: Scene) -> Iterator[Finding]:
@@ -78,5 +78,7 @@ def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
     inner = carrier.rod_pin if i == 1 else before.E
     found = {"the pivot before": pivot - carrier.length}
     if inner is not None:
-        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = pivot + complex(*inner) - carrier.length
+        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.asarray(
+            pivot + (complex(*inner) - carrier.length)
+        )
     return found

@@ -92,7 +92,7 @@ def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple
         yield warning(draft, part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
 
 
-def _pressure(draft: Draft, scene: Scene, _: StraightBoom) -> Iterator[Finding]:
+def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
     """Of the oil under the boom's weight in the posture that is worst for it: pushing on the bore, pulling on the ring."""
     if all(joint.cylinder.oil is None for joint in scene.joints):
         return
@@ -104,7 +104,7 @@ def _pressure(draft: Draft, scene: Scene, _: StraightBoom) -> Iterator[Finding]:
         pressures = [abs(load.force) / area for load, (area, *_) in zip(loads, sides, strict=True)]
         worst = max((0, 1), key=pressures.__getitem__)
         if pressures[worst] > PRESSURE:
-            load, (_, acts, side) = loads[worst], sides[worst]
+            load, (_area, acts, side) = loads[worst], sides[worst]
             bound = (
                 f"at rest with sections at {list(load.angles)} deg cylinder {i + 1} {acts} with "
                 f"{abs(load.force) / 1e3:.3g} kN, {pressures[worst] / 1e6:.3g} MPa on the {side} side; "
