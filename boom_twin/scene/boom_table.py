@@ -158,19 +158,25 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
     return found
 
 
-def lying_boxes(table: BoomTable, document: Document) -> list[Fault]:
-    """A warning of every box that is wider than high: it would be stiffer in the plane of the boom the other way round."""
+SLIMMEST = 0.3  # width of a box over its height
+
+
+def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
+    """A warning of every box that is wider than high, for it would be stiffer the other way round, or much too slim."""
     found = []
     for i, section in enumerate(table.sections):
-        if section.width > section.height:
-            softer = second_moment(section.width, section.height, section.wall)
-            softer /= second_moment(section.height, section.width, section.wall)
+        h, b, place = section.height, section.width, ("sections", i)
+        if b > h:
+            softer = second_moment(b, h, section.wall) / second_moment(h, b, section.wall)
             bound = (
-                f"it is less than width = {section.width:g} m; booms are higher than wide, and this box bends "
-                f"{softer:.3g} times as much in the plane as one of {section.width:g} by {section.height:g} m"
+                f"it is less than width = {b:g} m; booms are higher than wide, and this box bends "
+                f"{softer:.3g} times as much in the plane as one of {b:g} by {h:g} m"
             )
-            remedy = f"Give height: {section.width:g} and width: {section.height:g}, if they are swapped."
-            found.append(document.fault(("sections", i, "height"), section.height, bound, remedy))
+            remedy = f"Give height: {b:g} and width: {h:g}, if they are swapped."
+            found.append(document.fault((*place, "height"), h, bound, remedy))
+        elif b < SLIMMEST * h:
+            bound = f"expected at least {SLIMMEST * h:.3g} m for a box {h:g} m high"
+            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit."))
     return found
 
 

@@ -90,7 +90,7 @@ def test_a_stroke_that_turns_back_warns(bench: Any) -> None:
 DEAD_CENTRES = {
     "links": (
         1,
-        [-60, 10],
+        [-60, 25],
         {"lL": 0.2, "lR": 0.0808},
         ("next to a dead centre of the links at -14.3 to -8.5", "at least 5 deg"),
     ),

@@ -80,13 +80,13 @@ def test_a_pull_on_the_ring_away_from_the_stretched_posture_is_warned_of(tmp_pat
     text = TABLE.read_text(encoding="utf-8")
     path.write_text(text.replace("bore: 190 mm, rod: 110 mm", "bore: 180 mm, rod: 110 mm"), encoding="utf-8")
     _, scene, (told,) = first_scene(*read_table(path), "table")
-    assert told.path == "joints[1].bore" and "pulls with 758 kN, 47.6 MPa on the rod side" in told.bound
+    assert told.path == "joints[1].bore" and "pulls most, with 758 kN, 47.6 MPa on the rod side" in told.bound
     stretched = statics(scene, posture="stretched", modes=0).cylinder_forces[1]
     oil = scene.joints[1].cylinder.oil
     assert oil is not None and stretched / oil.rod_area < 30e6, "stretched out it passes"
     path.write_text(text.replace("bore: 170 mm, rod: 115 mm", "bore: 100 mm, rod: 60 mm"), encoding="utf-8")
     (push,) = first_scene(*read_table(path), "table")[2]
-    assert push.path == "joints[0].bore" and "pushes with" in push.bound and "on the cap side" in push.bound
+    assert push.path == "joints[0].bore" and "pushes most" in push.bound and "on the cap side" in push.bound
 
 
 def test_the_package_s_own_tables_and_scenes_pass() -> None:
