@@ -81,6 +81,7 @@ def test_a_pull_on_the_ring_away_from_the_stretched_posture_is_warned_of(tmp_pat
     path.write_text(text.replace("bore: 190 mm, rod: 110 mm", "bore: 180 mm, rod: 110 mm"), encoding="utf-8")
     _, scene, (told,) = first_scene(*read_table(path), "table")
     assert told.path == "joints[1].bore" and "pulls most, with 758 kN, 47.6 MPa on the rod side" in told.bound
+    assert "With this rod a bore of 0.184 m would do" in told.remedy  # sqrt(4 / pi 758 kN / 45 MPa + 0.11^2)
     stretched = statics(scene, posture="stretched", modes=0).cylinder_forces[1]
     oil = scene.joints[1].cylinder.oil
     assert oil is not None and stretched / oil.rod_area < 30e6, "stretched out it passes"

@@ -115,7 +115,10 @@ def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Find
                 f"{abs(load.force) / 1e3:.3g} kN, {pressures[worst] / 1e6:.3g} MPa on the {side} side; "
                 f"expected {expected.format(*(1e-6 * limit for limit in PRESSURE))}"
             )
-            remedy = "Give bore and rod as diameters, not radii (m), and check pins and masses; or narrow range_deg."
+            remedy = "Give bore and rod as diameters, not radii (m), and check pins and masses."
+            if pressures[worst] > PRESSURE[1]:
+                area = 4.0 / math.pi * abs(load.force) / PRESSURE[1] + (oil.rod**2 if worst else 0.0)
+                remedy += f" With this rod a bore of {math.ceil(1e3 * math.sqrt(area)) / 1e3:g} m would do."
             yield warning(draft, ("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
 
 
