@@ -65,7 +65,8 @@ def _boom(axes: Axes, scene: Scene) -> None:
 
     axes.set_aspect("equal", adjustable="datalim")
     angles = _straight(scene)
-    bones = skeleton(scene, angles)
+    with np.errstate(invalid="ignore"):
+        bones = skeleton(scene, angles)
     for i in range(len(scene.sections)):
         draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
     for i, joint in enumerate(scene.joints):
