@@ -27,7 +27,9 @@ document.querySelectorAll('table.sorted th').forEach((head, column) => head.oncl
 });
 </script>
 <style>
-body { max-width: 1400px } svg { width: 100%; height: 130px }
+body { max-width: 1400px } svg { width: 100%; height: 130px } .wide { overflow-x: auto }
+table.sorted td { white-space: nowrap } table.sorted td:last-child { white-space: normal; min-width: 8em }
+@media (max-width: 1300px) { table.sorted { font-size: 13px } table.sorted th, table.sorted td { padding: .22em .4em } }
 table.sorted th { cursor: pointer } tr.failed td { background: #fff0e6 }
 </style>"""
 
@@ -60,7 +62,8 @@ _COLUMNS = (
 
 def _table(rows: Sequence[Row]) -> str:
     titles = "".join(f"<th>{escape(title)}</th>" for title in _COLUMNS)
-    return f'<table class="sorted"><thead><tr>{titles}</tr></thead><tbody>{"".join(map(_line, rows))}</tbody></table>'
+    table = f'<table class="sorted"><thead><tr>{titles}</tr></thead><tbody>{"".join(map(_line, rows))}</tbody></table>'
+    return f'<div class="wide">{table}</div>'
 
 
 def _line(row: Row) -> str:

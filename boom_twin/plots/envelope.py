@@ -103,3 +103,5 @@ def _make_room(axes: Axes, labels: list[Annotation]) -> None:
         if np.ptp(reach) <= span / share:
             break
     axes.set_xlim(reach.min(), reach.max())
+    if ends.min() >= 0.0:  # there are no negative frequencies and stresses, only room for words
+        axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= reach.max()])

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 POSITIONS = 5  # of a joint, ends of its range included
 CURVE = 361  # angles
 COLUMNS = 3
+FAN = 0.4  # radius of the sector that a section sweeps in the panel of the boom, over its length
+ASIDE = 0.035  # of the reach, by which a section that is folded back is drawn beside the one that it lies on
 SLENDER = 0.07  # width of a drawn barrel over its closed length
 NOTE = "blue: lowest angle, orange: highest; section before along x"
 ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
@@ -58,27 +60,51 @@ def _straight(scene: Scene) -> Array:
 
 
 def _boom(axes: Axes, scene: Scene) -> None:
-    """The straight boom, and where each section gets when only its joint turns."""
+    """The straight boom, where each section gets when only its joint turns, and the fan that it sweeps."""
+    from matplotlib.patheffects import withStroke
+
     axes.set_aspect("equal", adjustable="datalim")
     angles = _straight(scene)
-    for i, joint in enumerate(scene.joints):
-        for degrees, (colour, word) in zip(joint.range_deg, ENDS, strict=True):
-            turned = angles.copy()
-            turned[i] = np.radians(degrees)
-            with np.errstate(invalid="ignore"):
-                line = skeleton(scene, turned).pivots[i : i + 2]
-            axes.plot(*line.T, "-", color=colour, linewidth=1.6, label="" if i else f"{word} angle of its joint")
-    bones = skeleton(scene, angles)
+    with np.errstate(invalid="ignore"):
+        bones = skeleton(scene, angles)
     for i in range(len(scene.sections)):
         draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
+    for i, joint in enumerate(scene.joints):
+        before = float(bones.headings[i] - angles[i])
+        _fan(axes, bones.pivots[i], before + np.radians(joint.range_deg), FAN * scene.sections[i].length)
+        for degrees, (colour, word) in zip(joint.range_deg, ENDS, strict=True):
+            line = folded_section(bones.pivots[i], before, np.radians(degrees), scene.sections[i].length, ASIDE * scene.reach)
+            axes.plot(*line.T, "-", color=colour, linewidth=2.2, label="" if i else f"{word} angle of its joint", zorder=9)
+            axes.plot(*line[-1], "o", color=colour, markersize=4.0, zorder=9)
         middle = bones.point(i, 0.5 * scene.sections[i].length)
-        axes.annotate(str(i + 1), (middle[0], middle[1]), ha="center", va="center", fontsize=12, zorder=9)
+        halo = [withStroke(linewidth=3.0, foreground="white")]
+        axes.annotate(str(i + 1), (middle[0], middle[1]), ha="center", va="center", fontsize=12, zorder=10, path_effects=halo)
     for pivot in bones.pivots:
         draw_pin(axes, pivot, 4.0)
     axes.set_title("each section alone at the ends of its joint's range")
-    axes.set_xlabel("x forward, m")
+    axes.set_xlabel("x forward, m; folded sections are drawn aside")
     axes.set_ylabel("y up, m")
     axes.legend(loc="lower left", fontsize=11)
+
+
+def folded_section(pivot: Array, before: float, angle: float, length: float, aside: float) -> Array:
+    """Line of a section that its joint turns by `angle` (rad) from the heading `before`, shape (3, 2), m.
+
+    One that is folded back lies on the section before: it is moved `aside` (m), by the more the farther it is beyond 90
+    degrees, to the side from which it came.
+    """
+    along = np.array([np.cos(before), np.sin(before)])
+    across = np.sign(angle) * np.array([-along[1], along[0]])
+    away = max(0.0, -np.cos(angle)) * aside * across
+    end = length * np.array([np.cos(before + angle), np.sin(before + angle)])
+    return np.array([pivot, pivot + away, pivot + away + end])
+
+
+def _fan(axes: Axes, pivot: Array, ends: Array, radius: float) -> None:
+    """What a section sweeps, as a sector about its pivot."""
+    turn = np.linspace(ends[0], ends[1], 60)
+    rim = pivot + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    axes.fill(*np.vstack([pivot, rim]).T, facecolor=PURPLE, alpha=0.18, linewidth=0, zorder=3)
 
 
 def _joint(axes: Axes, scene: Scene, i: int) -> None:
@@ -99,6 +125,7 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
     middle, reach = 0.5 * (low + high), 0.62 * max(*(high - low), 0.05 * scene.reach)
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    axes.locator_params(nbins=5)
     joint_range = " to ".join(f"{degrees:g}" for degrees in scene.joints[i].range_deg)
     axes.set_title(f"joint {i + 1}, kind {scene.joints[i].kind}: {joint_range} deg")
 

@@ -158,6 +158,33 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
     return found
 
 
+SLIMMEST = 0.3  # width of a box over its height
+
+
+def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
+    """A warning of every box that is wider than high, for it would be stiffer the other way round, or much too slim."""
+    found = []
+    for i, section in enumerate(table.sections):
+        h, b, place = section.height, section.width, ("sections", i)
+        if b > h:
+            softer = second_moment(b, h, section.wall) / second_moment(h, b, section.wall)
+            bound = (
+                f"it is less than width = {b:g} m; booms are higher than wide, and this box bends "
+                f"{softer:.3g} times as much in the plane as one of {b:g} by {h:g} m"
+            )
+            remedy = f"Give height: {b:g} and width: {h:g}, if they are swapped."
+            found.append(document.fault((*place, "height"), h, bound, remedy))
+        elif b < SLIMMEST * h:
+            bound = f"expected at least {SLIMMEST * h:.3g} m for a box {h:g} m high"
+            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit."))
+    return found
+
+
+def second_moment(height: float, width: float, wall: float) -> float:
+    """I (m^4) of a box about the axis across the plane of the boom."""
+    return (width * height**3 - (width - 2 * wall) * (height - 2 * wall) ** 3) / 12
+
+
 def csv_document(text: str, source: str) -> Document:
     """A CSV text as the values of a table: a header, then a row for every section with its joint.
 

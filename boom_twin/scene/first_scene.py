@@ -16,7 +16,9 @@ from ..config.yaml_text import yaml_text
 from ..errors import Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
-from .boom_table import BoomTable, BoxSection, DrawnJoint
+from .boom_table import BoomTable, BoxSection, DrawnJoint, odd_boxes, second_moment
+from .checks.joint_range import NEXT_TO
+from .checks.values import TURNS
 from .kinematics import linkage_of, stroke_curve
 from .load import examine_text
 from .oil_spring import middle_stiffness, stiffness
@@ -42,11 +44,16 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
         The boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
     """
     text, scene, faults, odd = _examined(table, source)
-    narrower = [each for each in odd if RANGE.fullmatch(each.path)]
+    narrower = [each for each in odd if RANGE.fullmatch(each.path) and not each.bound.startswith((NEXT_TO, TURNS))]
     if narrower:  # a fault here: the stroke and the postures that are worked out hang on the range
         odd = [each for each in odd if each not in narrower]
         faults = narrower + [each for each in faults if table.postures or not each.path.startswith("postures")]
-    oddities = in_table(odd, document)
+    boxes, told = odd_boxes(table, document), in_table(odd, document)
+    lying = {each.path.rpartition(".")[0] for each in boxes if each.path.endswith("height")}  # their second moments are odd too
+    told = [each for each in told if each.path.rpartition(".")[0] not in lying]
+    known = {each.path.rpartition(".")[0] for each in told}
+    oddities = [*told, *(each for each in boxes if each.path.rpartition(".")[0] not in known)]
+    oddities.sort(key=lambda each: each.line or 0)
     if faults or scene is None:
         raise SceneError(source, tuple(in_table(faults, document)), tuple(oddities))
     return text, scene, oddities
@@ -99,7 +106,7 @@ Row = tuple[str, str, str]
 def _section(table: BoomTable, section: BoxSection, first: float | None) -> list[Row]:
     h, b, t, rho = section.height, section.width, section.wall, table.material.rho or 0.0
     area = h * b - (h - 2 * t) * (b - 2 * t)
-    inertia = (b * h**3 - (b - 2 * t) * (h - 2 * t) ** 3) / 12
+    inertia = second_moment(h, b, t)
     pipe = table.pipe if section.pipe is None else section.pipe
     per_metre = rho * area + pipe
     rows = [

@@ -58,6 +58,23 @@ def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
         return np.asarray(cylinder_length(row, np.atleast_1d(angles))[0] - closed)
 
 
+def transmission_angles(row: np.record, angles: Array) -> Array:
+    """Angles (rad, 0 to pi/2) at which the links of a six-bar meet in Q, 0 at a dead centre; NaN where they do not meet."""
+    with np.errstate(invalid="ignore"):
+        left, right = link_angles(row, angles)
+        return np.asarray(np.abs(np.arcsin(np.sin(left - right))))
+
+
+def levers_and_transmission(scene: Scene, index: int, samples: int) -> tuple[float, float, float | None]:
+    """Least and greatest lever ds/dphi (m) over the range of joint `index`; least transmission angle (rad) of a six-bar."""
+    row, angles = linkage(scene, index), np.radians(np.linspace(*scene.joints[index].range_deg, samples))
+    with np.errstate(invalid="ignore"):
+        levers = np.abs(cylinder_length(row, angles)[1])
+    direct = scene.joints[index].kind == "A"
+    least = None if direct else float(np.nanmin(transmission_angles(row, angles)))
+    return float(np.nanmin(levers)), float(np.nanmax(levers)), least
+
+
 def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
     """Least and greatest stroke (m) of joint `index` at `samples` angles of its range, within the cylinder's travel.
 

@@ -12,7 +12,17 @@ import numpy as np
 
 from ..errors import Fault, SceneError, SceneWarning
 from .block_reader import validated
-from .checks import clearance, cross_sections, cylinder_clearance, geometry, joint_range, rigid_bodies, stretched_boom, values
+from .checks import (
+    clearance,
+    cross_sections,
+    cylinder_clearance,
+    geometry,
+    joint_range,
+    pin_spacing,
+    rigid_bodies,
+    stretched_boom,
+    values,
+)
 from .checks.findings import Draft, Finding
 from .format import SCENE
 from .glossary import BLOCKS
@@ -66,6 +76,7 @@ PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
     rigid_bodies.rigid_parts,
     rigid_bodies.moving_parts,
     cylinder_clearance.clear_cylinders,
+    pin_spacing.spaced_pins,
 )
 """Of a scene without faults: parts against each other."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .kinematics import stroke_range
+from .linkage_range import LinkageAccount, linkage_account
 from .oil_spring import stiffness_over_stroke
 from .schema import IDEAL_BELOW, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits
@@ -132,6 +133,7 @@ class JointAccount:
     k_over_stroke: tuple[float, ...]
     d: float | None
     side: str
+    linkage: LinkageAccount
     link_mass: float
     barrel_mass: float
     rod_mass: float
@@ -223,6 +225,7 @@ def _joint(scene: Scene, i: int) -> JointAccount:
         k_over_stroke=() if cylinder.oil is None else stiffness_over_stroke(cylinder),
         d=cylinder.d,
         side="" if joint.kind == "A" else joint.side or "left",
+        linkage=linkage_account(scene, i),
         link_mass=(joint.mL or 0.0) + (joint.mR or 0.0),
         barrel_mass=cylinder.barrel.mass if cylinder.barrel is not None else 0.0,
         rod_mass=cylinder.rod.mass if cylinder.rod is not None else 0.0,

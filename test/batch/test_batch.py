@@ -142,6 +142,7 @@ def test_the_page_needs_nothing_from_elsewhere(done: tuple[Path, dict[str, int],
     found.feed(text)
     assert found.links == [] and "http" not in text and not re.search(r"url\(|@import|fetch\(", text)
     assert found.tags.count("tr") == COUNT + 2 and found.tags.count("svg") >= 3
+    assert '<div class="wide"><table' in text, "the table scrolls by itself where the screen is narrower"
 
 
 def test_a_finished_batch_starts_no_cluster(

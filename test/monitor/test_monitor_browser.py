@@ -268,6 +268,32 @@ def test_a_finger_opens_tabs_and_chooses_a_span(browser: Any, monitor: Monitor) 
     context.close()
 
 
+SIZES = {(1280, 720): 0.62, (2560, 1440): 0.78, (1024, 768): 0.66, (834, 1112): 0.62}
+"""Sizes of screens, and what share of the height the tabs have at least."""
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_every_tab_fits_the_screen(browser: Any, monitor: Monitor, size: tuple[int, int]) -> None:
+    """Nothing is cut off at the side, and head, buttons and foot leave the tabs most of the height."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(monitor.url)
+    wait(page, "twin.timeline.isRead", 120_000)
+    go(page, 10.0)
+    for tab in ("traces", "spectrum", "spectrogram", "shape", "state", "path", "response"):
+        page.locator(f"#tabs button[data-tab='{tab}']").click()
+        page.wait_for_timeout(300)
+        beyond = "filter(e => e.getBoundingClientRect().right > innerWidth + 1).map(e => e.id)"
+        assert page.evaluate(f"[...document.querySelectorAll('body *')].{beyond}") == [], tab
+        assert page.evaluate("document.querySelector('main').clientHeight / innerHeight") >= SIZES[size], tab
+    page.keyboard.press("1")
+    page.wait_for_timeout(600)
+    right = "[...document.querySelectorAll('#figures tr')].slice(0, 2).map(row => getComputedStyle(row.cells[3]).textAlign)"
+    assert page.evaluate(right) == ["right", "right"], "heads stand over their numbers"
+    context.close()
+
+
 def test_spectrum_and_spectrogram(page: Any) -> None:
     page.keyboard.press("2")
     wait(page, "document.querySelectorAll('#peaks tr').length > 2")

@@ -51,6 +51,8 @@ def test_words_fit_beside_their_bars_and_the_legend_covers_nothing(tmp_path: Pat
     figure.draw_without_rendering()
     tips, *bars = [axes for axes in figure.axes if axes.get_ylabel() == "y up, m" or axes.get_xlabel() in ("kN", "MPa")]
     assert len(bars) == 2 and tips.get_legend().get_window_extent().y0 >= tips.get_window_extent().y1
+    forces, stresses = (axes.get_xticks() for axes in bars)
+    assert forces.min() < 0.0 and stresses.min() == 0.0, "stresses are not negative, so their axis begins at 0"
     for axes in bars:
         frame, labels = axes.get_window_extent(), [text for text in axes.texts if text.get_text()]
         assert len(labels) == 8 and not any("e+" in label.get_text() for label in labels)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from boom_twin.errors import SceneError
-from boom_twin.scene.boom_table import read_table
+from boom_twin.scene.boom_table import BoomTable, read_table
 from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.load import examine
@@ -145,6 +145,7 @@ def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
         ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
         ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
         ("payload: 60 kg", "payload: 0.06", "payload", "tonnes?"),
+        ("height: 450 mm, width: 340 mm", "height: 340 mm, width: 450 mm", "sections[1].height", "bends 1.53 times as much"),
     ],
 )
 def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: str, path: str, words: str) -> None:
@@ -152,6 +153,57 @@ def test_a_slip_in_the_table_is_warned_of_once(tmp_path: Path, old: str, new: st
     oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
     (told,) = [oddity for oddity in oddities if oddity.path == path]
     assert words in str(told) and len(oddities) <= 2, [str(oddity) for oddity in oddities]
+
+
+FURTHER_SLIPS = {
+    "width in cm, written mm": ("width: 340 mm", "width: 34 mm", "sections[1].width"),
+    "wall in cm": ("wall: 6 mm", "wall: 6 cm", "sections[1].wall"),
+    "wall of a tenth": ("wall: 6 mm", "wall: 0.6 mm", "sections[1].wall"),
+    "length in cm": ("length: 7600 mm", "length: 7600 cm", "sections[1].beam"),
+    "one mm among units": ("height: 450 mm", "height: 450", "sections[1].height"),
+    "pipe of the whole section": ("pipe: 25 kg/m", "pipe: 190 kg/m", "pipe"),
+    "payload 100 times": ("payload: 60 kg", "payload: 6000 kg", "payload"),
+    "line_fill as density": ("line_fill: 0 kg/m", "line_fill: 2400", "line_fill"),
+    "bulk modulus in bar, a digit short": ("1.4 GPa", "1400 bar", "bulk_modulus"),
+    "bulk modulus, a digit more": ("1.4 GPa", "14 GPa", "bulk_modulus"),
+    "damping in percent of a percent": ("damping_ratio: 0.01", "damping_ratio: 0.1", "damping_ratio"),
+    "rod_pin on the other side": ("rod_pin: [1320 mm, -264 mm]", "rod_pin: [1320 mm, 264 mm]", "joints[0].range_deg"),
+    "rod_pin in cm": ("rod_pin: [1320 mm, -264 mm]", "rod_pin: [132 mm, -26.4 mm]", "joints[0].bore"),
+    "cylinder_pin, x and y swapped": ("[990 mm, -2750 mm]", "[-2750 mm, 990 mm]", "joints[0].range_deg"),
+    "pivot from another origin": ("pivot: [0, 0]", "pivot: [0, 2750 mm]", "joints[0].range_deg"),
+    "D on the other side": ("D: [-362 mm, -55 mm]", "D: [-362 mm, 55 mm]", "joints[1].range_deg"),
+    "R on the other side": ("R: [845 mm, 237 mm]", "R: [845 mm, -237 mm]", "joints[2].range_deg"),
+    "range, a decimal": ("range_deg: [-165, 10], bore: 200", "range_deg: [-16.5, 1], bore: 200", "joints[1].range_deg"),
+    "rod of a tenth": ("rod: 120 mm", "rod: 12 mm", "joints[1].rod"),
+    "rod as thick as the bore": ("rod: 120 mm", "rod: 198 mm", "joints[1].bore"),
+    "bore of another joint": ("bore: 90 mm, rod: 55 mm", "bore: 200 mm, rod: 120 mm", "joints[3].bore"),
+    "oil in ml": ("bore: 180 mm, rod: 125 mm", "bore: 180 mm, rod: 125 mm, cap_line: 0.5 ml", "joints[0].cap_line"),
+    "open length as stroke": ("rod: 125 mm", "rod: 125 mm, max_stroke: 4.5 m", "joints[0].max_stroke"),
+    "inclination in degrees": ("-2750 mm]}", "-2750 mm], inclination: 3}", "base.inclination"),
+    "link in g": ("mL: 35 kg", "mL: 35000 kg", "joints[1].mL"),
+}  # fmt: skip
+"""A newcomer's slips in the table: what is there, what was written, and where it is told; all load."""
+
+
+@pytest.mark.parametrize("slip", FURTHER_SLIPS)
+def test_further_slips_in_the_table_are_warned_of_where_they_are(tmp_path: Path, slip: str) -> None:
+    old, new, path = FURTHER_SLIPS[slip]
+    assert EXAMPLE.count(old) == 1
+    oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
+    assert path in [oddity.path for oddity in oddities] and len(oddities) <= 4, [str(oddity) for oddity in oddities]
+
+
+def test_the_example_table_names_what_a_table_may_hold_of_the_whole_boom(tmp_path: Path) -> None:
+    written = set(re.findall(r"^(\w+):", EXAMPLE, re.MULTILINE))
+    assert written == set(BoomTable.model_fields) - {"postures"}
+    _, full, (heavy,) = scene_of(tmp_path, EXAMPLE.replace("line_fill: 0 kg/m", "line_fill: 29 kg/m"))
+    assert full.line_fill == 29.0 and heavy.path == "joints[1].bore", "surrogate pins: cylinder 2 is too small for a full line"
+    assert scene_of(tmp_path, EXAMPLE)[1].line_fill is None
+
+
+def test_a_square_box_is_not_warned_of(tmp_path: Path) -> None:
+    square = EXAMPLE.replace("height: 240 mm, width: 190 mm", "height: 210 mm, width: 210 mm")
+    assert scene_of(tmp_path, square)[2] == []
 
 
 def test_what_follows_from_a_warned_pin_is_not_told_again(tmp_path: Path) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
 from boom_twin.errors import SceneError
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import levers_and_transmission
 
 Place = tuple[str | int, ...]
 
@@ -82,7 +84,38 @@ def test_a_stroke_that_turns_back_warns(bench: Any) -> None:
     (oddity,) = bench.oddities(edit)
     assert oddity.path == "joints[0].range_deg"
     assert "turns back at -58.9 deg" in oddity.bound and "two angles" in oddity.bound
-    assert "Narrow range_deg to [-58, 85]" in oddity.remedy
+    assert "Narrow range_deg to [-51, 85], which keeps a quarter of the largest lever" in oddity.remedy
+
+
+DEAD_CENTRES = {
+    "links": (
+        1,
+        [-60, 25],
+        {"lL": 0.2, "lR": 0.0808},
+        ("next to a dead centre of the links at -14.3 to -8.5", "at least 5 deg"),
+    ),
+    "slider-crank": (0, [-54, 22], {}, ("next to a dead centre of the cylinder at -54", "a quarter of the largest")),
+}
+
+
+@pytest.mark.parametrize("case", DEAD_CENTRES)
+def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_keeps_clear_of_it(bench: Any, case: str) -> None:
+    i, whole, keys, words = DEAD_CENTRES[case]
+
+    def edit(values: Any, angles: list[float]) -> None:
+        values["postures"] = {"straight": [0, 0, 0, 0]}
+        values["joints"][i].update(keys, range_deg=angles)
+        values["joints"][i]["cylinder"].update(
+            [{"closed_length": 0.72, "max_stroke": 0.68}, {"closed_length": 0.55, "max_stroke": 0.5}][i]
+        )
+
+    (oddity,) = bench.oddities(lambda values: edit(values, whole))
+    assert oddity.path == f"joints[{i}].range_deg" and all(word in oddity.bound for word in words), str(oddity)
+    low = float(oddity.remedy.partition("[")[2].partition(",")[0])
+    assert low > whole[0] and bench.oddities(lambda values: edit(values, [low, whole[1]])) == []
+    scene = load_scene(bench.edited(lambda values: edit(values, [low, whole[1]])))
+    least, greatest, between = levers_and_transmission(scene, i, 1751)
+    assert least >= 0.25 * greatest and (between is None or math.degrees(between) >= 5.0)
 
 
 def test_one_warning_tells_all_that_is_wrong_with_a_range_and_its_remedy_mends_it(bench: Any) -> None:

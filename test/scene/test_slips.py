@@ -106,6 +106,26 @@ def test_a_rod_that_passes_a_pin_is_warned_of(case: str) -> None:
     assert examine_text(text_of(values), "scene")[1] == []
 
 
+CLOSE = {
+    "with oil": ("five_section_z_fold", 1, {"D": [-0.16, -0.16], "E": [0.03, 0.24], "lL": 0.66}, "0.163 m"),
+    "without": (None, 1, {"D": [-0.13, -0.04], "E": [0.116, 0.039], "lR": 0.405}, "0.043 m"),
+}
+
+
+@pytest.mark.parametrize("case", CLOSE)
+def test_pins_that_come_too_close_are_warned_of_with_the_range_that_keeps_them_apart(case: str) -> None:
+    name, i, keys, needed = CLOSE[case]
+    values = YAML(typ="safe", pure=True).load(example_text(name) if name else default_text())
+    values["joints"][i].update(keys)
+    cylinder = values["joints"][i]["cylinder"]
+    cylinder.update(closed_length=cylinder["closed_length"] - 0.03, max_stroke=cylinder["max_stroke"] + 0.06)
+    values["postures"] = {"arch": values["postures"]["arch"]}
+    (told,) = examine_text(text_of(values), "scene")[1]
+    assert told.path == f"joints[{i}].E" and "D and E are" in told.bound and f"at least {needed}" in told.bound, str(told)
+    values["joints"][i]["range_deg"] = [float(angle) for angle in told.remedy.rpartition("[")[2].rstrip("].").split(",")]
+    assert examine_text(text_of(values), "scene")[1] == []
+
+
 def test_a_rod_is_as_far_from_the_pins_as_the_skeleton_says() -> None:
     scene, _ = examine_text(example_text("five_section_z_fold"), "scene")
     joint = scene.joints[2]

@@ -4,7 +4,8 @@ export class HtmlTable {
   constructor(id) { this.element = document.getElementById(id); }
 
   fill(heads, rows, caption = "") {
-    const cells = (kind, row) => "<tr>" + row.map(cell => `<${kind}${typeof cell === "string" ? ' class="text"' : ""}>${formatNumber(cell)}</${kind}>`).join("") + "</tr>";
+    const words = heads.map((_, i) => rows.some(row => typeof row[i] === "string")); // a head stands over its column: left over words, right over numbers
+    const cells = (kind, row) => "<tr>" + row.map((cell, i) => `<${kind}${words[i] ? ' class="text"' : ""}>${formatNumber(cell)}</${kind}>`).join("") + "</tr>";
     this.element.innerHTML = (caption ? `<caption>${escapeHtml(caption)}</caption>` : "") + cells("th", heads) + rows.map(row => cells("td", row)).join("");
   }
 }

@@ -11,17 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels.elements.linkage import LINK_L, link_angles
-from ...kernels.plane_algebra import turned
 from ...types import Array
-from ..kinematics import linkage
+from ..linkage_range import PIN, distances_to, joint_pins, rod_pin_of
 from ..schema import Cylinder, Oil, Scene
 from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
-from .joint_range import grid_of, usable
+from .joint_range import Mask, grid_of, usable
 
 WALL = 0.12  # of a barrel, over its bore
-PIN = 0.5  # diameter over the bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
 
 
@@ -31,7 +28,7 @@ class Pass(NamedTuple):
     pin: str
     distance: Array
     needed: Array
-    at_barrel: Array
+    at_barrel: Mask
 
 
 def clear_cylinders(draft: Draft, scene: Scene) -> Iterator[Finding]:
@@ -63,39 +60,25 @@ def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, cl
 
 def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
     """The pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
-    row = linkage(scene, i)
-    foot = complex(row.cx, row.cy)
-    rod_pin, pins = _pins(scene, i, row, phi)
-    along = rod_pin - foot
-    length = np.abs(along)
-    for name, pin in pins.items():
-        place = np.clip(((pin - foot) * along.conj()).real / length**2, 0.0, 1.0)
+    pins = joint_pins(scene, i, phi)
+    foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
+    length = np.abs(rod_pin - foot)
+    for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
+        distance, place = distances_to(pin, foot, rod_pin)
         at_barrel = place * length < BARREL * cylinder.closed_length
         radius = np.where(at_barrel, (0.5 + WALL) * oil.bore, 0.5 * oil.rod)
-        yield Pass(name, np.abs(pin - foot - place * along), radius + 0.5 * PIN * oil.bore, at_barrel)
+        yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
 
 
-def _pins(scene: Scene, i: int, row: np.record, phi: Array) -> tuple[Array, dict[str, Array]]:
-    """The rod pin and, by name, the other pins, each shape as `phi`; NaN where the links do not meet."""
-    e = _complex(turned(phi, row.ex, row.ey))
-    pins = {"the pivot": np.zeros_like(e)}
+def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
+    """Pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
     if i == 0:
-        return e, pins
+        return {}
     carrier, before = scene.sections[i - 1], scene.joints[i - 1]
     inner = carrier.rod_pin if i == 1 else before.E
-    pins["the pivot before"] = np.full_like(e, -carrier.length)
+    found = {"the pivot before": pivot - carrier.length}
     if inner is not None:
-        pins["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.full_like(e, complex(*inner) - carrier.length)
-    with np.errstate(invalid="ignore"):
-        left, right = link_angles(row, phi)
-    d = complex(row.dx, row.dy)
-    q = d + row.length_l * np.exp(1j * left)
-    base, angle = (d, left) if row.mount == LINK_L else (e, right)
-    pins |= {"D": np.full_like(e, d), "E": e}
-    if scene.joints[i].kind != "B1":  # there the rod pin is Q
-        pins["Q"] = q
-    return np.asarray(base + _complex(turned(angle, row.along, row.left))), pins
-
-
-def _complex(point: tuple[Array, Array]) -> Array:
-    return np.asarray(point[0] + 1j * point[1])
+        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.asarray(
+            pivot + (complex(*inner) - carrier.length)
+        )
+    return found

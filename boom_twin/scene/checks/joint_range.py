@@ -1,4 +1,4 @@
-"""Checks of a joint over its range: links that meet, strokes within reach and unique, named postures in it."""
+"""Checks of a joint over its range: links that meet, strokes within reach and unique, dead centres, named postures in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
-from ..kinematics import linkage_of
+from ..kinematics import linkage_of, transmission_angles
 from ..schema import Joint
 from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
@@ -19,8 +19,12 @@ from .geometry import TOLERANCE
 from .values import NEEDED
 
 STEP_DEG = 0.1
+TRANSMISSION_DEG = 5.0  # least angle between the links at Q; forces in them are then 11 times those across
+LEVER = 0.25  # least lever ds/dphi over the largest; the cylinder's force is then 4 times the least one
+OPEN_DEG = 15.0  # between the links, where the largest lever counts: next to a dead centre it grows beyond all bounds
 MIRRORED = ("side", "cy", "dy", "ey", "left")  # numbers of a linkage that change their sign
 UNMET = "the links lL and lR, between D and E, do not meet at"
+NEXT_TO = "next to a dead centre"
 Mask = NDArray[np.bool_]
 
 
@@ -82,6 +86,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
     within = np.where(reached, lengths, np.nan)
     turns = _turns(within)
+    tight, tight_words = _dead_centres(joint, row, degrees, reached)
     reasons, remedies = [], []
     if not closed.all():
         reasons.append(f"{UNMET} {intervals(degrees, ~closed)}")
@@ -95,11 +100,42 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
     if turns.size:
         angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
         reasons.append(f"the stroke turns back at {angles} deg: one stroke then belongs to two angles")
+    remedies = [*filter(None, [_turned_over(joint, row, degrees) if reasons else ""]), *(remedies or ["check the pins"])]
+    reasons = reasons or tight_words
     if reasons:
-        low, high = usable(degrees, within)
-        remedies = [_turned_over(joint, row, degrees), *(remedies or ["check the pins"])]
-        remedy = ", or ".join([f"Narrow range_deg to [{low:g}, {high:g}]", *filter(None, remedies)])
+        remedy = ", or ".join([_narrow_words(joint, degrees, within, tight), *remedies])
         yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
+
+
+def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
+    """Where the joint is next to a dead centre, and that in words."""
+    angles = np.radians(degrees)
+    with np.errstate(invalid="ignore"):
+        levers = np.abs(cylinder_length(row, angles)[1])
+    between = np.full(len(degrees), 90.0) if joint.kind == "A" else np.degrees(transmission_angles(row, angles))
+    counted = levers[reached & (between >= OPEN_DEG)]
+    largest = float(counted.max()) if counted.size else float(np.nanmax(np.where(reached, levers, np.nan), initial=0.0))
+    flat, weak, told = reached & (between < TRANSMISSION_DEG), reached & (levers < LEVER * largest), []
+    if flat.any():
+        told.append(
+            f"{NEXT_TO} of the links at {intervals(degrees, flat)}: they meet at {between[flat].min():.1f} deg; "
+            f"expected at least {TRANSMISSION_DEG:g} deg, for forces in links and pins grow as 1/sin of that"
+        )
+    if weak.any():
+        told.append(
+            f"{NEXT_TO} of the cylinder at {intervals(degrees, weak)}: its lever ds/dphi is {levers[weak].min():.3g} m; "
+            f"expected at least {LEVER * largest:.3g} m, a quarter of the largest, for its force grows as one over that"
+        )
+    return flat | weak, told
+
+
+def _narrow_words(joint: Joint, degrees: Array, within: Array, tight: Mask) -> str:
+    """The range that does, with what it keeps from dead centres where that is possible."""
+    low, high = usable(degrees, np.where(tight, np.nan, within))
+    if low >= high:
+        return "Narrow range_deg to [{:g}, {:g}]".format(*usable(degrees, within))
+    links = "" if joint.kind == "A" else f"at least {TRANSMISSION_DEG:g} deg between the links and "
+    return f"Narrow range_deg to [{low:g}, {high:g}], which keeps {links}a quarter of the largest lever"
 
 
 def _turned_over(joint: Joint, row: np.record, degrees: Array) -> str:

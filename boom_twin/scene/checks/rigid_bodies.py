@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ..schema import CylinderPart, Joint, RigidPart, Scene, Section, section_depth
+from ..schema import Cylinder, CylinderPart, Joint, RigidPart, Scene, Section, section_depth
 from ..yaml_reader import Place
 from .cross_sections import density
 from .findings import Draft, Finding, warning
@@ -18,6 +18,8 @@ ROD_BY_BEAM = (0.01, 10.0)  # mass per metre of links, barrels and rods against 
 CYLINDER_GYRATION = (0.05, 0.5)  # of the closed length; a uniform rod has 0.29
 CYLINDER_CENTRE = 0.8  # of the closed length
 LONGEST_STROKE = 0.95  # of the closed length
+LONGEST_CYLINDER = 0.5  # of the section that it lies along: closed length
+LEAST_LINE = 1e-3  # oil between piston and valve, of what the chamber takes
 
 
 def rigid_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
@@ -73,6 +75,7 @@ def moving_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
             if mass and length:
                 yield from _rod_mass(draft, ("joints", i, key), mass, length, per_metre)
         yield from _cylinder(draft, i, joint, per_metre)
+        yield from _cylinder_size(draft, i, joint.cylinder, scene.sections[max(0, i - 1)].length)
 
 
 def _mass_per_metre(section: Section) -> float:
@@ -99,6 +102,21 @@ def _cylinder(draft: Draft, i: int, joint: Joint, per_metre: float) -> Iterator[
         if part is not None and part.mass > 0.0:
             yield from _cylinder_part(draft, (*place, key), part, closed)
             yield from _rod_mass(draft, (*place, key, "mass"), part.mass, closed, per_metre)
+
+
+def _cylinder_size(draft: Draft, i: int, cylinder: Cylinder, section: float) -> Iterator[Finding]:
+    """Closed length against the section that the cylinder lies along, oil in the lines against that in the chambers."""
+    place, closed = ("joints", i, "cylinder"), cylinder.closed_length
+    if closed > LONGEST_CYLINDER * section:
+        bound = f"expected at most {LONGEST_CYLINDER * section:.3g} m beside a section of {section:g} m"
+        remedy = "Check the pins at its ends: C from the outboard pivot, cylinder_pin from the same origin as pivot."
+        yield warning(draft, (*place, "closed_length"), closed, bound, remedy)
+    if cylinder.oil is not None:
+        for key, area in (("cap_line", cylinder.oil.cap_area), ("rod_line", cylinder.oil.rod_area)):
+            volume, least = getattr(cylinder.oil, key), LEAST_LINE * area * cylinder.max_stroke
+            if 0.0 < volume < least:
+                bound = f"expected at least {least:.2g} m^3, a thousandth of what the chamber takes"
+                yield warning(draft, (*place, "oil", key), volume, bound, "Give m^3: half a litre is 5e-4.")
 
 
 def _cylinder_part(draft: Draft, place: Place, part: CylinderPart, closed: float) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Plausibility of the whole boom stretched out: its first frequencies, their damping, the give of its oil, its payload."""
+"""Plausibility of the whole boom: payload, pressures; stretched out its first frequencies, their damping, the give of oil."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from ..oil_spring import middle_stiffness
 from ..schema import Scene
 from ..straight_boom import StraightBoom, straight_boom
+from ..worst_load import worst_loads
 from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
 
@@ -17,13 +18,15 @@ FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
 DAMPING = (1e-3, 0.2)  # ratio of the first mode
 PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
 QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
-PRESSURE = 4.5e7  # Pa; placing booms have 30 to 40 MPa
+PRESSURE = (5e6, 4.5e7)  # Pa, of the chamber that bears most; placing booms have up to 30 to 40 MPa
 GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
 TINY = 1e-300
 MOST_PAYLOAD = 0.5  # of the boom's mass
 
 
-TAKES = frozenset({"E", "A", "I", "k", "rho_A", "mass", "mL", "mR", "payload", "line_fill", "beam", "gravity"})
+TAKES = frozenset(
+    {"E", "A", "I", "k", "rho_A", "mass", "mL", "mR", "payload", "line_fill", "beam", "gravity", "inclination", "bulk_modulus"}
+)
 """Keys on which all of it depends: where one of these is odd, it would be told again."""
 
 
@@ -37,7 +40,11 @@ def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Findi
     stiffnesses = np.array([middle_stiffness(joint.cylinder) for joint in scene.joints])
     found = straight_boom(scene, stiffnesses)
     checks = (_payload, _pressure, _give, _frequency, _damping)
-    return next((told for check in checks if (told := list(check(draft, scene, found)))), [])
+    turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
+    findings = (
+        [each for each in check(draft, scene, found) if not each.fault.path.startswith(tuple(turned))] for check in checks
+    )
+    return next(filter(None, findings), [])
 
 
 def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
@@ -87,20 +94,32 @@ def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple
         yield warning(draft, part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
 
 
-def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
-    """Of the oil under the weight of the boom, on the side of the piston that bears it."""
-    for i, joint in enumerate(scene.joints):
-        oil, lever = joint.cylinder.oil, float(found.levers[i])
-        if oil is not None and lever != 0.0:
-            side, area = ("cap", oil.cap_area) if lever > 0.0 else ("rod", oil.rod_area)
-            pressure = float(found.moments[i]) / abs(lever) / area
-            if pressure > PRESSURE:
-                bound = (
-                    f"stretched out, the boom needs {pressure / 1e6:.3g} MPa on the {side} side; "
-                    f"expected at most {PRESSURE / 1e6:.0f} MPa"
-                )
-                remedy = "Give bore and rod as diameters, not radii (m), and check pins and masses."
-                yield warning(draft, ("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
+def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
+    """Of the oil under the boom's weight in the posture that is worst for it: pushing on the bore, pulling on the ring."""
+    if all(joint.cylinder.oil is None for joint in scene.joints):
+        return
+    for i, (joint, loads) in enumerate(zip(scene.joints, worst_loads(scene), strict=True)):
+        oil = joint.cylinder.oil
+        if oil is None:
+            continue
+        sides = ((oil.cap_area, "pushes", "cap"), (oil.rod_area, "pulls", "rod"))
+        pressures = [abs(load.force) / area for load, (area, *_) in zip(loads, sides, strict=True)]
+        worst = max((0, 1), key=pressures.__getitem__)
+        if loads[worst].angles and not PRESSURE[0] <= pressures[worst] <= PRESSURE[1]:
+            load, (_area, acts, side) = loads[worst], sides[worst]
+            expected = (
+                "at most {1:g} MPa in every posture" if pressures[worst] > PRESSURE[1] else "at least {0:g} MPa in one posture"
+            )
+            bound = (
+                f"at rest with sections at {list(load.angles)} deg cylinder {i + 1} {acts} most, with "
+                f"{abs(load.force) / 1e3:.3g} kN, {pressures[worst] / 1e6:.3g} MPa on the {side} side; "
+                f"expected {expected.format(*(1e-6 * limit for limit in PRESSURE))}"
+            )
+            remedy = "Give bore and rod as diameters, not radii (m), and check pins and masses."
+            if pressures[worst] > PRESSURE[1]:
+                area = 4.0 / math.pi * abs(load.force) / PRESSURE[1] + (oil.rod**2 if worst else 0.0)
+                remedy += f" With this rod a bore of {math.ceil(1e3 * math.sqrt(area)) / 1e3:g} m would do."
+            yield warning(draft, ("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
 
 
 def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:

@@ -172,6 +172,10 @@ LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin"
            "closed_length", "max_stroke")  # fmt: skip
 MASSES = ("mass", "mL", "mR", "payload")
 
+BULK = (4e8, 2.5e9)  # Pa; water has 2.2e9
+TURNS = "the joint turns by"
+NARROW = 25.0  # deg; joints of booms turn by 60 and more
+
 # key: (looks wrong when, what it looks like, what to do)
 SUSPECTS: dict[str, tuple[float, str, str]] = {
     "A": (1.0, "more than 1 m^2: cm^2 or mm^2?", "Give the area in m^2: 49 cm^2 is 4.9e-3."),
@@ -226,6 +230,12 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
     elif key == "k" and value > 1e9:
         remedy = "Check its unit, N/m, or the bore and the oil that it comes from."
         yield warning(draft, place, value, "expected from 1e6 to 1e9 N/m", remedy)
+    elif key == "bulk_modulus" and not BULK[0] <= value <= BULK[1]:
+        bound = f"expected from {BULK[0]:.2g} to {BULK[1]:.2g} Pa: hydraulic oil has 1.4e9 to 1.7e9, with air in it less"
+        yield warning(draft, place, value, bound, "Check its unit: 1.4 GPa are 14000 bar.")
+    elif key == "range_deg" and max(map(abs, value)) >= 6.3 and 0.0 < value[1] - value[0] < NARROW:
+        bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {NARROW:g} deg"
+        yield warning(draft, place, value, bound, "Give the lowest and the highest joint angle in degrees; check the decimals.")
     elif key == "range_deg" and max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield warning(draft, place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
