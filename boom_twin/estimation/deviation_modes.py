@@ -167,7 +167,7 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
-        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
+        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n), variances=np.zeros(n),
         pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),

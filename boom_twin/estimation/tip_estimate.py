@@ -15,7 +15,8 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
 - a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
   F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it. F_i is
   its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i
-  would be drawn to what explains noise by noise.
+  would be drawn to what explains noise by noise. While a boom moves that is behind by a share of a_i itself, which a_i may
+  drift by within `SLOW`: else load and other shares would have to make up for it.
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
   moment, slow likewise, M_j the mode's, w Simpson's weights.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
@@ -67,7 +68,7 @@ LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
 STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
 SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
 ONE_SOFT, ALL_SOFT = 0.02, 0.005  # chances that one certain cylinder is not, and that none is
-SOFT, SOFTENING = 0.5, 0.01  # standard deviation of a once anything is measured, and what is added to it in a second
+SOFT, SOFTENING = 0.5, 0.005  # standard deviation of a once anything is measured, and what is added to it in a second
 AGILITY, RETREAT = 2.0, 0.02  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
@@ -78,8 +79,8 @@ LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
 
 LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
-"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load that
-stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
+"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load
+that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
 
 WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
@@ -107,7 +108,8 @@ class DeviationFilter(NamedTuple):
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
-    coupling : (m, 4 + 2 n) of f, a, b and the load that stays. drawn : (n,) F_i / k_i, m, slow.
+    coupling : (m, 4 + 2 n) of f, a, b and the load that stays. drawn, ahead : (n,) F_i / k_i, m, slow; by which
+    share the newest is more.
     variances : (n,) of the strokes' estimates, m^2. pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (8, s) scratch.
     within, cross : (8, 8), (8, n) scratch, covariances of what the rows read with one another and with a.
@@ -141,6 +143,7 @@ class DeviationFilter(NamedTuple):
     lever: Array
     coupling: Array
     drawn: Array
+    ahead: Array
     variances: Array
     pushes: Array
     x: Array
@@ -286,7 +289,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
     n = f.softness.shape[0]
     kept = math.exp(-min(max(f.now[STEP], 0.0) / SLOW, 50.0)) if f.status[STARTED] else 0.0
     for i in range(n):
-        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * results.cylinder_forces[i] * f.softness[i]
+        newest = results.cylinder_forces[i] * f.softness[i]
+        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * newest
+        f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
         f.variances[i] = estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
@@ -380,7 +385,8 @@ def step_inputs(f, h, size):
         fade(f, STAYING + b, math.exp(-h / STAY_TIME), (STAYS * f.loads[USUAL_LOAD]) ** 2, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
-            f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+            lag = f.x[SHARES + i] * f.ahead[i]
+            f.p[SHARES + i, SHARES + i] += (SOFTENING * SOFTENING + lag * lag / SLOW) * h
 
 
 @inner

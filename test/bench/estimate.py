@@ -25,13 +25,15 @@ from boom_twin.estimation.load_spectrum import tip_load as pulses_of
 from boom_twin.estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, TIP, TIP_COVARIANCE
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, with_parameters
-from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
 from boom_twin.twin.twin import Twin
 from boom_twin.types import NANO, Array, Stream
 from boom_twin.validation.rig import Programme, Scheme, Sensors, at_rest, move, observe, random_programme
+from boom_twin.validation.rig.faults import RigFault
+from boom_twin.validation.rig.faulty_boom import changes as changes_by
 from boom_twin.validation.rig.loads import parse, tip_load
 from boom_twin.validation.rig.motion import ease, ease_rate
 
@@ -51,6 +53,7 @@ class Case:
     seconds: float = 40.0
     rate: float = 200.0
     settings: tuple[tuple[str, float], ...] = ()
+    faults: tuple[RigFault, ...] = ()
 
 
 SHAKEN = ("pump:0.43:130", "wind:15")
@@ -65,6 +68,9 @@ CASES = {
     "sweep": Case("sweep"),
     "cylinder 2 soft": Case(off=(("cylinder_2.k", 0.7),)),
     "cylinder 2 soft, shaken": Case(loads=SHAKEN, off=(("cylinder_2.k", 0.7),)),
+    "cylinder 2 softens": Case(faults=(RigFault("cylinder_2.k", "softer", 0.3, 12.0, 2.0),)),
+    "cylinder 3 softens, shaken": Case(loads=SHAKEN, faults=(RigFault("cylinder_3.k", "softer", 0.4, 12.0, 10.0),)),
+    "load begins": Case("rest", ("pump:0.4:150@15",)),
     "section 2 soft": Case(off=(("section_2.EI", 0.6),)),
     "section 2 soft, told": Case(off=(("section_2.EI", 0.6),), settings=(("section_deviation", 0.4),)),
     "20 kg more, rest": Case("rest", off=(("tip.payload", 20.0),)),
@@ -145,12 +151,12 @@ def made(name: str, case: Case, seed: int, folder: Path) -> Session:
             return Session(*(stored[field] for field in Session._fields))
     scene = scene_of(case)
     changes = {key: parameter(scene, key) * by if by < 10.0 else parameter(scene, key) + by for key, by in case.off}
-    boom = with_parameters(scene, changes) if changes else scene
+    boom, changing = changes_by(with_parameters(scene, changes) if changes else scene, case.faults)
     programme = programme_of(case, scene, seed)
     load = tip_load(boom, [parse(text) for text in case.loads], case.seconds, seed) if case.loads else None
     step = 1e-3 if case.rate > 200.0 or case.motion in ("stops", "sweep") else 5e-3
     resting = at_rest(boom, programme(np.zeros(1))[0][0], ELEMENTS, nodally_exact=True)
-    rows, _ = move(resting, programme, case.seconds, step, step, SCHEME, load)
+    rows, _ = move(resting, programme, case.seconds, step, step, SCHEME, load, changing)
     found = observe(boom, programme, rows, Sensors(case.rate), seed, load)
     truth = found.truth
     loads = truth.get("load", np.zeros((len(found.stamps), 2)))
@@ -218,7 +224,7 @@ def main() -> None:
     parser.add_argument("--skip", type=float, default=0.0, help="s at the start that count for nothing")
     args = parser.parse_args()
     print(
-        "case | seed | sensors | tip before, mm | tip | stated | ne | acc before, m/s^2 | acc | stated | ne | load off, N | load"
+        "case | seed | sensors | tip before, mm | tip | stated | ne | acc before, m/s2 | acc | stated | ne | load off, N | load"
     )
     for name, case in CASES.items():
         if args.only and not any(name.startswith(word) for word in args.only):
