@@ -242,7 +242,7 @@ def pseudo_session(scene: Scene, true: Scene, seconds: float, seed: int) -> tupl
 
 
 def test_a_load_that_hangs_at_the_tip_is_found(scene: Scene) -> None:
-    """20 kg more than the scene says pull by 196 N; sensors are angles only. Four cylinders a little softer would do the same."""
+    """20 kg more than the scene says pull by 196 N; sensors are angles only. Four softer cylinders would do the same."""
     heavy = with_parameters(scene, {"tip.payload": 60.0})
     light = with_parameters(scene, {"tip.payload": 40.0})
     samples, truth = pseudo_session(light, heavy, 6.0, 1)
@@ -265,9 +265,11 @@ def test_a_soft_cylinder_is_no_load(scene: Scene) -> None:
     soft = with_parameters(scene, {"cylinder_2.k": 0.75 * parameter(scene, "cylinder_2.k")})
     samples, truth = pseudo_session(scene, soft, 6.0, 1)
     twin = Twin(scene)
+    report = None
     for sample in samples:
         told = twin.update(sample)
         report = told if told.prediction is not None else report
+    assert report is not None and report.estimate is not None and report.prediction is not None
     off = np.hypot(*(report.prediction.tip_position - truth["tip"]))
     assert off > 0.02
     assert np.hypot(*(report.estimate.tip[:2] - truth["tip"])) < 0.08 * off
