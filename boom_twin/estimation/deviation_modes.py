@@ -33,8 +33,10 @@ from .tip_estimate import (
     DeviationFilter,
 )
 
-LOADS = np.array([0.0023, 0.031, 0.0092])
-"""See `DeviationFilter.loads`, as shares of the boom's weight: 15, 200 and 60 N of the 6.5 kN of the default one."""
+LOADS = np.array([1.0, 31.0, 9.2])
+"""See `DeviationFilter.loads`, in loads that turn the joints by one standard deviation of their sensors: 6.5 N of the
+default boom in posture arch, 21 N of the 36 m Z fold."""
+STIFFEST = 1e-3  # of the boom's weight: most that such a load is taken for
 HIGHEST = 25.0  # Hz; what is faster follows a load without vibration of its own
 WIDTH = 1e-3  # relative accuracy of frequencies
 POSTURE_STEP = 0.03  # m of stroke after which the modes are made anew
@@ -63,6 +65,7 @@ class DeviationModes:
         self._bending = moments_by_unknowns(plan) * flexibility_by_station(scene)[:, None]
         mounting = Mounting(plan, scene.base.inclination, mounts)
         self.filter = _new_filter(scene, plan, settings, mounting)
+        self._weight = explain(scene).mass * math.hypot(*scene.gravity)
         self._motions: list[Array] = []
         self._at = np.full(plan.joints, math.inf)
 
@@ -122,7 +125,17 @@ class DeviationModes:
         f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
         first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
         self._motions, f.status[COUNT] = kept, len(modes)
+        self._set_loads()
         f.x[first:], f.p[first:], f.p[:, first:] = 0.0, 0.0, 0.0
+
+    def _set_loads(self) -> None:
+        """What loads are usual: by how far they turn the joints, in standard deviations of the angle sensors."""
+        f, tip, count = self.filter, self._plan.tables.tip, len(self._motions)
+        if not count:
+            return
+        bends = np.array([motion[tip : tip + 2] for motion in self._motions]) / f.omega[:count, None] ** 2
+        turns = f.turns[:count].T @ bends / np.sqrt(f.noise[: len(f.slopes), None])
+        f.loads[:] = LOADS / max(float(np.linalg.norm(turns, 2)), 1.0 / (STIFFEST * self._weight))
 
     def _put(self, j: int, mode: Mode, sign: float) -> Array:
         """A mode as number j of the filter, turned round if `sign` is -1; gives its motion."""
@@ -154,10 +167,12 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
         noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
-        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 2 + 2 * n)), drawn=np.zeros(n), variances=np.zeros(n),
-        pushes=np.zeros(2),
-        x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((6, size)),
-        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * explain(scene).mass * math.hypot(*scene.gravity),
+        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n),
+        variances=np.zeros(n), pushes=np.zeros(2),
+        x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
+        within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
+        chances=np.zeros(n + 2),
+        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
         last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip
 

@@ -10,10 +10,13 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   the acceleration that there is. Phi_j is the mode's motion of the tip, 1/sqrt(kg). Its level follows the sensors: while
   successive innovations of the angles are alike, the filter is too slow and the level rises, while they alternate it is too
   quick and it falls (Mehra 1970). A pump's pulses need no periodic part of their own: the process is as wide as they are.
+- f also has a part that stays, Gauss-Markov of `STAY_TIME`, `STAYS` times as large as is usual: a load that is there from the
+  first sample on, and the mean of a pump's pulses.
 - a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
   F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it. F_i is
   its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i
-  would be drawn to what explains noise by noise.
+  would be drawn to what explains noise by noise. While a boom moves that is behind by a share of a_i itself, which a_i may
+  drift by within `SLOW`: else load and other shares would have to make up for it.
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
   moment, slow likewise, M_j the mode's, w Simpson's weights.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
@@ -28,6 +31,11 @@ Measured less predicted:
 
 What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
 cylinder's force. The part of that which the few modes lack is added (static correction).
+
+At rest a load that stays and softer cylinders look alike. Gaussian deviations as wide as a soft cylinder needs would always
+take it for these, all of them a little softer at once; so what is told is a mixture over the causes: no cylinder is off by
+more than a scene's error, or one of them is, or all. The filter itself knows the wide deviations only; what each cause makes
+of its state is a reading of a_i = 0 on top, and the cause's chance is what that reading and its prior say (`weigh_causes`).
 
 A section that sags turns the tip and no joint, and to an IMU that turn is a bias. As far as the biases are beyond doubt, the
 stated covariance of the tip is wider: by the shares b, alike in all sections, that make such a turn.
@@ -57,9 +65,11 @@ SLOW = 0.5  # s, over which the forces and moments are taken that a and b are le
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
-SCENE_ERROR = 0.02  # standard deviation of a while nothing is measured
-SOFT, SOFTENING = 0.5, 0.01  # standard deviation of a once anything is measured, and what is added to it in a second
-AGILITY, RETREAT = 2.0, 0.02  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
+STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
+SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
+ONE_SOFT, ALL_SOFT = 0.02, 0.005  # chances that one certain cylinder is not, and that none is
+SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
+AGILITY, RETREAT = 2.0, 0.03  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
@@ -68,9 +78,9 @@ INEXACT = 0.05  # share of the deviation that modes and static corrections may b
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 OLDEST = 0.25  # s, age of a sample that still counts
 
-LOAD, LOAD_CHANGE, ERROR, BIAS, SHARES = 0, 2, 4, 6, 8
-"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the shares a (n,) and
-b (n,); then q_j and q_j' of every mode."""
+LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
+"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load
+that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
 
 WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
@@ -98,9 +108,14 @@ class DeviationFilter(NamedTuple):
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
-    coupling : (m, 2 + 2 n) of f, a, b. drawn : (n,) F_i / k_i, m, slow. variances : (n,) of the strokes' estimates, m^2.
-    pushes : (2,) of e, (m/s^2)^2.
-    x, p : state and covariance. row, gain, rows : (s,), (s,), (6, s) scratch. last : (c,) innovations. level : (1,) N.
+    coupling : (m, 4 + 2 n) of f, a, b and the load that stays. drawn, ahead : (n,) F_i / k_i, m, slow; by which
+    share the newest is more.
+    variances : (n,) of the strokes' estimates, m^2. pushes : (2,) of e, (m/s^2)^2.
+    x, p : state and covariance. row, gain, rows : (s,), (s,), (8, s) scratch.
+    within, cross : (8, 8), (8, n) scratch, covariances of what the rows read with one another and with a.
+    inverse, healed, drag : (n, n), (8, n), (n,) scratch, B of `weigh_causes`, and B times `cross` and times the mean of a.
+    chances : (n + 2,) of the causes: no cylinder is off, one of them is, all are.
+    last : (c,) innovations. level : (1,) N.
     loads : (3,) least and largest level, and the usual one that it begins with, N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
@@ -128,6 +143,7 @@ class DeviationFilter(NamedTuple):
     lever: Array
     coupling: Array
     drawn: Array
+    ahead: Array
     variances: Array
     pushes: Array
     x: Array
@@ -135,6 +151,12 @@ class DeviationFilter(NamedTuple):
     row: Array
     gain: Array
     rows: Array
+    within: Array
+    cross: Array
+    healed: Array
+    inverse: Array
+    drag: Array
+    chances: Array
     spread: Array
     level: Array
     loads: Array
@@ -203,8 +225,10 @@ def start_state(f):
         f.x[k] = 0.0
         for b in range(f.x.shape[0]):
             f.p[k, b] = 0.0
+    f.level[0] = f.loads[USUAL_LOAD]
     for b in range(2):
         add_unknown(f, b, f.loads[USUAL_LOAD])
+        add_unknown(f, 2 + 2 * n + b, STAYS * f.loads[USUAL_LOAD])
         f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.loads[USUAL_LOAD]) ** 2
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
         f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
@@ -225,7 +249,7 @@ def add_unknown(f, b, deviation):
     """Add to what is not known an input of the modes, of this standard deviation, and what it has done at rest."""
     size = states_of(f)
     clear(f.row, size)
-    f.row[input_place(b)] = deviation
+    f.row[input_place(f, b)] = deviation
     for j in range(f.status[COUNT]):
         at = mode_place(f, j)
         f.row[at] = deviation * f.coupling[j, b] / (f.omega[j] * f.omega[j])
@@ -265,12 +289,15 @@ def follow_prediction(f, results, estimates, moments, gravity):
     n = f.softness.shape[0]
     kept = math.exp(-min(max(f.now[STEP], 0.0) / SLOW, 50.0)) if f.status[STARTED] else 0.0
     for i in range(n):
-        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * results.cylinder_forces[i] * f.softness[i]
+        newest = results.cylinder_forces[i] * f.softness[i]
+        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * newest
+        f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
         f.variances[i] = estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
         c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
+        c[2 + 2 * n], c[3 + 2 * n] = c[0], c[1]
         for i in range(n):
             c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], kept * c[2 + n + i]
         for k in range(moments.shape[0]):
@@ -323,7 +350,7 @@ def step_state(f, h):
         for k in range(size):
             row[k] = 0.0
         for b in range(inputs):
-            place = input_place(b)
+            place = input_place(f, b)
             force += c[b] * x[place]
             for k in range(size):
                 row[k] += c[b] * p[place, k]
@@ -334,7 +361,7 @@ def step_state(f, h):
         for k in range(size):
             force = 0.0
             for b in range(inputs):
-                force += c[b] * p[k, input_place(b)]
+                force += c[b] * p[k, input_place(f, b)]
             q, rate = p[k, at], p[k, at + 1]
             p[k, at], p[k, at + 1] = a11 * q + a12 * rate + g1 * force, a21 * q + a22 * rate + g2 * force
         _, b12, _, b22 = oscillate(f.omega[j], f.decay[j], 0.5 * h)
@@ -355,9 +382,11 @@ def step_inputs(f, h, size):
     """Load and shares h (s) later."""
     for b in range(2):
         step_load(f, LOAD + b, LOAD_CHANGE + b, h, size)
+        fade(f, STAYING + b, math.exp(-h / STAY_TIME), (STAYS * f.loads[USUAL_LOAD]) ** 2, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
-            f.p[SHARES + i, SHARES + i] += SOFTENING * SOFTENING * h
+            lag = f.x[SHARES + i] * f.ahead[i]
+            f.p[SHARES + i, SHARES + i] += (SOFTENING * SOFTENING + lag * lag / SLOW) * h
 
 
 @inner
@@ -380,9 +409,12 @@ def step_load(f, place, change, h, size):
 
 
 @inner
-def input_place(b):
-    """Place in the state of an input of the modes: of the load the first two, then the shares."""
-    return b if b < 2 else b + SHARES - 2
+def input_place(f, b):
+    """Place in the state of an input of the modes: of the load the first two, then the shares, then the load that stays."""
+    shares = 2 * f.softness.shape[0]
+    if b < 2:
+        return LOAD + b
+    return SHARES + b - 2 if b < 2 + shares else STAYING + b - 2 - shares
 
 
 @inner
@@ -456,7 +488,7 @@ def read_acceleration(f, x, y, turn, turned, row):
         row[at] = -f.omega[j] * f.omega[j] * along + turned * f.tip[j, 2]
         row[at + 1] = -f.decay[j] * along
         for b in range(f.coupling.shape[1]):
-            row[input_place(b)] += along * f.coupling[j, b]
+            row[input_place(f, b)] += along * f.coupling[j, b]
 
 
 @inner
@@ -585,20 +617,120 @@ def write_estimate(f, results, out):
     read_acceleration(f, 1.0, 0.0, 0.0, 0.0, f.rows[3])
     read_acceleration(f, 0.0, 1.0, 0.0, 0.0, f.rows[4])
     read_acceleration(f, 0.0, 0.0, 1.0, 0.0, f.rows[5])
-    for a in range(3):
-        for k in range(size):
-            out[TIP + a] += f.rows[a, k] * f.x[k]
-            out[ACCELERATION + a] += f.rows[3 + a, k] * f.x[k]
-    write_covariance(f, 0, size, out[TIP_COVARIANCE:ACCELERATION_COVARIANCE])
-    write_covariance(f, 3, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    for a in range(2):
+        clear(f.rows[6 + a], size)
+        f.rows[6 + a, LOAD + a], f.rows[6 + a, STAYING + a], out[FORCE + a] = 1.0, 1.0, 0.0
+    weigh_causes(f)
+    read_covariances(f, size)
+    write_covariance(f, 0, out[TIP_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, 3, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    for a in range(2):
+        out[FORCE_VARIANCE + a] = covariance_of(f, 6 + a, 6 + a)
+    for a in range(8):
+        place = (TIP if a < 3 else ACCELERATION - 3 if a < 6 else FORCE - 6) + a
+        out[place] += mean_of(f, a, size)
     at = TIP_COVARIANCE
     for a in range(3):
         out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
         at += 3 - a
     add_sag(f, out)
     write_spread(f, results, out)
-    for a in range(2):
-        out[FORCE + a], out[FORCE_VARIANCE + a] = f.x[LOAD + a], f.p[LOAD + a, LOAD + a]
+
+
+@inner
+def weigh_causes(f):
+    """Chances of the causes, and what a reading of a = 0 of all cylinders would change: `inverse`, `drag`.
+
+    With P the covariance of the shares a, m their mean, R the square of `SCENE_ERROR` and W the wide variance that the filter
+    began with, a cause under which the cylinders K are as the scene says has the chance N(0; m_K, P_KK + R) / N(0; 0, W + R)
+    times its prior. Of K without one cylinder all follows from the inverse B of P + R: B_ii of that one is all it takes.
+    """
+    n, wide = f.softness.shape[0], SOFT * SOFT + 2.0 * SCENE_ERROR * SCENE_ERROR
+    size2 = SCENE_ERROR * SCENE_ERROR
+    f.chances[:] = 0.0
+    f.chances[n + 1] = 1.0
+    if f.status[FED] == 0:
+        return
+    b = f.inverse
+    for i in range(n):
+        for k in range(n):
+            b[i, k] = f.p[SHARES + i, SHARES + k]
+        b[i, i] += size2
+    doubt = invert(b)
+    if not math.isfinite(doubt):
+        return
+    free, cost = 0, 0.0
+    for i in range(n):
+        f.drag[i] = 0.0
+        for k in range(n):
+            f.drag[i] += b[i, k] * f.x[SHARES + k]
+    for i in range(n):
+        cost += f.drag[i] * f.x[SHARES + i]
+        free += 1 if f.softness[i] > 0.0 else 0
+    wide_log = math.log(wide)
+    rigid = (n - free) * math.log(size2)
+    healthy = 0.5 * (free * wide_log + rigid - doubt - cost) + math.log(1.0 - free * min(ONE_SOFT, 0.5 / n) - ALL_SOFT)
+    f.chances[0] = healthy
+    f.chances[n + 1] = math.log(ALL_SOFT)
+    most = max(healthy, f.chances[n + 1])
+    for i in range(n):
+        f.chances[1 + i] = -math.inf
+        if f.softness[i] > 0.0:
+            own = 0.5 * (f.drag[i] * f.drag[i] / b[i, i] - math.log(b[i, i]) - wide_log)
+            f.chances[1 + i] = 0.5 * (free * wide_log + rigid - doubt - cost) + own + math.log(min(ONE_SOFT, 0.5 / n))
+            most = max(most, f.chances[1 + i])
+    total = 0.0
+    for i in range(n + 2):
+        f.chances[i] = math.exp(f.chances[i] - most)
+        total += f.chances[i]
+    for i in range(n + 2):
+        f.chances[i] /= total
+
+
+@inner
+def invert(b):
+    """A symmetric positive definite matrix becomes its inverse, by Gauss-Jordan; gives the logarithm of its determinant."""
+    n, log = b.shape[0], 0.0
+    for k in range(n):
+        pivot = b[k, k]
+        if not pivot > 0.0:
+            return math.nan
+        log += math.log(pivot)
+        b[k, k] = 1.0
+        for j in range(n):
+            b[k, j] /= pivot
+        for i in range(n):
+            if i != k:
+                factor = b[i, k]
+                b[i, k] = 0.0
+                for j in range(n):
+                    b[i, j] -= factor * b[k, j]
+    return log
+
+
+@inner
+def shift_by(f, a, cause):
+    """By how much a cause (0 none, i cylinder i, n + 1 all) changes what row a reads."""
+    n, shift = f.softness.shape[0], 0.0
+    if cause == n + 1:
+        return 0.0
+    for i in range(n):
+        shift -= f.cross[a, i] * f.drag[i]
+    if cause > 0:
+        shift += f.healed[a, cause - 1] * f.drag[cause - 1] / f.inverse[cause - 1, cause - 1]
+    return shift
+
+
+@inner
+def mean_of(f, a, size):
+    """What row a reads, by the chances of the causes."""
+    total = 0.0
+    for k in range(size):
+        total += f.rows[a, k] * f.x[k]
+    for cause in range(f.softness.shape[0] + 1):
+        if f.chances[cause] > 0.0:
+            total += f.chances[cause] * shift_by(f, a, cause)
+    return total
 
 
 @inner
@@ -649,18 +781,51 @@ def write_spread(f, results, out):
 
 
 @inner
-def write_covariance(f, first, size, out):
-    """Upper triangle of the covariance of three rows."""
-    at = 0
-    for a in range(first, first + 3):
+def read_covariances(f, size):
+    """Of every row its covariance with the rows of its own three or two and with the shares, before causes are weighed."""
+    n = f.softness.shape[0]
+    for a in range(8):
         for k in range(size):
             total = 0.0
             for b in range(size):
                 total += f.p[k, b] * f.rows[a, b]
             f.gain[k] = total
-        for b in range(a, first + 3):
+        for b in range(a, min(a - a % 3 + 3, 8)):
             total = 0.0
             for k in range(size):
                 total += f.rows[b, k] * f.gain[k]
-            out[at] = total
+            f.within[a, b] = total
+        for i in range(n):
+            f.cross[a, i] = f.gain[SHARES + i]
+        for i in range(n):
+            total = 0.0
+            for k in range(n):
+                total += f.inverse[i, k] * f.cross[a, k]
+            f.healed[a, i] = total
+
+
+@inner
+def covariance_of(f, a, b):
+    """Of what two rows read: that within each cause, and that of the causes' means."""
+    n, total, shift_a, shift_b = f.softness.shape[0], f.within[a, b], 0.0, 0.0
+    for i in range(n):
+        total -= (1.0 - f.chances[n + 1]) * f.cross[a, i] * f.healed[b, i]
+    for cause in range(n + 1):
+        chance = f.chances[cause]
+        if chance > 0.0:
+            one, other = shift_by(f, a, cause), shift_by(f, b, cause)
+            total += chance * one * other
+            shift_a, shift_b = shift_a + chance * one, shift_b + chance * other
+            if cause > 0:
+                total += chance * f.healed[a, cause - 1] * f.healed[b, cause - 1] / f.inverse[cause - 1, cause - 1]
+    return total - shift_a * shift_b
+
+
+@inner
+def write_covariance(f, first, out):
+    """Upper triangle of the covariance of three rows."""
+    at = 0
+    for a in range(first, first + 3):
+        for b in range(a, first + 3):
+            out[at] = covariance_of(f, a, b)
             at += 1
