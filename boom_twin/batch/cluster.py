@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from logging import CRITICAL
 from threading import Event, Thread
@@ -112,8 +113,9 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
     done = as_completed(first, loop=client.loop)
     for future in done:
         task = running.pop(future.key)
-        if (reason := _fault(future)) is None:
-            yield future.result()
+        row, reason = _row_or_reason(future)
+        if row is not None:
+            yield row
         elif attempts[task.key] <= task.retries:
             done.add(submitted(task))
         else:
@@ -123,13 +125,18 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
             done.add(submitted(waiting.popleft()))
 
 
-def _fault(future: Future) -> str | None:
-    """Why a task came to no end."""
+def _row_or_reason(future: Future) -> tuple[Row | None, str]:
+    """The row of a task that has ended; else why it has none.
+
+    A worker that ends before its row was fetched takes the row with it: the task runs once more, and may then fail too.
+    """
     from distributed import KilledWorker
 
-    if future.status == "finished":
-        return None
-    error = future.exception() if future.status == "error" else None
-    if isinstance(error, KilledWorker):
-        return f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
-    return f"{type(error).__name__}: {error}" if error else f"Dask gave it up ({future.status})"
+    try:
+        return future.result(), ""
+    except KilledWorker:
+        return None, f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
+    except CancelledError:
+        return None, f"Dask gave it up ({future.status})"
+    except Exception as error:
+        return None, f"{type(error).__name__}: {error}"
