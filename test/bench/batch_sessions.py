@@ -180,9 +180,8 @@ def main() -> None:
             alone = single(folder / "sessions", folder / "single", min(args.sessions, 5))
             one, two = (batch(folder / "sessions", folder / f"out{n}", n) for n in (1, 2))
             each = [seconds / args.sessions for seconds in (one, two)]
-            print(
-                f"a session of {args.seconds:g} s: single replay {alone:.2f} s; batch on 1 worker {each[0]:.2f} s, on 2 {each[1]:.2f} s"
-            )
+            rates = f"single replay {alone:.2f} s; batch on 1 worker {each[0]:.2f} s, on 2 {each[1]:.2f} s"
+            print(f"a session of {args.seconds:g} s: {rates}")
             print(f"2 workers: {one / two:.2f} times the rate of one, {alone / each[1]:.2f} times that of single replays")
         if "faults" not in args.skip:
             faults(folder / "sessions", folder / "faults", args.kill_every)
