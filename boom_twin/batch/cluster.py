@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 ALLOWED = 5
 """Workers that may end while they have a task, before it counts as a failed attempt."""
-AHEAD = 500
-"""Tasks that are with the scheduler at once: enough for its workers to be busy, few enough for 100 000 sessions."""
 LOST = 5
 """Seconds without a word of a worker after which another one takes its place."""
 CONNECT = 20.0
@@ -96,6 +94,8 @@ def _kept_up(cluster: LocalCluster) -> Iterator[None]:
 def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[SessionTask], Row]) -> Iterator[Row]:
     """The rows of all tasks, as they are done.
 
+    No more tasks are with the scheduler than its workers have threads: when a worker ends, Dask counts that against every task
+    that waits there, not only against the one that it had at work.
     A task whose workers end (killed, out of memory, a machine that is lost) goes to others; when `ALLOWED` of them have,
     that counts as one of its attempts. What fails in any other way costs its own row only.
     """
@@ -109,8 +109,15 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
         running[future.key] = task
         return future
 
-    first = [submitted(waiting.popleft()) for _ in range(min(AHEAD, len(waiting)))]
-    done = as_completed(first, loop=client.loop)
+    done, most = as_completed([], loop=client.loop), 1
+
+    def fill() -> None:
+        nonlocal most
+        most = max(most, sum(client.nthreads().values()))
+        while waiting and len(running) < most:
+            done.add(submitted(waiting.popleft()))
+
+    fill()
     for future in done:
         task = running.pop(future.key)
         row, reason = _row_or_reason(future)
@@ -121,8 +128,7 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
         else:
             yield failed(task, reason, attempts[task.key])
         future.release()
-        if waiting:
-            done.add(submitted(waiting.popleft()))
+        fill()
 
 
 def _row_or_reason(future: Future) -> tuple[Row | None, str]:

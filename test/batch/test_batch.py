@@ -20,6 +20,8 @@ from health.recorded import written
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("distributed")
 
+from distributed import Client, LocalCluster  # noqa: E402
+
 from boom_twin import load_scene, replay  # noqa: E402
 from boom_twin.batch import cluster  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
@@ -230,6 +232,21 @@ def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path) -
     (tmp_path / "kills.py").write_text(KILLS)
     command = [sys.executable, str(tmp_path / "kills.py")]
     assert subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout == "20\n"
+
+
+def test_no_task_waits_at_a_worker_whose_end_would_count_against_it() -> None:
+    tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(9)]
+    with Client(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)) as client:
+        most = 0
+        for row in cluster.rows_of(client, tasks, slept):
+            assert row["status"] == "ok"
+            most = max(most, sum(len(keys) for keys in client.processing().values()))
+    assert 0 < most <= 2
+
+
+def slept(task: SessionTask) -> dict[str, object]:
+    time.sleep(0.1)
+    return {"key": task.key, "status": "ok"}
 
 
 class FinishedFuture:
