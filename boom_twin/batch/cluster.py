@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from logging import CRITICAL
+from math import inf
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
@@ -21,7 +23,7 @@ REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 ALLOWED = 5
 """Workers that may end while they have a task, before it counts as a failed attempt."""
 LOST = 5
-"""Seconds without a word of a worker after which another one takes its place."""
+"""Seconds without a word of a worker after which another one takes its place; also between counts of the workers."""
 CONNECT = 20.0
 """Seconds for a scheduler to answer."""
 
@@ -109,11 +111,12 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
         running[future.key] = task
         return future
 
-    done, most = as_completed([], loop=client.loop), 1
+    done, most, looked = as_completed([], loop=client.loop), 1, -inf
 
     def fill() -> None:
-        nonlocal most
-        most = max(most, sum(client.nthreads().values()))
+        nonlocal most, looked
+        if (now := time.monotonic()) > looked + LOST:
+            most, looked = max(most, sum(client.nthreads().values())), now
         while waiting and len(running) < most:
             done.add(submitted(waiting.popleft()))
 
