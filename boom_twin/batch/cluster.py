@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from logging import CRITICAL
+from math import inf
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
@@ -19,10 +22,8 @@ if TYPE_CHECKING:
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 ALLOWED = 5
 """Workers that may end while they have a task, before it counts as a failed attempt."""
-AHEAD = 500
-"""Tasks that are with the scheduler at once: enough for its workers to be busy, few enough for 100 000 sessions."""
 LOST = 5
-"""Seconds without a word of a worker after which another one takes its place."""
+"""Seconds without a word of a worker after which another one takes its place; also between counts of the workers."""
 CONNECT = 20.0
 """Seconds for a scheduler to answer."""
 
@@ -95,6 +96,8 @@ def _kept_up(cluster: LocalCluster) -> Iterator[None]:
 def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[SessionTask], Row]) -> Iterator[Row]:
     """The rows of all tasks, as they are done.
 
+    No more tasks are with the scheduler than its workers have threads: when a worker ends, Dask counts that against every task
+    that waits there, not only against the one that it had at work.
     A task whose workers end (killed, out of memory, a machine that is lost) goes to others; when `ALLOWED` of them have,
     that counts as one of its attempts. What fails in any other way costs its own row only.
     """
@@ -108,28 +111,41 @@ def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[Sessio
         running[future.key] = task
         return future
 
-    first = [submitted(waiting.popleft()) for _ in range(min(AHEAD, len(waiting)))]
-    done = as_completed(first, loop=client.loop)
+    done, most, looked = as_completed([], loop=client.loop), 1, -inf
+
+    def fill() -> None:
+        nonlocal most, looked
+        if (now := time.monotonic()) > looked + LOST:
+            most, looked = max(most, sum(client.nthreads().values())), now
+        while waiting and len(running) < most:
+            done.add(submitted(waiting.popleft()))
+
+    fill()
     for future in done:
         task = running.pop(future.key)
-        if (reason := _fault(future)) is None:
-            yield future.result()
+        row, reason = _row_or_reason(future)
+        if row is not None:
+            yield row
         elif attempts[task.key] <= task.retries:
             done.add(submitted(task))
         else:
             yield failed(task, reason, attempts[task.key])
         future.release()
-        if waiting:
-            done.add(submitted(waiting.popleft()))
+        fill()
 
 
-def _fault(future: Future) -> str | None:
-    """Why a task came to no end."""
+def _row_or_reason(future: Future) -> tuple[Row | None, str]:
+    """The row of a task that has ended; else why it has none.
+
+    A worker that ends before its row was fetched takes the row with it: the task runs once more, and may then fail too.
+    """
     from distributed import KilledWorker
 
-    if future.status == "finished":
-        return None
-    error = future.exception() if future.status == "error" else None
-    if isinstance(error, KilledWorker):
-        return f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
-    return f"{type(error).__name__}: {error}" if error else f"Dask gave it up ({future.status})"
+    try:
+        return future.result(), ""
+    except KilledWorker:
+        return None, f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
+    except CancelledError:
+        return None, f"Dask gave it up ({future.status})"
+    except Exception as error:
+        return None, f"{type(error).__name__}: {error}"

@@ -26,6 +26,10 @@ from .examples import epilog_of
 from .parser import CommandParser
 from .quiet import QuietStream
 
+# Before numpy is loaded: threads slow small matrices down ten times and more, and results are to be the same on any number of
+# cores. What runs on several cores here does so as processes.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 if TYPE_CHECKING:
     from ..bag.reader import Session
     from ..bag.session_model import SessionScene

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-
-# Before numpy is loaded, hence before the scene's modules: threads slow small matrices down ten times and more, and every
-# program is timed on one core.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {

@@ -17,6 +17,7 @@ import stat
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any
@@ -98,7 +99,8 @@ class KernelCache:
     """The compiled code of one kernel on disk; has what numba's dispatcher asks of a cache.
 
     It loads without first filling numba's tables of types and of BLAS: that takes 0.25 s, most of it an import of
-    scipy.linalg, and only compiling needs them, which fills them itself.
+    scipy.linalg, and only compiling needs them, which fills them itself. Likewise the intermediate code beside the machine code
+    is read only where another kernel that calls this one is compiled: reading it is four fifths of a load.
 
     Parameters
     ----------
@@ -115,12 +117,14 @@ class KernelCache:
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         from numba import __version__
+        from numba.core.codegen import CPUCodeLibrary, JitEngine
         from numba.core.compiler import CompileResult
         from numba.core.runtime import rtsys
         from numba.core.serialize import dumps
 
         self._rebuild, self._reduce = CompileResult._rebuild, CompileResult._reduce
         self._initialize, self._dumps = rtsys.initialize, dumps
+        _ = CPUCodeLibrary._get_module_for_linking, JitEngine.is_symbol_defined  # what loading stands in for
         self._name, self._folder = f"{function.__module__}.{function.__qualname__}", folder
         self._version = (__version__, sys.implementation.cache_tag, function.__code__.co_code)
 
@@ -133,14 +137,22 @@ class KernelCache:
         """The compiled kernel for a signature; None if it is not there, or not as it was written."""
         self._initialize(context)  # the symbols that loaded code refers to
         data = read_checked(self._path(signature, context.codegen()))
-        return None if data is None else self._rebuild(context, *pickle.loads(data))
+        if data is None:
+            return None
+        symbols, parts = pickle.loads(data)
+        (name, kind, (machine, intermediate)), *others = pickle.loads(parts)
+        context.codegen()._engine._defined_symbols.update(symbols)
+        loaded = self._rebuild(context, (name, kind, (machine, _nothing(context.codegen()))), *others)
+        _read_when_linked(loaded.library, intermediate)
+        return loaded
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep a compiled kernel; a full disk or a folder that went away is no reason to stop."""
         if compiled.lifted or compiled.library.has_dynamic_globals:
             return
         with suppress(OSError):
-            write_checked(self._path(signature, compiled.codegen), self._dumps(self._reduce(compiled)))
+            kept = pickle.dumps((_symbols(compiled.library), self._dumps(self._reduce(compiled))))
+            write_checked(self._path(signature, compiled.codegen), kept)
 
     def enable(self) -> None:
         """It always is."""
@@ -151,6 +163,28 @@ class KernelCache:
     def _path(self, signature: Any, codegen: Any) -> Path:
         key = repr((self._version, str(signature), codegen.magic_tuple()))
         return self._folder / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
+
+
+def _symbols(library: Any) -> list[str]:
+    """Names of what a library defines, which numba else looks for in its intermediate code."""
+    module = library._get_module_for_linking()
+    return [each.name for group in (module.functions, module.global_variables) for each in group if not each.is_declaration]
+
+
+def _nothing(codegen: Any) -> bytes:
+    """Intermediate code without any function, as what stands for that of a kernel until it is needed."""
+    return bytes(codegen.create_library("nothing")._final_module.as_bitcode())
+
+
+def _read_when_linked(library: Any, intermediate: bytes) -> None:
+    """Let a loaded library read its intermediate code when it is asked for that the first time, to be linked into another."""
+    from llvmlite.binding import parse_bitcode
+
+    @cache
+    def module() -> Any:
+        return parse_bitcode(intermediate)
+
+    library._get_module_for_linking = module
 
 
 def read_checked(path: Path) -> bytes | None:

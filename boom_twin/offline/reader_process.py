@@ -99,6 +99,8 @@ class SampleReader:
         Of the scene.
     window : TimeWindow, optional
         The part of the session that is read.
+    process : Pipe, optional
+        From `started`, where it was begun before all of this was known.
 
     Attributes
     ----------
@@ -106,11 +108,24 @@ class SampleReader:
         Of the decoder, once the iteration has ended.
     """
 
-    def __init__(self, path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
-        self._pipe = Pipe(__name__)
+    def __init__(
+        self,
+        path: Path,
+        topics: Topics,
+        wanted: list[str],
+        joints: int,
+        window: TimeWindow = WHOLE,
+        process: Pipe | None = None,
+    ) -> None:
+        self._pipe = process or self.started()
         self._pipe.send((path, topics, wanted, joints, window))
         self._joints = joints
         self.oddities: Counter[str] = Counter()
+
+    @staticmethod
+    def started() -> Pipe:
+        """The process, which begins its imports."""
+        return Pipe(__name__)
 
     def wait_ready(self) -> None:
         """Until the process can begin."""

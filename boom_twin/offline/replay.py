@@ -44,6 +44,7 @@ from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
+from .process_pipe import Pipe
 from .reader_process import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
@@ -204,71 +205,74 @@ def replay_into(
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
-    taken = scene_for(session.path, scene)
-    scene, joints = taken.scene, len(taken.scene.joints)
-    mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
-    topics, wanted = mapped.topics, _wanted(session, mapped.topics)
-    refuse_other_names(session, topics, joints, taken.source)
-    usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
-    truth = _truth_in(window, session, topics, wanted)
-    errors = None if truth is None else TipErrors(truth)
-    taking = None if take is None else _Timed(take)
-    recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
-    refused = RefusedStrokes(scene)
-    with _unhurried_collector(), _ends(session, topics, wanted, scene, settings, building, window) as (ahead, behind):
-        twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
-        ahead.wait_ready()
-        behind.wait_ready()
-        samples: Iterator[SampleBlock | Change | None] = iter(ahead)
-        bar = progress(_expected(session, wanted, window)) if progress else None
-        began = time.perf_counter()
-        if not changes:
-            samples = (sample for sample in samples if not isinstance(sample, Change))
-        for step in drive_blocks(twin, samples):
+    with _processes(building) as (reader, writer):
+        session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
+        taken = scene_for(session.path, scene)
+        scene, joints = taken.scene, len(taken.scene.joints)
+        mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
+        topics, wanted = mapped.topics, _wanted(session, mapped.topics)
+        refuse_other_names(session, topics, joints, taken.source)
+        usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
+        truth = _truth_in(window, session, topics, wanted)
+        errors = None if truth is None else TipErrors(truth)
+        taking = None if take is None else _Timed(take)
+        recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
+        refused = RefusedStrokes(scene)
+        ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
+        behind = ReportWriter(writer, session.notes, topics, scene, settings)
+        with _unhurried_collector():
+            twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
+            ahead.wait_ready()
+            behind.wait_ready()
+            samples: Iterator[SampleBlock | Change | None] = iter(ahead)
+            bar = progress(_expected(session, wanted, window)) if progress else None
+            began = time.perf_counter()
+            if not changes:
+                samples = (sample for sample in samples if not isinstance(sample, Change))
+            for step in drive_blocks(twin, samples):
+                if bar is not None:
+                    bar.update(1 if step is None else len(step[0].stamps))
+                if step is None:
+                    recording.refused += 1
+                    continue
+                block, found = step
+                recording.add_samples(block)
+                for each in found:
+                    recording.add(each)
+                    for part in each.all if isinstance(each, Report) else (each,):
+                        behind.put(part)
+                if recording.is_empty:
+                    refused.take(block)
+                    read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
+                _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+            _refuse(session, taken, other_boom.judge())
+            behind.close()
             if bar is not None:
-                bar.update(1 if step is None else len(step[0].stamps))
-            if step is None:
-                recording.refused += 1
-                continue
-            block, found = step
-            recording.add_samples(block)
-            for each in found:
-                recording.add(each)
-                for part in each.all if isinstance(each, Report) else (each,):
-                    behind.put(part)
-            if recording.is_empty:
-                refused.take(block)
-                read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
-            _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
-        _refuse(session, taken, other_boom.judge())
-        behind.close()
-        if bar is not None:
-            bar.close()
-        wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
-    twin.counts.update(ahead.oddities)
-    if recording.is_empty:
-        raise BagError(
-            f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
-            f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
-            f"and stamps.{refused.told}"
-        )
-    recording.close()
-    SessionSheet(__version__, taken.text).write(out / "bag")
-    summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
-        "scene": taken.source,
-        "scene_sha256": taken.sha256,
-        "baseline": None if usual is None else usual.source,
-        "mapping": mapped.source,
-    }
-    if window != WHOLE:
-        summary |= {"window_start_s": window.start, "window_duration_s": window.duration}
-    if session.incomplete:
-        summary["session_incomplete"] = session.incomplete
-    if errors is not None:
-        summary |= errors.rms
-    write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
-    return Replay(summary, recording, session, truth)
+                bar.close()
+            wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
+        twin.counts.update(ahead.oddities)
+        if recording.is_empty:
+            raise BagError(
+                f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
+                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
+                f"and stamps.{refused.told}"
+            )
+        recording.close()
+        SessionSheet(__version__, taken.text).write(out / "bag")
+        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
+            "scene": taken.source,
+            "scene_sha256": taken.sha256,
+            "baseline": None if usual is None else usual.source,
+            "mapping": mapped.source,
+        }
+        if window != WHOLE:
+            summary |= {"window_start_s": window.start, "window_duration_s": window.duration}
+        if session.incomplete:
+            summary["session_incomplete"] = session.incomplete
+        if errors is not None:
+            summary |= errors.rms
+        write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
+        return Replay(summary, recording, session, truth)
 
 
 class _Timed:
@@ -346,23 +350,17 @@ def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], win
 
 
 @contextmanager
-def _ends(
-    session: Session,
-    topics: Topics,
-    wanted: list[str],
-    scene: Scene,
-    settings: Settings,
-    building: UnfinishedResult,
-    window: TimeWindow,
-) -> Iterator[tuple[SampleReader, ReportWriter]]:
-    """The processes that read and write, as they start."""
-    ahead = SampleReader(session.path, topics, wanted, len(scene.joints), window)
-    behind = ReportWriter(building.folder / "bag", session.notes, topics, scene, settings, building.lock)
+def _processes(building: UnfinishedResult) -> Iterator[tuple[Pipe, Pipe]]:
+    """The processes that read and write: their imports go on while the session is looked at."""
+    reader = SampleReader.started()
     try:
-        yield ahead, behind
+        writer = ReportWriter.started(building.folder / "bag", building.lock)
+        try:
+            yield reader, writer
+        finally:
+            writer.stop()
     finally:
-        ahead.stop()
-        behind.stop()
+        reader.stop()
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:

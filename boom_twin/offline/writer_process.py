@@ -35,8 +35,8 @@ class ReportWriter:
 
     Parameters
     ----------
-    directory : Path
-        Of the bag; must be new or empty.
+    process : Pipe
+        From `started`.
     notes : mapping of str to str
         Kept in the bag.
     topics : Topics
@@ -45,8 +45,6 @@ class ReportWriter:
         What the reports are about.
     settings : Settings
         How it is drawn.
-    lock : int
-        Descriptor that the process keeps open, see `boom_twin.system.result_folder.UnfinishedResult`.
 
     Raises
     ------
@@ -54,13 +52,24 @@ class ReportWriter:
         From any method: the bag could not be written; says why.
     """
 
-    def __init__(
-        self, directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings, lock: int
-    ) -> None:
+    def __init__(self, process: Pipe, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings) -> None:
         self._reports: list[Report] = []
         self._joints = len(scene.joints)
-        self._pipe = Pipe(__name__, str(directory), inherited=[lock])
+        self._pipe = process
         self._pipe.send((dict(notes), topics, scene, settings))
+
+    @staticmethod
+    def started(directory: Path, lock: int) -> Pipe:
+        """The process, which begins its imports.
+
+        Parameters
+        ----------
+        directory : Path
+            Of the bag; must be new or empty.
+        lock : int
+            Descriptor that the process keeps open, see `boom_twin.system.result_folder.UnfinishedResult`.
+        """
+        return Pipe(__name__, str(directory), inherited=[lock])
 
     def wait_ready(self) -> None:
         """Until the process can begin."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from ..analysis.column_statistics import ColumnStatistics
 from ..types import Array
@@ -112,6 +111,8 @@ def density(stamps: Array, values: Array, interval: float | None = None) -> Dens
         return Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
     interval = interval or float(np.median(np.diff(stamps[known])))
     even = np.arange(stamps[known][0], stamps[known][-1], interval)
+    from scipy.signal import welch  # takes longer to import than all else that a replay starts with
+
     segment = min(len(even), round(SEGMENT / interval))
     frequencies, power = welch(np.interp(even, stamps[known], values[known]), 1.0 / interval, nperseg=segment)
     count = (len(even) - segment // 2) // (segment - segment // 2)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import inf, pi
 
 import numpy as np
-from scipy.signal import decimate
 
 from ..monitor.data.present_posture import ModeList
 from ..plots import History
@@ -66,7 +65,11 @@ def _thinned(times: Array, values: Array) -> tuple[float, Array]:
     step = max(1, round(1.0 / (RATE * interval)))
     if len(rows) < 3 * ORDER * step:
         return 1.0, np.zeros((0, 1))
-    return step * interval, rows if step == 1 else np.asarray(decimate(rows, step, axis=0))
+    if step == 1:
+        return interval, rows
+    from scipy.signal import decimate  # takes longer to import than all else that a replay starts with
+
+    return step * interval, np.asarray(decimate(rows, step, axis=0))
 
 
 def _sigmas(times: Array, x: Array, rates: np.ndarray) -> Array:

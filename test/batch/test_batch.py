@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,7 +20,10 @@ from health.recorded import written
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("distributed")
 
+from distributed import Client, LocalCluster  # noqa: E402
+
 from boom_twin import load_scene, replay  # noqa: E402
+from boom_twin.batch import cluster  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
@@ -201,6 +205,7 @@ def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> N
 KILLS = """
 import time, psutil
 from boom_twin.batch.cluster import connected, rows_of
+from boom_twin.batch import cluster  # noqa: E402
 from boom_twin.batch.session_task import SessionTask
 
 def nothing(task):
@@ -228,6 +233,44 @@ def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path) -
     (tmp_path / "kills.py").write_text(KILLS)
     command = [sys.executable, str(tmp_path / "kills.py")]
     assert subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout == "20\n"
+
+
+def test_no_task_waits_at_a_worker_whose_end_would_count_against_it() -> None:
+    tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(9)]
+    with Client(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)) as client:
+        most = 0
+        for row in cluster.rows_of(client, tasks, slept):
+            assert row["status"] == "ok"
+            most = max(most, sum(len(keys) for keys in client.processing().values()))
+    assert 0 < most <= 2
+
+
+def slept(task: SessionTask) -> dict[str, object]:
+    time.sleep(0.1)
+    return {"key": task.key, "status": "ok"}
+
+
+class FinishedFuture:
+    """A task that has ended, its row still with a worker."""
+
+    status = "finished"
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    def result(self) -> object:
+        raise self._error
+
+
+def test_a_row_that_is_lost_with_its_worker_costs_an_attempt_and_not_the_batch() -> None:
+    from distributed import KilledWorker
+
+    row, reason = cluster._row_or_reason(FinishedFuture(KilledWorker("s0", None, 6)))
+    assert row is None and reason.startswith("5 workers that had it were ended from outside")
+    row, reason = cluster._row_or_reason(FinishedFuture(CancelledError()))
+    assert row is None and reason == "Dask gave it up (finished)"
+    row, reason = cluster._row_or_reason(FinishedFuture(OSError("gone")))
+    assert row is None and reason == "OSError: gone"
 
 
 def test_without_the_extra_one_line_tells_what_to_install(sessions: Path, tmp_path: Path) -> None:

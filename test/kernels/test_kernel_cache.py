@@ -29,11 +29,18 @@ hits = getattr(add.dispatcher, "_cache_hits", None)
 print(found, "loaded", 0 if hits is None else sum(hits.values()))
 """
 
+CALLER = """
+@kernel
+def add_three(x, y, z):
+    return add(add(x, y), z)
+print(add_three(1.0, 2.0, 3.0))
+"""
 
-def run(folder: Path, before: str = "") -> subprocess.CompletedProcess[str]:
+
+def run(folder: Path, before: str = "", after: str = "") -> subprocess.CompletedProcess[str]:
     """A process that calls a kernel twice, once for every type; its cache is in `folder`."""
     script = folder.parent / "program.py"
-    script.write_text(PROGRAM.format(before=before))
+    script.write_text(PROGRAM.format(before=before) + after)
     command, environment = [sys.executable, str(script)], os.environ | {"NUMBA_CACHE_DIR": str(folder)}
     return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
 
@@ -58,6 +65,11 @@ def test_what_one_process_compiled_another_loads(tmp_path: Path) -> None:
     (folder,) = (tmp_path / "cache").iterdir()
     assert folder.stat().st_mode & 0o777 == 0o700
     assert {path.suffix for path in folder.iterdir()} == {".kernel"}
+
+
+def test_a_loaded_kernel_can_be_called_by_one_that_is_compiled(tmp_path: Path) -> None:
+    run(tmp_path / "cache")
+    assert told(run(tmp_path / "cache", after=CALLER)).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]
 
 
 def harmed(path: Path, harm: str) -> None:

@@ -62,7 +62,8 @@ def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size
             for key, data in encoder.fill(report):
                 expected.write_encoded(key, report.stamp, data)
     with (tmp_path / "lock").open("w") as lock:
-        writer = ReportWriter(tmp_path / "bag", notes, load_topics(), scene, Settings(), lock.fileno())
+        process = ReportWriter.started(tmp_path / "bag", lock.fileno())
+        writer = ReportWriter(process, notes, load_topics(), scene, Settings())
         writer.wait_ready()
         for item in _items(reports, size, 3):
             writer.put(item)

@@ -5,8 +5,6 @@ Worked out anew only where the boom has moved, in a thread beside the server and
 
 from __future__ import annotations
 
-import asyncio
-from asyncio.subprocess import DEVNULL
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -125,6 +123,9 @@ async def compile_beside() -> None:
     """
     if not could_be_kept(harmonic_response):
         return
+    import asyncio  # which a replay, whose report uses this module, has no need of
+    from asyncio.subprocess import DEVNULL
+
     process = await asyncio.create_subprocess_exec(*python_command(__name__), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL)
     try:
         await process.wait()
