@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..types import NANO, Array
 from .inference.holds import HoldProblem
@@ -71,11 +72,10 @@ class HoldTest:
         """A further hold; gives what all say of parameters that are healthy about a mean (parameters,)."""
         self._holds = [*self._holds, hold][-MOST:]
         white, log, numbers = self._whitened()
-        count = len(mean)
         best: HoldVerdict | None = None
         for first, start in enumerate(self._holds):
             since = numbers >= first
-            verdict = self._explained(white, since, log, mean, covariance, count)
+            verdict = self._explained(white, since, log, mean, covariance)
             if best is None or verdict.strength > best.verdict.strength:
                 found = verdict.best
                 best = HoldVerdict(start.start, verdict, float(np.hypot(*hold.tip[:, found.place]) * abs(found.value)))
@@ -83,10 +83,16 @@ class HoldTest:
         return best
 
     def _explained(
-        self, white: tuple[Array, Array, Array], since: Array, log: float, mean: Array, covariance: Array, count: int
+        self,
+        white: tuple[Array, Array, Array],
+        since: NDArray[np.bool_],
+        log: float,
+        mean: Array,
+        covariance: Array,
+        count: int,
     ) -> Verdict:
         """All faults that are there in the rows `since` (k,)."""
-        root, left, signature = white
+        (root, left, signature), count = white, len(mean)
         faulty = np.linalg.solve(root, np.where(since[:, None], root @ signature, 0.0))
         rows = np.column_stack([left, signature, faulty])[None]
         healthy = Evidence.of(rows, np.array([log])).given(mean, covariance)

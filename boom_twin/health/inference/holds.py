@@ -22,7 +22,8 @@ DECAYS = 4.0  # deviations by which a vibration is damped: the line of a pump is
 SURE = 0.004  # largest relative deviation of a frequency
 PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
-HEARD = 2.0  # times the power of noise, below which nothing is told of that
+COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
+HEARD = 4.0  # times the power of noise, below which nothing is told of that
 
 
 class StillReadings(NamedTuple):
@@ -120,9 +121,11 @@ class HoldCollector:
         stamps = np.concatenate([stamps for stamps, _ in self._motion])
         values = np.concatenate([values for _, values in self._motion])
         dt, thin = _thinned(stamps, values)
-        part = max(1, round(PART / (block * NANO)))
-        left, unrest = _mean_at_rest(np.array(self._left), 1 if _is_kept_up(thin) else part, _is_kept_up(thin))
-        found = tuple(each for each in free_vibrations(dt, thin, LAGS) if _is_free(each))
+        vibrations = free_vibrations(dt, thin, LAGS)
+        is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
+        part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
+        left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
+        found = () if is_shaken else tuple(each for each in vibrations if _is_free(each))
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
 
 
@@ -138,6 +141,20 @@ def _is_kept_up(values: Array) -> bool:
     noise = (np.diff(values, 2, axis=0) ** 2).mean(axis=0) / 6.0
     first, second = (half.var(axis=0) for half in (values[: len(values) // 2], values[len(values) // 2 :]))
     return bool((second.sum() > KEPT_UP * first.sum()) and (second > HEARD * noise).any())
+
+
+def _is_explained(dt: float, values: Array, vibrations: list[Vibration]) -> bool:
+    """Whether these vibrations and noise are all that there is in `values` (k, c), `dt` (s) apart: no wind, no pump's steps."""
+    if len(values) < 8:
+        return True
+    omegas = 2.0 * np.pi * np.array([each.frequency for each in vibrations])
+    decays = omegas * np.array([each.damping for each in vibrations])
+    times = dt * np.arange(float(len(values)))[:, None]
+    turns, sizes = np.sqrt(np.maximum(omegas**2 - decays**2, 0.0)) * times, np.exp(-decays * times)
+    basis = np.linalg.qr(np.hstack([sizes * np.cos(turns), sizes * np.sin(turns), np.ones_like(times)]))[0]
+    rest = values - basis @ (basis.T @ values)
+    noise = (np.diff(rest, 2, axis=0) ** 2).mean(axis=0) / 6.0
+    return bool((rest**2).mean(axis=0).sum() < COLOURED * noise.sum())
 
 
 def _mean_at_rest(left: Array, part: int, is_shaken: bool) -> tuple[Array, Array]:

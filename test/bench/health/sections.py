@@ -25,10 +25,9 @@ import numpy as np
 import run
 import stored
 import table
-from scenarios import RIGS, Scenario, boom, learning
+from scenarios import RIGS, Scenario, learning
 
-from boom_twin import Twin, load_scene
-from boom_twin.health.baseline import load_baseline
+from boom_twin import load_scene
 from boom_twin.scene.kinematics import stroke_range, strokes_of_posture
 from boom_twin.validation.rig.faults import RigFault
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad
@@ -98,16 +97,22 @@ def near(row: dict[str, Any], by: int) -> bool:
 
 def tables(rows: list[dict[str, Any]]) -> list[str]:
     """By size and by section: told, most probable cause the right section or its neighbour, another cause named."""
-    lines = ["| softer by | sessions | alarm | right section or neighbour | the section itself | wrong name |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| softer by | sessions | alarm | right section or neighbour | the section itself | wrong name |",
+        "|---|---|---|---|---|---|",
+    ]
     faulty = [row for row in rows if row["faults"]]
     keys = [(f"{size:.0%}", [r for r in faulty if f":{size:g}" in r["faults"][0]]) for size in SIZES]
-    keys += [(f"section {i}, 30 % and more", [r for r in faulty if r["causes"][0][8] == str(i) and ":0.2" not in r["faults"][0]]) for i in range(1, 5)]
+    keys += [
+        (f"section {i}, 30 % and more", [r for r in faulty if r["causes"][0][8] == str(i) and ":0.2" not in r["faults"][0]])
+        for i in range(1, 5)
+    ]
     for name, own in keys:
         told = [row for row in own if row["told"]]
         wrong = sum(any(not cause.startswith("section_") for cause in table.wrong_names(row)) for row in own)
         counts = [len(told), sum(near(row, 1) for row in told), sum(near(row, 0) for row in told), wrong]
         lines.append(f"| {name} | {len(own)} | " + " | ".join(table.share(count, len(own)) for count in counts) + " |")
-    return lines + [""] + table.healthy([row for row in rows if not row["faults"]])
+    return [*lines, "", *table.healthy([row for row in rows if not row["faults"]])]
 
 
 if __name__ == "__main__":
@@ -128,12 +133,16 @@ if __name__ == "__main__":
             for rig in range(1, RIGS):
                 run._learn(rig, folder, args.out)
             wanted = [each for each in every if (each.number % 3 == 2) == args.held_out]
-            rows = list(pool.imap(partial(judge, out=args.out), wanted))
-            name = "sections_held_out.jsonl" if args.held_out else "sections.jsonl"
-            (args.out / name).write_text("".join(json.dumps(row) + "\n" for row in rows))
+            kept, rows = args.out / ("sections_held_out.jsonl" if args.held_out else "sections.jsonl"), []
+            with kept.open("w") as file:
+                for row in pool.imap(partial(judge, out=args.out), wanted):
+                    rows.append(row)
+                    file.write(json.dumps(row) + "\n")
+                    file.flush()
             print("\n".join(tables(rows)))
             for row in rows if args.each else []:
                 print(row["number"], row["rig"], row["posture"], row["faults"], row["loads"])
                 for told in row["told"]:
                     ranks = " ".join(f"{cause}:{p:.2f}" for cause, p, _ in told["ranked"][:4])
-                    print(f"    {told['at']:5.1f} {told['channel']} {told['kind']} {told['cause']} until {told['until']} [{ranks}]")
+                    over = "" if told["until"] is None else f" until {told['until']:.1f}"
+                    print(f"    {told['at']:5.1f} {told['channel']} {told['kind']} {told['cause']}{over} [{ranks}]")
