@@ -83,13 +83,7 @@ class HoldTest:
         return best
 
     def _explained(
-        self,
-        white: tuple[Array, Array, Array],
-        since: NDArray[np.bool_],
-        log: float,
-        mean: Array,
-        covariance: Array,
-        count: int,
+        self, white: tuple[Array, Array, Array], since: NDArray[np.bool_], log: float, mean: Array, covariance: Array
     ) -> Verdict:
         """All faults that are there in the rows `since` (k,)."""
         (root, left, signature), count = white, len(mean)
