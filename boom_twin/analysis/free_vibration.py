@@ -62,8 +62,9 @@ def _sigmas(times: Array, x: Array, rates: np.ndarray) -> Array:
     by_rates = np.concatenate([slopes.real, -slopes.imag], axis=1)
     # what amplitudes can make up for is no information on rates
     basis = np.linalg.qr(linear)[0]
-    left = by_rates - np.einsum("ta,ba,bmc->tmc", basis, basis, by_rates)
-    information = np.einsum("tmc,tnc->mn", left, left)
+    flat = by_rates.reshape(len(times), -1)
+    left = (flat - basis @ (basis.T @ flat)).reshape(by_rates.shape)
+    information = np.tensordot(left, left, axes=((0, 2), (0, 2)))
     covariance = noise * np.linalg.pinv(information, hermitian=True)
     return np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(2, -1).T
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.equilibrium import settle
-from ...analysis.modal import natural_modes
+from ...analysis.modal import natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
 from ...errors import BoomTwinError
@@ -122,6 +122,11 @@ class _Boom:
         self.state.contacts[:], self.state.drives[:] = other.state.contacts, other.state.drives
 
 
+def _frequencies(boom: _Boom) -> Array:
+    """The lowest natural frequencies (Hz) of a boom where it is."""
+    return natural_frequencies(boom.plan, boom.state, boom.work, MODES, WIDTH)
+
+
 class Signatures:
     """Follows the posture of a boom.
 
@@ -156,7 +161,7 @@ class Signatures:
         if there is None:
             return None
         table = np.column_stack([readings.left, there.channels])
-        model = self._frequencies(self.nominal)
+        model = _frequencies(self.nominal)
         sensed: dict[int, tuple[float, float]] = {}
         for each in readings.vibrations:
             mode = int(np.argmin(np.abs(model - each.frequency)))
@@ -167,14 +172,10 @@ class Signatures:
         frequencies = np.zeros((len(modes), 1 + len(self.known)))
         frequencies[:, 0] = [sensed[mode][0] for mode in modes.tolist()]
         for place, step, boom in self._changed if len(modes) else ():
-            frequencies[:, 1 + place] = (self._frequencies(boom)[modes] / model[modes] - 1.0) / step
+            frequencies[:, 1 + place] = (_frequencies(boom)[modes] / model[modes] - 1.0) / step
         sigmas = np.array([sensed[mode][1] for mode in modes.tolist()])
         start, end, strokes = readings.start, readings.end, readings.strokes
         return HoldProblem(start, end, strokes, table, readings.unrest, modes, frequencies, sigmas, there.tip)
-
-    def _frequencies(self, boom: _Boom) -> Array:
-        """Natural frequencies (Hz) of a boom where it is."""
-        return np.array([mode.frequency for mode in natural_modes(boom.plan, boom.state, boom.work, MODES, WIDTH)])
 
     def at(self, strokes: Array) -> Signature | None:
         """At `strokes` (m), shape (n,); None where there is no equilibrium."""
