@@ -152,7 +152,12 @@ class ResidualMonitor:
             return news
         self._suspicion.take(problem)
         self._blocks += 1
-        return news + self._look(block.start) if self._blocks % PERIOD == 0 else news
+        if self._blocks % PERIOD == 0:
+            news += self._look(block.start)
+            others = {self._alarm.cause if self._alarm is not None else None, *self._known}
+            if self._hold_alarm is not None and self._hold_alarm.cause in others - {None}:  # one fault is one alarm
+                news += self._end_hold_alarm(block.start)
+        return news
 
     def _judge_hold(self, hold: HoldProblem) -> list[Alarm]:
         """Weigh all holds, while there is no alarm of what their blocks say; gives the news."""
