@@ -8,14 +8,16 @@ from health.recorded import run, session
 
 from boom_twin import Twin, load_scene
 from boom_twin.analysis.equilibrium import statics
+from boom_twin.health.alarm_text import AlarmText
 from boom_twin.health.baseline import Baseline
 from boom_twin.health.hold_test import HoldTest
 from boom_twin.health.inference.fault_catalogue import Form, Parameter, parameters, step_of
 from boom_twin.health.inference.holds import HoldCollector, HoldProblem, StillReadings
-from boom_twin.health.inference.hypotheses import HypothesisTest
+from boom_twin.health.inference.hypotheses import Cause, Explanation, HypothesisTest, Verdict
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Alarm
 
 BLOCK, RATE = 100_000_000, 200.0
 STROKES = np.array([0.5, 0.2])
@@ -179,3 +181,28 @@ def test_a_softer_section_of_a_recorded_session() -> None:
 def test_the_same_session_of_the_right_boom_gives_no_alarm() -> None:
     scene = load_scene()
     assert run(session(27.0), twin=Twin(scene, baseline=learnt(scene))).told() == []
+
+
+def verdict_of(**shares: float) -> Verdict:
+    """Two sections, each with what it is probable by."""
+    known = parameters(load_scene())
+    places = {"first": 4, "second": 5}
+    causes = [
+        Cause(known[places[name]].cause, share, (Explanation(places[name], 0, 20.0, 0.4, 0.05),))
+        for name, share in shares.items()
+    ]
+    return Verdict(tuple(causes), 1.0, 1.0, 0)
+
+
+def test_which_section_is_told_only_where_it_is_known() -> None:
+    scene = load_scene()
+    known = parameters(scene)
+    assert [known[place].cause for place in (4, 5)] == ["section_1.EI", "section_2.EI"]
+    tell = AlarmText(scene, known, Signatures(scene, known, (None,) * 4), np.full(6, 1e-4))
+    fresh = Alarm("tip", "residual", 0, None, None, "")
+    either = tell.of_holds(fresh, verdict_of(first=0.6, second=0.4), 0.022)
+    assert (either.kind, either.cause) == ("softer", None)
+    assert "which one is not told yet: section_1.EI or section_2.EI" in either.told and "22 mm" in either.told
+    one = tell.of_holds(either, verdict_of(second=0.97, first=0.03), 0.022)
+    assert (one.kind, one.cause) == ("softer", "section_2.EI") and "-29 % of the scene's" in one.told
+    assert tell.of_holds(one, verdict_of(first=0.6, second=0.4), 0.022) is one, "a name stays"
