@@ -179,7 +179,8 @@ def _thinned(stamps: NDArray[np.int64], values: Array) -> tuple[float, Array]:
     known = np.isfinite(values).all(axis=1) if values.size else np.zeros(0, bool)
     if known.sum() < 2:
         return 1.0, np.zeros((0, 1))
-    times, rows = np.asarray(stamps[known] - stamps[0]) * NANO, values[known]
+    order = np.flatnonzero(known)[np.argsort(stamps[known], kind="stable")]  # samples may be late
+    times, rows = np.asarray(stamps[order] - stamps[0]) * NANO, values[order]
     interval = float(np.median(np.diff(times)))
     if interval <= 0.0:
         return 1.0, np.zeros((0, 1))
