@@ -147,6 +147,17 @@ def natural_modes(
     return tuple(modes)
 
 
+def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
+    """The lowest `count` natural frequencies (Hz) alone, or all if there are fewer; see `natural_modes`."""
+    boom, low = _AtRest(plan, state, work), 0.0
+    base, found = boom.count_below(0.0), []
+    for k in range(min(count, boom.count_below(HIGHEST) - base)):
+        found.append(boom.frequency(base, k, low, width))
+        low = found[-1] * (1.0 - 1e-9)
+    place(plan.tables, state, work)
+    return np.array(found) / (2.0 * math.pi)
+
+
 def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:
     """Inverse iteration from a random inertial load, a little beside `omega`, free of the `lower` modes."""
     rng = np.random.default_rng(1)

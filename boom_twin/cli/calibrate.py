@@ -71,7 +71,8 @@ def _learn(args: Namespace) -> int:
         return 0
     for name, mean, row, i in zip(learnt.names, learnt.mean, learnt.covariance, range(len(learnt.names)), strict=True):
         print(f"{name:28s} {mean:+.2e} +- {row[i] ** 0.5:.1e}")
-    print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {learnt.detuning:.1%}")
+    shares = f"{learnt.detuning:.1%}, of those measured in holds {learnt.frequency_error:.2%}"
+    print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {shares}")
     print(args.baseline)
     return 0
 

@@ -65,6 +65,23 @@ class AlarmText:
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
+    def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float) -> Alarm:
+        """The alarm with what holds say together; `tip` (m): by how much the most probable fault puts the tip off."""
+        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
+        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
+        best, off = verdict.causes[0], f"; that puts the tip off by {1e3 * tip:.0f} mm"
+        if best.probability >= NAMED and verdict.excess <= FITS:
+            told = self._sentence(ranks[0], verdict.best) + off
+            return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
+        if alarm.cause is not None:
+            return alarm
+        names = " or ".join(rank.cause for rank in ranks)
+        if sum(cause.probability for cause in verdict.causes if cause.name.startswith("section_")) >= NAMED:
+            told = f"a section is softer, which one is not told yet: {names}{off}; hold still in other postures"
+            return replace(alarm, kind="softer", cause=None, told=told, ranked=ranks)
+        told = f"holds are off in mean and frequency, why is not told yet: {names}{off}; hold still in other postures"
+        return replace(alarm, kind="residual", cause=None, told=told, ranked=ranks)
+
     def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
         best = verdict.causes[0]

@@ -51,6 +51,9 @@ class Baseline(BaseModel):
     angle_noise: Positive = Field(default=1.0, description="noise of the angles over what sensors are stated to have")
     force_noise: Positive = Field(default=1.9, description="likewise of the IMU; the look ahead adds to it")
     detuning: Positive = Field(default=0.01, description="share by which natural frequencies may be wrong")
+    frequency_error: Positive = Field(
+        default=0.01, description="likewise of those that are measured in holds, with the parameters' part taken out"
+    )
 
     def errors(self, joints: int) -> Array:
         """Deviation of the model's error of every channel, shape (c,)."""

@@ -19,6 +19,7 @@ from ..types import NANO, Array
 from .baseline import Baseline
 from .inference.block_problem import BLOCK, BlockProblem
 from .inference.fault_catalogue import Parameter
+from .inference.holds import HoldProblem
 from .inference.hypotheses import GATE, Regression
 from .inference.innovation_filter import InnovationFilter
 
@@ -31,6 +32,7 @@ RATIOS = (2.0, 1.25)  # of the grid, coarse and fine
 ROUNDS = 2
 WIDER = 4.0  # times the covariance that is learnt, because the model is not exact
 LEAST = 45.0  # s
+FREQUENCY_ERRORS = (0.02, 0.01, 0.005, 0.0025)  # that are tried
 
 Session = Sequence[BlockProblem]
 
@@ -72,6 +74,8 @@ def learn(
         best = _line_search(shaken, known, joints, best, key, ratio)
     progress(1.0)
     regression, _ = _run(shaken, known, joints, best)
+    holds = [problem.hold for session in sessions for problem in session if problem.hold is not None]
+    best = _learn_frequencies(holds, regression, best)
     learnt = [i for i, each in enumerate(known) if each.healthy > 0.0]
     covariance = WIDER * regression.covariance[np.ix_(learnt, learnt)]
     return best.model_copy(
@@ -81,6 +85,25 @@ def learn(
             "covariance": covariance.tolist(),
         }
     )
+
+
+def _learn_frequencies(holds: Sequence[HoldProblem], regression: Regression, start: Baseline) -> Baseline:
+    """Narrow the regression by the natural frequencies of holds, with the error of the model that makes them most probable."""
+    before, found = (regression.mean, regression.covariance), []
+    for error in FREQUENCY_ERRORS if any(len(hold.modes) for hold in holds) else ():
+        regression.mean, regression.covariance = before
+        log = 0.0
+        for hold in holds:
+            if len(hold.modes):
+                sigmas = np.hypot(hold.sigmas, error)
+                log += _log(regression, hold.frequencies / sigmas[:, None], 0.0) - float(np.log(sigmas).sum())
+                first = hold.frequencies[:, 0] / sigmas
+                log -= 0.5 * float(first @ first)
+        found.append((log, error, regression.mean, regression.covariance))
+    if not found:
+        return start
+    _, error, regression.mean, regression.covariance = max(found, key=lambda each: each[0])
+    return start.model_copy(update={"frequency_error": error})
 
 
 def _under_load(

@@ -139,7 +139,7 @@ class HealthMonitor:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
-        averaged = self._means(block, predictions, {stream: rows.left for stream, rows in readings.items()})
+        averaged = self._means(block, predictions, readings)
         return news + self.residuals.take(averaged, self._noise)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
@@ -157,13 +157,13 @@ class HealthMonitor:
             self.residuals.forget()
         return news
 
-    def _means(self, block: Block, predictions: PredictionRows, left: dict[Stream, Array]) -> BlockMeans:
+    def _means(self, block: Block, predictions: PredictionRows, readings: dict[Stream, MeasuredRows]) -> BlockMeans:
         """Means of the residuals (k, channels) of every stream that is judged."""
         stamps, found = predictions.stamps, []
         for stream in JUDGED:
-            stated = self._settings.variance(SENSORS[stream])
-            mean, count = means(left[stream], stated**0.5)
-            count = count * stated / self._measured_noise(stream, left[stream], stated)
+            stated, left = self._settings.variance(SENSORS[stream]), readings[stream].left
+            mean, count = means(left, stated**0.5)
+            count = count * stated / self._measured_noise(stream, left, stated)
             if stream in self._sensors:
                 mean[self._sensors[stream].masked] = np.nan
             found.append((mean, count))
@@ -178,6 +178,7 @@ class HealthMonitor:
             variances=predictions.variances.mean(axis=0),
             rates=rates,
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
+            motion=readings[Stream.IMU if len(readings[Stream.IMU].stamps) else Stream.ANGLES],
         )
 
     def _measured_noise(self, stream: Stream, left: Array, stated: float) -> Array:

@@ -19,8 +19,10 @@ from ..types import NANO, SECOND, Alarm, Array, Mount
 from .alarm_text import AlarmText
 from .baseline import Baseline
 from .detection import Detector
+from .hold_test import HoldTest
 from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
 from .inference.fault_catalogue import parameters
+from .inference.holds import HoldProblem
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import InnovationFilter
 from .inference.sensitivities import Signature
@@ -37,6 +39,7 @@ PERIOD = 3  # blocks between two looks at a suspicion
 SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
+HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
 
 
@@ -96,6 +99,9 @@ class ResidualMonitor:
         self._on_block = on_block
         self._regression = Regression(self._mean, self.covariance)
         self._tip_load = TipLoadMonitor(settings.tip_load_limit)
+        self._frequency_error = baseline.frequency_error
+        self._hold_test = HoldTest(self._bank, self._errors2, baseline.frequency_error)
+        self._hold_alarm: Alarm | None = None
         self.begin()
 
     def begin(self) -> None:
@@ -120,7 +126,7 @@ class ResidualMonitor:
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """Those that last: of faults that are known, and what is being looked into."""
-        open_ones = [each for each in (self._alarm, self._tip_load.alarm) if each is not None]
+        open_ones = [each for each in (self._alarm, self._tip_load.alarm, self._hold_alarm) if each is not None]
         return (*(each.alarm for each in self._known.values()), *open_ones)
 
     @property
@@ -140,12 +146,39 @@ class ResidualMonitor:
             return []
         if self._on_block is not None:
             self._on_block(problem)
+        news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
         if self._suspicion is None or problem.start < self._suspicion.start:
-            return []
+            return news
         self._suspicion.take(problem)
         self._blocks += 1
-        return self._look(block.start) if self._blocks % PERIOD == 0 else []
+        if self._blocks % PERIOD == 0:
+            news += self._look(block.start)
+            others = {self._alarm.cause if self._alarm is not None else None, *self._known}
+            if self._hold_alarm is not None and self._hold_alarm.cause in others - {None}:  # one fault is one alarm
+                news += self._end_hold_alarm(block.start)
+        return news
+
+    def _judge_hold(self, hold: HoldProblem) -> list[Alarm]:
+        """Weigh all holds, while there is no alarm of what their blocks say; gives the news."""
+        if self._suspicion is not None:
+            self._suspicion.take_hold(hold, self._frequency_error)
+        if self._alarm is not None or self._tip_load.alarm is not None:
+            return []
+        found = self._hold_test.take(hold, self._mean_about_known(), self.covariance)
+        if self._hold_alarm is None and found.verdict.strength < HELD:
+            return []
+        if found.verdict.strength < LET_GO:
+            return self._end_hold_alarm(hold.end)
+        alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
+        self._hold_alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        return [self._hold_alarm]
+
+    def _end_hold_alarm(self, stamp: int) -> list[Alarm]:
+        """End the alarm by holds, if there is one."""
+        ended = [] if self._hold_alarm is None else [replace(self._hold_alarm, until=stamp)]
+        self._hold_alarm = None
+        return ended
 
     def _watch(self, problem: BlockProblem) -> None:
         """Innovations beyond what healthy parameters and known faults explain; the first suspicious one begins a suspicion."""
@@ -252,7 +285,8 @@ class ResidualMonitor:
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
         is_calm = self._load_lately(start) == 0.0
         self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), span, start, is_calm, self.signature)
-        return [self._alarm]
+        is_same = self._hold_alarm is not None and self._hold_alarm.cause is None  # one fault is one alarm
+        return [*(self._end_hold_alarm(start) if is_same else []), self._alarm]
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
         """The known fault whose end goes with what is measured about as well as any other explanation does."""
@@ -271,6 +305,8 @@ class ResidualMonitor:
     def _end_open(self, start: int) -> list[Alarm]:
         """End the alarm that is being looked into, if there is one."""
         ended = self._tip_load.end(start) + ([] if self._alarm is None else [replace(self._alarm, until=start)])
+        if self._alarm is not None:
+            self._hold_test.restart()
         self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._detector.reset()
         return ended
@@ -294,11 +330,16 @@ class ResidualMonitor:
 
     def _start_about_known(self) -> None:
         """Parameters are healthy but for the faults that are known."""
+        self._regression = Regression(self._mean_about_known(), self.covariance)
+        self._hold_test.restart()
+        self._watch_anew()
+
+    def _mean_about_known(self) -> Array:
+        """Of the parameters, with the faults that are known."""
         mean = self._mean.copy()
         for each in self._known.values():
             mean[each.place] += each.value
-        self._regression = Regression(mean, self.covariance)
-        self._watch_anew()
+        return mean
 
     def forget(self) -> None:
         """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
@@ -307,5 +348,5 @@ class ResidualMonitor:
             self._detector.reset()
 
     def close(self, stamp: int) -> list[Alarm]:
-        """End the alarm that is being looked into, if there is one."""
-        return self._end_open(stamp)
+        """End the alarm that is being looked into, and that of holds, if there are any."""
+        return self._end_open(stamp) + self._end_hold_alarm(stamp)

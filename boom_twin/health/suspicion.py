@@ -11,7 +11,9 @@ import numpy as np
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import NANO, Array
+from .hold_test import rows_of
 from .inference.block_problem import BLOCK, BlockProblem
+from .inference.holds import HoldProblem
 from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
 from .inference.innovation_filter import InnovationFilter
 
@@ -87,6 +89,18 @@ class Suspicion:
         self._calm += found.weighted(weight)
         self._before.append(self._evidence)
         self.blocks += 1
+
+    def take_hold(self, hold: HoldProblem, frequency_error: float) -> None:
+        """Take the natural frequencies of a hold that began since; no load changes them, and no sensor."""
+        if hold.start < self.start or not len(hold.modes):
+            return
+        table, own, error2 = rows_of(hold, self._errors2, frequency_error)
+        rows, sigmas = table[len(self._errors2) :], np.sqrt(own + error2)[len(self._errors2) :, None]
+        middle = 0.5 * (hold.start + hold.end) - self.start
+        white = np.hstack([rows, middle * NANO * rows[:, 1:]]) / sigmas
+        found = Evidence.of(white[None], np.array([-0.5 * float(white[:, 0] @ white[:, 0]) - float(np.log(sigmas).sum())]))
+        self._evidence += found
+        self._calm += found
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""

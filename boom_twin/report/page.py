@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import __version__
 from ..analysis.bending_stress import BOX
+from ..analysis.free_vibration import Vibration
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
@@ -24,7 +25,7 @@ from .evaluation import Evaluation
 from .fatigue import SMALL
 from .html import heading, image, page, paragraph, table
 from .quantities import Load
-from .vibration import LEAST, NEAR, Vibration, course
+from .vibration import LEAST, NEAR, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."

@@ -1,57 +1,25 @@
-"""Measured natural frequencies and damping while the boom stood still, beside the model's.
-
-The samples of all channels are stacked into Hankel matrices; what is shifted by one sample spans the same signal space, turned
-by exp(lambda dt) per mode (ERA: Juang and Pappa 1985, doi 10.2514/3.20031). Amplitudes follow by least squares. How sure a
-frequency is, is told by the covariance of all parameters for white noise as large as what the modes leave.
-"""
+"""Measured natural frequencies and damping while the boom stood still, beside the model's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi
+from math import inf
 
 import numpy as np
 
+from ..analysis.free_vibration import ORDER, Vibration, free_vibrations
 from ..monitor.data.present_posture import ModeList
 from ..plots import History
 from ..scene.schema import Scene
 from ..types import Array, Stream, stream_of
 
-ORDER = 14
-"""Eigenvalues that are looked for: two a mode, and some that take up noise."""
 RATE = 40.0
 """Hz to which samples are thinned out."""
-LOWEST, HIGHEST = 0.2, 15.0
-DAMPED = 0.2
-"""Largest damping ratio of what is taken for a mode."""
-
-
-@dataclass(frozen=True, slots=True)
-class Vibration:
-    """One mode: frequency (Hz) and damping ratio, with their standard deviations."""
-
-    frequency: float
-    frequency_sigma: float
-    damping: float
-    damping_sigma: float
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
     """Modes by frequency in `values` (k, c) at `times` (k,) in s; none of less than a second or two."""
-    dt, x = _thinned(times, values)
-    if len(x) < 3 * ORDER or not x.any():
-        return []
-    x = np.asarray(x - x.mean(axis=0), np.float64)
-    lags = len(x) // 3
-    hankel = np.hstack([np.lib.stride_tricks.sliding_window_view(column, len(x) - lags) for column in x.T])
-    space = np.linalg.svd(hankel, full_matrices=False)[0][:, :ORDER]
-    turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
-    rates = np.log(turns[turns.imag > 0.0]) / dt
-    frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
-    kept = (frequencies > LOWEST) & (frequencies < min(HIGHEST, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
-    rates = rates[kept][np.argsort(frequencies[kept])]
-    sigmas = _sigmas(dt * np.arange(float(len(x))), x, rates) if len(rates) else np.zeros((0, 2))
-    return [_vibration(rate, sigma) for rate, sigma in zip(rates, sigmas, strict=True)]
+    return free_vibrations(*_thinned(times, values))
 
 
 def _thinned(times: Array, values: Array) -> tuple[float, Array]:
@@ -70,28 +38,6 @@ def _thinned(times: Array, values: Array) -> tuple[float, Array]:
     from scipy.signal import decimate  # takes longer to import than all else that a replay starts with
 
     return step * interval, np.asarray(decimate(rows, step, axis=0))
-
-
-def _sigmas(times: Array, x: Array, rates: np.ndarray) -> Array:
-    """Standard deviations of real and imaginary part of every rate (1/s), shape (modes, 2)."""
-    waves = np.exp(rates[None, :] * times[:, None])
-    linear = np.hstack([waves.real, -waves.imag, np.ones((len(times), 1))])
-    amplitudes = np.linalg.lstsq(linear, x, rcond=None)[0]
-    noise = float(np.square(x - linear @ amplitudes).sum() / max(x.size - linear.shape[1] * x.shape[1] - 2 * len(rates), 1))
-    complexes = amplitudes[: len(rates)] + 1j * amplitudes[len(rates) : 2 * len(rates)]
-    slopes = times[:, None, None] * waves[:, :, None] * complexes[None]
-    by_rates = np.concatenate([slopes.real, -slopes.imag], axis=1)
-    # what amplitudes can make up for is no information on rates
-    basis = np.linalg.qr(linear)[0]
-    left = by_rates - np.einsum("ta,ba,bmc->tmc", basis, basis, by_rates)
-    information = np.einsum("tmc,tnc->mn", left, left)
-    covariance = noise * np.linalg.pinv(information, hermitian=True)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(2, -1).T
-
-
-def _vibration(rate: complex, sigmas: Array) -> Vibration:
-    size = abs(rate)
-    return Vibration(float(size) / (2.0 * pi), float(sigmas[1]) / (2.0 * pi), float(-rate.real / size), float(sigmas[0] / size))
 
 
 PACE = 1e-3

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from boom_twin.errors import UsageError
+from boom_twin.health.baseline import Baseline
 from boom_twin.health.inference.block_problem import BlockProblem
 from boom_twin.health.inference.fault_catalogue import Form, Parameter
+from boom_twin.health.inference.holds import HoldProblem
+from boom_twin.health.inference.hypotheses import Regression
 from boom_twin.health.inference.innovation_filter import REACH, REST, ModalStates
-from boom_twin.health.learning import LEAST, learn
+from boom_twin.health.learning import LEAST, _learn_frequencies, learn
 
 BLOCK, JOINTS, TRAVEL = 0.1, 2, 0.01
 KNOWN = (
@@ -77,3 +80,24 @@ def test_larger_errors_are_told_from_smaller():
 def test_too_short(sessions):
     with pytest.raises(UsageError, match=rf"too short to learn from\. Give at least {LEAST:.0f} s, with moves"):
         learn(sessions, KNOWN, JOINTS, [str(i) for i in range(len(sessions))])
+
+
+def test_frequencies_of_holds_narrow_the_parameters():
+    """A stiffness that lowers a frequency is learnt from holds, with the error of the model that was drawn."""
+    rng, place, sessions = np.random.default_rng(6), 0, []
+    for seed in (1, 2):
+        problems = session(seed, 300)
+        for k in range(10, 300, 20):
+            slopes = np.zeros((2, len(KNOWN)))
+            slopes[:, place] = [-0.2, -0.05]
+            off = slopes @ THETA + 0.0025 * rng.normal(size=2)
+            rows, none = np.column_stack([off, slopes]), np.zeros(0)
+            hold = HoldProblem(k, k, none, none, none, np.arange(2), rows, np.full(2, 1e-4), none)
+            problems[k] = problems[k]._replace(hold=hold)
+        sessions.append(problems)
+    regression = Regression(*Baseline().healthy(KNOWN))
+    holds = [problem.hold for problems in sessions for problem in problems if problem.hold is not None]
+    learnt = _learn_frequencies(holds, regression, Baseline())
+    assert learnt.frequency_error == 0.0025
+    sigma = float(np.sqrt(regression.covariance[place, place]))
+    assert sigma < 0.3 * KNOWN[place].healthy and abs(regression.mean[place] - THETA[place]) < 3.0 * sigma

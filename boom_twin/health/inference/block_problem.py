@@ -16,6 +16,7 @@ from ...scene.schema import Scene
 from ...types import NANO, Array, Mount, Stream, sensor_kind
 from ..baseline import judged_channels
 from .fault_catalogue import Form, Parameter
+from .holds import HoldCollector, HoldProblem
 from .innovation_filter import ModalStates, modes_of
 from .sensitivities import Signature, Signatures
 
@@ -210,6 +211,8 @@ class BlockMeans:
         As estimated, m; variance of these estimates, m^2; rates of the predicted angles, rad/s.
     shaking : float
         Mean square of the predicted tip acceleration, (m/s^2)^2.
+    motion : MeasuredRows
+        Readings of the sensor that shows vibration best: the IMU, or without it the angles.
     """
 
     start: int
@@ -219,6 +222,7 @@ class BlockMeans:
     variances: Array
     rates: Array
     shaking: float
+    motion: MeasuredRows
 
 
 class BlockProblem(NamedTuple):
@@ -235,6 +239,8 @@ class BlockProblem(NamedTuple):
     shaking, travel : float
         Mean square of the predicted tip acceleration lately, (m/s^2)^2; travel of the strokes since the block before, m.
     modes : ModalStates
+    hold : HoldProblem or None
+        That ended with the block before.
     """
 
     start: int
@@ -244,6 +250,7 @@ class BlockProblem(NamedTuple):
     shaking: float
     travel: float
     modes: ModalStates
+    hold: HoldProblem | None = None
 
     def noise(self, factors2: Array) -> Array:
         """Covariance (c, c) of the residuals where the sensors' own noise is `factors2` (c,) times as strong in power."""
@@ -284,9 +291,12 @@ class LinearModel:
         self._modes: ModalStates | None = None
         self._before: Array | None = None
         self._shaking = 0.0
+        self._holds = HoldCollector()
 
     def take(self, block: BlockMeans, noise: StrokeNoise) -> BlockProblem | None:
         """One block; None while there is no equilibrium to linearise about."""
+        held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], BLOCK)
+        hold = None if held is None else self.signatures.hold(held)
         if self.signature is None or np.abs(block.strokes - self.signature.strokes).max() > STEP:
             self.signature = self.signatures.at(block.strokes) or self.signature
         if self.signature is None:
@@ -301,7 +311,7 @@ class LinearModel:
         by = self.signature.by_stroke
         spread = (by * (SMOOTHED * block.variances)) @ by.T
         assert self._modes is not None
-        return BlockProblem(block.start, self._table(block, self.signature), own, spread, shaking, travel, self._modes)
+        return BlockProblem(block.start, self._table(block, self.signature), own, spread, shaking, travel, self._modes, hold)
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
         table = np.column_stack([block.left, signature.channels])

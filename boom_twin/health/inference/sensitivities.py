@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.equilibrium import settle
+from ...analysis.modal import natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
 from ...errors import BoomTwinError
@@ -20,9 +21,12 @@ from ...scene.kinematics import joint_angles_of_strokes
 from ...scene.schema import Scene
 from ...types import Array, Mount
 from .fault_catalogue import Form, Parameter, step_of
+from .holds import HoldProblem, StillReadings
 
 STROKE_STEP = 1e-5  # m
 TOLERANCE, PASSES, LONGEST = 1e-7, np.int64(12), 0.1  # of a pass, rad
+MODES, WIDTH = 4, 1e-6  # natural frequencies that are compared, and their relative accuracy
+NEAR = 0.25  # a measured frequency is that of the nearest mode, if it is no further from it than this share
 
 
 class Signature(NamedTuple):
@@ -118,6 +122,11 @@ class _Boom:
         self.state.contacts[:], self.state.drives[:] = other.state.contacts, other.state.drives
 
 
+def _frequencies(boom: _Boom) -> Array:
+    """The lowest natural frequencies (Hz) of a boom where it is."""
+    return natural_frequencies(boom.plan, boom.state, boom.work, MODES, WIDTH)
+
+
 class Signatures:
     """Follows the posture of a boom.
 
@@ -139,6 +148,34 @@ class Signatures:
                 step, values = step_of(each, scene)
                 self._changed.append((place, step, _Boom(with_parameters(scene, values), mounts)))
         self._is_settled = False
+
+    def hold(self, readings: StillReadings) -> HoldProblem | None:
+        """A hold with the derivatives of means and natural frequencies there; None where there is no equilibrium."""
+        try:
+            return self._hold(readings)
+        except BoomTwinError:
+            return None
+
+    def _hold(self, readings: StillReadings) -> HoldProblem | None:
+        there = self.at(readings.strokes)
+        if there is None:
+            return None
+        table = np.column_stack([readings.left, there.channels])
+        model = _frequencies(self.nominal)
+        sensed: dict[int, tuple[float, float]] = {}
+        for each in readings.vibrations:
+            mode = int(np.argmin(np.abs(model - each.frequency)))
+            off, sigma = each.frequency / model[mode] - 1.0, each.frequency_sigma / model[mode]
+            if abs(off) < NEAR and (mode not in sensed or sigma < sensed[mode][1]):
+                sensed[mode] = off, sigma
+        modes = np.array(sorted(sensed), np.int64)
+        frequencies = np.zeros((len(modes), 1 + len(self.known)))
+        frequencies[:, 0] = [sensed[mode][0] for mode in modes.tolist()]
+        for place, step, boom in self._changed if len(modes) else ():
+            frequencies[:, 1 + place] = (_frequencies(boom)[modes] / model[modes] - 1.0) / step
+        sigmas = np.array([sensed[mode][1] for mode in modes.tolist()])
+        start, end, strokes = readings.start, readings.end, readings.strokes
+        return HoldProblem(start, end, strokes, table, readings.unrest, modes, frequencies, sigmas, there.tip)
 
     def at(self, strokes: Array) -> Signature | None:
         """At `strokes` (m), shape (n,); None where there is no equilibrium."""

@@ -28,16 +28,17 @@ from boom_twin.validation.rig import Scheme, at_rest, move, observe, random_prog
 from boom_twin.validation.rig.faults import spoil
 from boom_twin.validation.rig.faulty_boom import changes
 from boom_twin.validation.rig.loads import tip_load
+from boom_twin.validation.rig.motion import Programme
 
 ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)
 NICE = 10
 AT_ONCE = 20  # sessions of one process: what Exudyn does not give back, its end does
 
 
-def simulated(each: Scenario) -> dict[str, np.ndarray]:
-    """The readings of one session, as arrays."""
+def simulated(each: Scenario, programme: Programme | None = None) -> dict[str, np.ndarray]:
+    """The readings of one session, as arrays; of random moves unless there is a programme."""
     start, changing = changes(boom(each.rig), each.faults)
-    programme = random_programme(load_scene(), each.posture, each.duration, each.seed)
+    programme = programme or random_programme(load_scene(), each.posture, each.duration, each.seed)
     load = tip_load(start, each.loads, each.duration, each.seed) if each.loads else None
     resting = at_rest(start, np.array(programme.first), ELEMENTS, nodally_exact=True)
     rows, _ = move(resting, programme, each.duration, STEP, STEP, SCHEME, load, changing)

@@ -1,0 +1,74 @@
+"""Natural frequencies and damping of free vibration, from samples of sensors at even times.
+
+The samples of all channels are stacked into Hankel matrices; what is shifted by one sample spans the same signal space, turned
+by exp(lambda dt) per mode (ERA: Juang and Pappa 1985, doi 10.2514/3.20031). Amplitudes follow by least squares. How sure a
+frequency is, is told by the covariance of all parameters for white noise as large as what the modes leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from ..types import Array
+
+ORDER = 14
+"""Eigenvalues that are looked for: two a mode, and some that take up noise."""
+LOWEST, HIGHEST = 0.2, 15.0
+DAMPED = 0.2
+"""Largest damping ratio of what is taken for a mode."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """One mode: frequency (Hz) and damping ratio, with their standard deviations."""
+
+    frequency: float
+    frequency_sigma: float
+    damping: float
+    damping_sigma: float
+
+
+def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> list[Vibration]:
+    """Modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows.
+
+    `most_lags`: rows of a Hankel matrix, a third of all samples unless that is more. Fewer take less time, and are less sure.
+    """
+    if len(values) < 3 * ORDER or not values.any():
+        return []
+    x = np.asarray(values - values.mean(axis=0), np.float64)
+    lags = min(len(x) // 3, most_lags or len(x))
+    hankel = np.hstack([np.lib.stride_tricks.sliding_window_view(column, len(x) - lags) for column in x.T])
+    space = np.linalg.svd(hankel, full_matrices=False)[0][:, :ORDER]
+    turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
+    rates = np.log(turns[turns.imag > 0.0]) / dt
+    frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
+    kept = (frequencies > LOWEST) & (frequencies < min(HIGHEST, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
+    rates = rates[kept][np.argsort(frequencies[kept])]
+    sigmas = _sigmas(dt * np.arange(float(len(x))), x, rates) if len(rates) else np.zeros((0, 2))
+    return [_vibration(rate, sigma) for rate, sigma in zip(rates, sigmas, strict=True)]
+
+
+def _sigmas(times: Array, x: Array, rates: np.ndarray) -> Array:
+    """Standard deviations of real and imaginary part of every rate (1/s), shape (modes, 2)."""
+    waves = np.exp(rates[None, :] * times[:, None])
+    linear = np.hstack([waves.real, -waves.imag, np.ones((len(times), 1))])
+    amplitudes = np.linalg.lstsq(linear, x, rcond=None)[0]
+    noise = float(np.square(x - linear @ amplitudes).sum() / max(x.size - linear.shape[1] * x.shape[1] - 2 * len(rates), 1))
+    complexes = amplitudes[: len(rates)] + 1j * amplitudes[len(rates) : 2 * len(rates)]
+    slopes = times[:, None, None] * waves[:, :, None] * complexes[None]
+    by_rates = np.concatenate([slopes.real, -slopes.imag], axis=1)
+    # what amplitudes can make up for is no information on rates
+    basis = np.linalg.qr(linear)[0]
+    flat = by_rates.reshape(len(times), -1)
+    left = (flat - basis @ (basis.T @ flat)).reshape(by_rates.shape)
+    information = np.tensordot(left, left, axes=((0, 2), (0, 2)))
+    covariance = noise * np.linalg.pinv(information, hermitian=True)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(2, -1).T
+
+
+def _vibration(rate: complex, sigmas: Array) -> Vibration:
+    size = abs(rate)
+    return Vibration(float(size) / (2.0 * pi), float(sigmas[1]) / (2.0 * pi), float(-rate.real / size), float(sigmas[0] / size))

@@ -1,0 +1,114 @@
+"""Test of holds: what means of residuals and natural frequencies of many holds say together of faults.
+
+A section that is softer turns the tip by a milliradian and lowers a natural frequency by two percent: in a block of 0.1 s that
+is nothing, and a filter that allows for the model's error of a posture follows it. Over holds it adds up. The rows of all holds
+are one Gaussian problem: the model's error of each channel and of each frequency is correlated over postures as in
+`boom_twin.health.inference.innovation_filter`, healthy parameters are those of the baseline, and a fault is there from any of
+the holds on; those before tell what this rig is like while all is well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import NANO, Array
+from .inference.holds import HoldProblem
+from .inference.hypotheses import Evidence, HypothesisTest, Verdict
+from .inference.innovation_filter import REACH, REST
+
+MOST = 12  # holds that are kept
+BENT = 0.1  # share of a deviation of a frequency by which its derivative may be wrong
+
+
+@dataclass(frozen=True)
+class HoldVerdict:
+    """What all holds say.
+
+    Attributes
+    ----------
+    since : int
+        Stamp (ns) of the first hold with the fault.
+    verdict : Verdict
+    tip : float
+        By how much the most probable fault puts the tip off in the newest hold, m.
+    """
+
+    since: int
+    verdict: Verdict
+    tip: float
+
+
+def rows_of(hold: HoldProblem, errors2: Array, frequency_error: float) -> tuple[Array, Array, Array]:
+    """Rows of a hold (k, 1 + parameters), variances of their own (k,), and variances of the model's error in them (k,)."""
+    table = np.vstack([hold.table, hold.frequencies])
+    own = np.concatenate([hold.unrest**2, hold.sigmas**2 + (BENT * hold.frequencies[:, 0]) ** 2])
+    return table, own, np.concatenate([errors2, np.full(len(hold.modes), frequency_error**2)])
+
+
+class HoldTest:
+    """Keeps the newest holds and weighs faults.
+
+    Parameters
+    ----------
+    bank : HypothesisTest
+    errors2 : ndarray, shape (channels,)
+        Variance of the model's error in one posture.
+    frequency_error : float
+        Relative error of the model's frequencies.
+    """
+
+    def __init__(self, bank: HypothesisTest, errors2: Array, frequency_error: float) -> None:
+        self._bank, self._errors2, self._frequency_error = bank, errors2, frequency_error
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all holds."""
+        self._holds: list[HoldProblem] = []
+
+    def take(self, hold: HoldProblem, mean: Array, covariance: Array) -> HoldVerdict:
+        """A further hold; gives what all say of parameters that are healthy about a mean (parameters,)."""
+        self._holds = [*self._holds, hold][-MOST:]
+        white, log, numbers = self._whitened()
+        best: HoldVerdict | None = None
+        for first, start in enumerate(self._holds):
+            since = numbers >= first
+            verdict = self._explained(white, since, log, mean, covariance)
+            if best is None or verdict.strength > best.verdict.strength:
+                found = verdict.best
+                best = HoldVerdict(start.start, verdict, float(np.hypot(*hold.tip[:, found.place]) * abs(found.value)))
+        assert best is not None
+        return best
+
+    def _explained(
+        self, white: tuple[Array, Array, Array], since: NDArray[np.bool_], log: float, mean: Array, covariance: Array
+    ) -> Verdict:
+        """All faults that are there in the rows `since` (k,)."""
+        (root, left, signature), count = white, len(mean)
+        faulty = np.linalg.solve(root, np.where(since[:, None], root @ signature, 0.0))
+        rows = np.column_stack([left, signature, faulty])[None]
+        healthy = Evidence.of(rows, np.array([log])).given(mean, covariance)
+        matrix, vector = np.zeros((1, 2 * count, 2 * count)), np.zeros((1, 2 * count))
+        matrix[:, :count, :count], vector[:, :count] = healthy.matrix[:, count:, count:], healthy.vector[:, count:]
+        none = np.zeros(0), np.zeros((0, 0))
+        return self._bank.explain(Evidence(matrix, vector, healthy.squares, healthy.rows, healthy.log), *none, 1.0, {})
+
+    def _whitened(self) -> tuple[tuple[Array, Array, Array], float, Array]:
+        """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row."""
+        parts = [rows_of(hold, self._errors2, self._frequency_error) for hold in self._holds]
+        table, own, error2 = (np.concatenate(column) for column in zip(*parts, strict=True))
+        channels = len(self._errors2)
+        what = np.concatenate([np.concatenate([np.arange(channels), channels + hold.modes]) for hold in self._holds])
+        numbers = np.repeat(np.arange(len(self._holds)), [len(part[0]) for part in parts])
+        strokes, times = np.array([hold.strokes for hold in self._holds]), np.array([hold.start for hold in self._holds]) * NANO
+        travel = np.abs(strokes[:, None] - strokes[None]).max(axis=2) + REST * np.abs(times[:, None] - times[None])
+        known = np.isfinite(table[:, 0])
+        table, own, error2, what, numbers = table[known], own[known], error2[known], what[known], numbers[known]
+        alike = (what[:, None] == what[None]) * np.exp(-travel / REACH)[np.ix_(numbers, numbers)]
+        covariance = np.diag(own) + alike * np.sqrt(np.outer(error2, error2))
+        root = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(root, table)
+        log = -0.5 * float(white[:, 0] @ white[:, 0]) - float(np.log(np.diag(root)).sum())
+        return (root, white[:, 0], white[:, 1:]), log, numbers

@@ -1,0 +1,190 @@
+"""Holds: what sensors read while the boom stands still, its free vibration among it, as linear problems.
+
+A hold says more than its blocks of 0.1 s: the mean of the residuals without vibration, and the natural frequencies of the
+posture, which stiffness and masses change, but no sensor does.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.free_vibration import Vibration, free_vibrations
+from ...types import NANO, Array
+
+PACE = 1e-4  # m of travel from block to block, above which a boom does not stand still
+LEAST, LONGEST = 3.0, 10.0  # s; of a longer one every part is a hold
+RATE = 40.0  # Hz to which samples are thinned out
+LAGS = 80  # of these samples, 2 s
+DECAYS = 4.0  # deviations by which a vibration is damped: the line of a pump is not
+SURE = 0.004  # largest relative deviation of a frequency
+PART = 1.0  # s, over which means are compared, to see how calm a hold is
+KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
+COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
+HEARD = 4.0  # times the power of noise, below which nothing is told of that
+
+
+class StillReadings(NamedTuple):
+    """What was read in a hold.
+
+    Attributes
+    ----------
+    start, end : int
+        ns.
+    strokes : ndarray, shape (n,)
+        m.
+    left, unrest : ndarray, shape (channels,)
+        Mean of the residuals, NaN where not measured, and how sure that is by its own scatter (standard deviation).
+    vibrations : tuple of Vibration
+        That show clearly, by frequency.
+    """
+
+    start: int
+    end: int
+    strokes: Array
+    left: Array
+    unrest: Array
+    vibrations: tuple[Vibration, ...]
+
+
+class HoldProblem(NamedTuple):
+    """A hold, linearised; c channels, m natural frequencies that were measured.
+
+    Attributes
+    ----------
+    start, end : int
+        ns.
+    strokes : ndarray, shape (n,)
+        m.
+    table, unrest : ndarray, shape (c, 1 + parameters), (c,)
+        Residuals and signatures; standard deviation of the residuals by what happened in this hold.
+    modes, frequencies, sigmas : ndarray, shape (m,), (m, 1 + parameters), (m,)
+        Which mode of the model each is, from 0; measured frequency over the model's less 1, and its derivatives; standard
+        deviation of the measured one.
+    tip : ndarray, shape (2, parameters)
+        Derivative of the tip's place, m.
+    """
+
+    start: int
+    end: int
+    strokes: Array
+    table: Array
+    unrest: Array
+    modes: NDArray[np.int64]
+    frequencies: Array
+    sigmas: Array
+    tip: Array
+
+
+class HoldCollector:
+    """Collects blocks while the boom stands still."""
+
+    def __init__(self) -> None:
+        self._strokes: list[Array] = []
+        self._left: list[Array] = []
+        self._motion: list[tuple[NDArray[np.int64], Array]] = []
+        self._starts: list[int] = []
+
+    def take(
+        self, start: int, left: Array, strokes: Array, motion: tuple[NDArray[np.int64], Array], block: int
+    ) -> StillReadings | None:
+        """One block of `block` ns; gives the hold that it ends, if that was long enough.
+
+        Parameters
+        ----------
+        start : int
+            ns.
+        left, strokes : ndarray, shape (channels,), (n,)
+            Means of the residuals; strokes, m.
+        motion : tuple
+            Stamps (k,) in ns and readings (k, any) of what shows vibration best.
+        """
+        is_next = bool(self._starts) and start - self._starts[-1] < 3 * block
+        is_still = is_next and float(np.abs(strokes - self._strokes[-1]).max()) < PACE
+        found = None
+        if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
+            found = self._finished(block)
+            self.__init__()  # type: ignore[misc]
+        self._starts.append(start)
+        self._strokes.append(strokes)
+        self._left.append(left)
+        self._motion.append(motion)
+        return found
+
+    def _finished(self, block: int) -> StillReadings | None:
+        span = (self._starts[-1] + block - self._starts[0]) * NANO
+        if span < LEAST:
+            return None
+        strokes = np.median(np.array(self._strokes), axis=0)
+        stamps = np.concatenate([stamps for stamps, _ in self._motion])
+        values = np.concatenate([values for _, values in self._motion])
+        dt, thin = _thinned(stamps, values)
+        vibrations = free_vibrations(dt, thin, LAGS)
+        is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
+        part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
+        left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
+        found = () if is_shaken else tuple(each for each in vibrations if _is_free(each))
+        return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
+
+
+def _is_free(each: Vibration) -> bool:
+    """Whether it decays, as no vibration does that a load keeps up, and its frequency is sure."""
+    return each.damping > DECAYS * each.damping_sigma and each.frequency_sigma < SURE * each.frequency
+
+
+def _is_kept_up(values: Array) -> bool:
+    """Whether vibration in `values` (k, c) does not decay: a load shakes the boom."""
+    if len(values) < 8:
+        return False
+    noise = (np.diff(values, 2, axis=0) ** 2).mean(axis=0) / 6.0
+    first, second = (half.var(axis=0) for half in (values[: len(values) // 2], values[len(values) // 2 :]))
+    return bool((second.sum() > KEPT_UP * first.sum()) and (second > HEARD * noise).any())
+
+
+def _is_explained(dt: float, values: Array, vibrations: list[Vibration]) -> bool:
+    """Whether these vibrations and noise are all that there is in `values` (k, c), `dt` (s) apart: no wind, no pump's steps."""
+    if len(values) < 8:
+        return True
+    omegas = 2.0 * np.pi * np.array([each.frequency for each in vibrations])
+    decays = omegas * np.array([each.damping for each in vibrations])
+    times = dt * np.arange(float(len(values)))[:, None]
+    turns, sizes = np.sqrt(np.maximum(omegas**2 - decays**2, 0.0)) * times, np.exp(-decays * times)
+    basis = np.linalg.qr(np.hstack([sizes * np.cos(turns), sizes * np.sin(turns), np.ones_like(times)]))[0]
+    rest = values - basis @ (basis.T @ values)
+    noise = (np.diff(rest, 2, axis=0) ** 2).mean(axis=0) / 6.0
+    return bool((rest**2).mean(axis=0).sum() < COLOURED * noise.sum())
+
+
+def _mean_at_rest(left: Array, part: int, is_shaken: bool) -> tuple[Array, Array]:
+    """Mean (channels,) of means of blocks (k, channels), and its deviation by the scatter of parts of so many blocks.
+
+    Where a load shakes the boom, its mean may be as large as its level: the deviation is the scatter itself.
+    """
+    weights = np.where(np.isfinite(left), np.sin(np.pi * (np.arange(len(left)) + 0.5) / len(left))[:, None] ** 2, 0.0)
+    total = weights.sum(axis=0)
+    mean = (np.where(np.isfinite(left), left, 0.0) * weights).sum(axis=0) / np.maximum(total, 1e-300)
+    mean[total < 0.25 * len(left)] = np.nan  # half of the weight of all of them
+    count = len(left) // part
+    parts = left[: count * part].reshape(count, part, -1).mean(axis=1)
+    known = np.isfinite(parts)
+    middle = np.where(known, parts, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    scatter = (np.where(known, parts - middle, 0.0) ** 2).sum(axis=0) / np.maximum(known.sum(axis=0) - 1, 1)
+    return mean, np.sqrt(scatter if is_shaken else scatter / np.maximum(known.sum(axis=0), 1))
+
+
+def _thinned(stamps: NDArray[np.int64], values: Array) -> tuple[float, Array]:
+    """Step (s) and values (k, c) at even times; nothing where there is too little."""
+    known = np.isfinite(values).all(axis=1) if values.size else np.zeros(0, bool)
+    if known.sum() < 2:
+        return 1.0, np.zeros((0, 1))
+    order = np.flatnonzero(known)[np.argsort(stamps[known], kind="stable")]  # samples may be late
+    times, rows = np.asarray(stamps[order] - stamps[0]) * NANO, values[order]
+    interval = float(np.median(np.diff(times)))
+    if interval <= 0.0:
+        return 1.0, np.zeros((0, 1))
+    step = max(1, round(1.0 / (RATE * interval)))
+    even = times[0] + interval * np.arange(int((times[-1] - times[0]) / interval) // step * step)
+    thin = np.stack([np.interp(even, times, column) for column in rows.T], axis=1)
+    return step * interval, thin.reshape(-1, step, rows.shape[1]).mean(axis=1)

@@ -1,0 +1,208 @@
+"""Holds: means and frequencies of a boom at rest, and what many of them say together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from health.recorded import run, session
+
+from boom_twin import Twin, load_scene
+from boom_twin.analysis.equilibrium import statics
+from boom_twin.health.alarm_text import AlarmText
+from boom_twin.health.baseline import Baseline
+from boom_twin.health.hold_test import HoldTest
+from boom_twin.health.inference.fault_catalogue import Form, Parameter, parameters, step_of
+from boom_twin.health.inference.holds import HoldCollector, HoldProblem, StillReadings
+from boom_twin.health.inference.hypotheses import Cause, Explanation, HypothesisTest, Verdict
+from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.scene.edit import parameter, with_parameters
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Alarm
+
+BLOCK, RATE = 100_000_000, 200.0
+STROKES = np.array([0.5, 0.2])
+
+
+def held(seconds: float, left, motion, drift: float = 0.0, seed: int = 1) -> list[StillReadings]:
+    """What a collector finds of a hold of so many seconds that a move ends; `left` (t) by channel, `motion` (t) of the IMU."""
+    rng, collector, found = np.random.default_rng(seed), HoldCollector(), []
+    for k in range(round(seconds * 1e9) // BLOCK):
+        stamps = k * BLOCK + np.arange(0, BLOCK, round(1e9 / RATE))
+        values = motion(stamps * 1e-9) + rng.normal(0.0, 0.05, (len(stamps), 2))
+        found.append(collector.take(k * BLOCK, left(0.1 * k + 0.05), STROKES + drift * k, (stamps, values), BLOCK))
+    nothing = np.zeros(0, np.int64), np.zeros((0, 2))
+    found.append(collector.take(round(seconds * 1e9) // BLOCK * BLOCK, left(0.0), STROKES + 0.01, nothing, BLOCK))
+    return [each for each in found if each is not None]
+
+
+def swing(times: np.ndarray) -> np.ndarray:
+    """1.05 Hz with 0.8 %, 2.4 Hz with 2 %."""
+    first = np.exp(-0.008 * 2 * np.pi * 1.05 * times) * np.cos(2 * np.pi * 1.05 * times)
+    second = np.exp(-0.02 * 2 * np.pi * 2.4 * times) * np.sin(2 * np.pi * 2.4 * times)
+    return np.stack([0.4 * first + second, first - 0.5 * second], axis=1)
+
+
+def test_mean_and_frequencies_of_a_hold() -> None:
+    (found,) = held(9.0, lambda t: np.array([1e-3, np.nan, 0.02 + 0.1 * np.cos(2 * np.pi * 1.05 * t)]), swing)
+    assert (found.start, found.end) == (0, 90 * BLOCK)
+    assert found.left[0] == pytest.approx(1e-3) and np.isnan(found.left[1]) and found.left[2] == pytest.approx(0.02, abs=1e-3)
+    assert [round(each.frequency, 2) for each in found.vibrations] == [1.05, 2.4]
+    for each, frequency in zip(found.vibrations, (1.05, 2.4), strict=True):
+        assert abs(each.frequency - frequency) < 4.0 * each.frequency_sigma < 0.01
+
+
+def test_what_a_load_keeps_up_is_no_frequency_and_leaves_the_mean_open() -> None:
+    def pump(times: np.ndarray) -> np.ndarray:
+        wave = np.sin(2 * np.pi * 0.7 * times)
+        return np.stack([wave, 0.3 * wave], axis=1)
+
+    (found,) = held(9.0, lambda t: np.array([2e-3 * np.sin(2 * np.pi * 0.7 * t)]), pump)
+    assert not found.vibrations and found.unrest[0] == pytest.approx(1.4e-3, rel=0.2)
+    (calm,) = held(9.0, lambda t: np.array([2e-3 * np.sin(2 * np.pi * 0.7 * t)]), swing)
+    assert calm.unrest[0] < 0.3e-3
+
+
+def test_short_ones_and_moves_are_no_holds_and_long_ones_are_parted() -> None:
+    def none(times: object) -> np.ndarray:
+        return np.zeros(1)
+
+    assert not held(2.9, none, swing) and not held(9.0, none, swing, drift=2e-4)
+    assert [each.end - each.start for each in held(24.0, none, swing)] == [100 * BLOCK, 100 * BLOCK, 40 * BLOCK]
+
+
+def test_derivatives_of_frequencies_are_those_of_changed_scenes() -> None:
+    scene = load_scene()
+    known, strokes = parameters(scene), strokes_of_posture(scene, "arch")
+    model = np.array(statics(scene, strokes, modes=2).frequencies)
+    sensed = held(9.0, lambda t: np.zeros(6), swing)[0]._replace(strokes=strokes)
+    hold = Signatures(scene, known, (None,) * 4).hold(sensed)
+    assert hold is not None and hold.modes.tolist() == [0, 1]
+    expected = [each.frequency for each in sensed.vibrations] / model - 1.0
+    assert hold.frequencies[:, 0] == pytest.approx(expected, abs=1e-5)
+    for place, each in enumerate(known):
+        slope = hold.frequencies[:, 1 + place]
+        if each.form is not Form.SCENE:
+            assert not slope.any(), "no sensor changes a frequency"
+        elif each.cause in ("cylinder_2.k", "section_1.EI", "section_4.mass"):
+            step, values = step_of(each, scene)
+            other = with_parameters(scene, {each.cause: 2.0 * parameter(scene, each.cause) - values[each.cause]})
+            changed = np.array(statics(other, strokes, modes=2).frequencies)
+            assert (1.0 - changed / model) / step == pytest.approx(slope, rel=0.05, abs=1e-4)
+
+
+KNOWN = (
+    Parameter("section_1.EI", "softer", Form.SCENE, 0, "", 0.02, 0.3, least=0.0),
+    Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, least=0.0),
+    Parameter("tip_imu.sensor", "bias x", Form.IMU, 0, "m/s^2", 0.01, 0.5),
+)
+ERRORS, FREQUENCY_ERROR = np.array([5e-5, 5e-3]), 2.5e-3
+MEAN, COVARIANCE = np.zeros(3), np.diag([0.01, 0.01, 0.005]) ** 2
+
+
+def drawn(rng: np.random.Generator, softer: float, onset: int = 0) -> list[HoldProblem]:
+    """Six holds far from each other: an angle, the IMU, one frequency; a section softer from a hold on."""
+    found, theta = [], np.sqrt(np.diag(COVARIANCE)) * rng.normal(size=3)
+    for k in range(6):
+        turn = 0.5 + 0.1 * k
+        slopes = np.array([[0.0, 2e-2 * turn, 0.0], [-0.06 * turn, -0.15 * turn, 1.0]])
+        by_frequency = np.array([[-0.08, -0.2, 0.0]])
+        now = theta + np.array([softer if k >= onset else 0.0, 0.0, 0.0])
+        left = slopes @ now + ERRORS * rng.normal(size=2)
+        off = by_frequency @ now + FREQUENCY_ERROR * rng.normal(size=1)
+        strokes, start = np.full(2, 1.0 * k), 20 * k * 10**9
+        table, rows = np.column_stack([left, slopes]), np.column_stack([off, by_frequency])
+        tip = np.array([[-0.03, 0.0, 0.0], [-0.04, 0.0, 0.0]])
+        found.append(
+            HoldProblem(start, start + 10**10, strokes, table, 0.1 * ERRORS, np.array([0]), rows, np.array([1e-4]), tip)
+        )
+    return found
+
+
+def judged(holds: list[HoldProblem]):
+    test = HoldTest(HypothesisTest(KNOWN), ERRORS**2, FREQUENCY_ERROR)
+    return [test.take(hold, MEAN, COVARIANCE) for hold in holds]
+
+
+def test_a_softer_section_is_told_with_its_size_and_the_hold_it_began_in() -> None:
+    rng = np.random.default_rng(3)
+    found = judged(drawn(rng, 0.43, onset=2))
+    assert max(each.verdict.strength for each in found[:2]) < 5.0
+    last = found[-1]
+    assert last.since == 40 * 10**9 and last.verdict.strength > 15.0
+    assert last.verdict.causes[0].name == "section_1.EI" and last.verdict.causes[0].probability > 0.95
+    assert abs(last.verdict.best.value - 0.43) < 3.0 * last.verdict.best.sigma
+    assert last.tip == pytest.approx(0.05 * last.verdict.best.value)
+
+
+def test_healthy_holds_are_no_fault() -> None:
+    rng = np.random.default_rng(4)
+    strengths = [max(each.verdict.strength for each in judged(drawn(rng, 0.0))) for _ in range(60)]
+    assert max(strengths) < 8.0
+
+
+def test_one_hold_agrees_with_the_dense_gaussian() -> None:
+    hold = drawn(np.random.default_rng(5), 0.43)[0]
+    verdict = judged([hold])[0].verdict
+    part = next(
+        each for cause in verdict.causes if cause.name == "tip_imu.sensor" for each in cause.parts if not each.rate_sigma
+    )
+    rows = np.vstack([hold.table, hold.frequencies])
+    own = np.concatenate([(0.1 * ERRORS) ** 2 + ERRORS**2, [1e-8 + (0.1 * rows[2, 0]) ** 2 + FREQUENCY_ERROR**2]])
+    healthy = rows[:, 1:] @ COVARIANCE @ rows[:, 1:].T + np.diag(own)
+    ill = healthy + 0.25 * np.outer(rows[:, 3], rows[:, 3])
+
+    def log(covariance: np.ndarray) -> float:
+        return float(-0.5 * rows[:, 0] @ np.linalg.solve(covariance, rows[:, 0]) - 0.5 * np.linalg.slogdet(covariance)[1])
+
+    assert part.log_factor == pytest.approx(log(ill) - log(healthy), rel=1e-6)
+
+
+def learnt(scene) -> Baseline:
+    """A baseline of a rig that is known well."""
+    known = [each for each in parameters(scene) if each.healthy > 0.0]
+    spread = np.diag([(0.2 * each.healthy) ** 2 for each in known]).tolist()
+    return Baseline(
+        names=tuple(each.name for each in known), mean=[0.0] * len(known), covariance=spread, force_error=4e-3,
+        frequency_error=2.5e-3,
+    )  # fmt: skip
+
+
+def test_a_softer_section_of_a_recorded_session() -> None:
+    """The session is of the default boom; beside a scene whose first section is stiffer, its own is 30 % softer."""
+    scene = load_scene()
+    stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.7})
+    found = run(session(27.0), twin=Twin(stiff, baseline=learnt(scene)))
+    assert found.causes() == {"section_1.EI"}
+    alarm = found.states()[-1][1]
+    assert alarm.channel == "tip" and alarm.kind == "softer" and "puts the tip off by" in alarm.told
+    assert abs(alarm.ranked[0].parts[0][1] - 0.43) < 0.1
+
+
+def test_the_same_session_of_the_right_boom_gives_no_alarm() -> None:
+    scene = load_scene()
+    assert run(session(27.0), twin=Twin(scene, baseline=learnt(scene))).told() == []
+
+
+def verdict_of(**shares: float) -> Verdict:
+    """Two sections, each with what it is probable by."""
+    known = parameters(load_scene())
+    places = {"first": 4, "second": 5}
+    causes = [
+        Cause(known[places[name]].cause, share, (Explanation(places[name], 0, 20.0, 0.4, 0.05),))
+        for name, share in shares.items()
+    ]
+    return Verdict(tuple(causes), 1.0, 1.0, 0)
+
+
+def test_which_section_is_told_only_where_it_is_known() -> None:
+    scene = load_scene()
+    known = parameters(scene)
+    assert [known[place].cause for place in (4, 5)] == ["section_1.EI", "section_2.EI"]
+    tell = AlarmText(scene, known, Signatures(scene, known, (None,) * 4), np.full(6, 1e-4))
+    fresh = Alarm("tip", "residual", 0, None, None, "")
+    either = tell.of_holds(fresh, verdict_of(first=0.6, second=0.4), 0.022)
+    assert (either.kind, either.cause) == ("softer", None)
+    assert "which one is not told yet: section_1.EI or section_2.EI" in either.told and "22 mm" in either.told
+    one = tell.of_holds(either, verdict_of(second=0.97, first=0.03), 0.022)
+    assert (one.kind, one.cause) == ("softer", "section_2.EI") and "-29 % of the scene's" in one.told
+    assert tell.of_holds(one, verdict_of(first=0.6, second=0.4), 0.022) is one, "a name stays"
