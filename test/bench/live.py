@@ -130,14 +130,19 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
 
 
 def listen(who: str, *forget: str) -> None:
-    """Until SIGTERM; prints stamps and delays by topic, unless it is to forget them."""
-    node, heard = rclpy.create_node("listener"), {}
+    """Until SIGTERM; prints stamps and delays by topic, or how many messages if it is to forget them."""
+    node, heard, counts = rclpy.create_node("listener"), {}, dict.fromkeys(OUT, 0)
     qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 
     def hear(name: str, kind: type) -> None:
         rows: Any = deque(maxlen=1 if forget else None)
         heard[name] = rows
-        node.create_subscription(kind, f"/{who}/{name}", lambda data: rows.append((data[:12], time.time_ns())), qos, raw=True)
+
+        def take(data: bytes) -> None:
+            counts[name] += 1
+            rows.append((data[:12], time.time_ns()))
+
+        node.create_subscription(kind, f"/{who}/{name}", take, qos, raw=True)
 
     for name, kind in OUT.items():
         hear(name, kind)
@@ -147,6 +152,9 @@ def listen(who: str, *forget: str) -> None:
     executor.add_node(node)
     while not ended:
         executor.spin_once(timeout_sec=0.1)
+    if forget:
+        print(json.dumps(counts))
+        return
     found = {name: [(stamp_in(data), now) for data, now in rows] for name, rows in heard.items()}
     print(json.dumps({name: [[stamp, now - stamp] for stamp, now in rows] for name, rows in found.items()}))
 
