@@ -87,7 +87,8 @@ def echo_on_events() -> None:
 def source(rate_text: str, duration_text: str, *more: str) -> None:
     """Send, once it has been found; prints a line when it begins, and the stamps of the strokes.
 
-    More words: ``imu`` sends that too, ``later=S`` stamps by a clock that is ahead by so many seconds.
+    More words: ``imu`` sends that too, ``later=S`` stamps by a clock that is ahead by so many seconds, ``even`` stamps with the
+    time when a message was due, as a rig that samples by its own clock, not with that of sending.
     """
     later = sum(round(float(word.removeprefix("later=")) * 1e9) for word in more if word.startswith("later="))
     rate, duration = float(rate_text), float(duration_text)
@@ -112,14 +113,14 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
     for force in random.normal(9.81, 0.05, 200):
         templates.append(bytearray(serialize_message(Imu(linear_acceleration=Vector3(z=force)))))
     print("sending", flush=True)
-    stamps, began = [], time.monotonic()
+    stamps, began, start = [], time.monotonic(), time.time_ns()
     for k in range(int(rate * duration)):
         left = began + k / rate - time.monotonic()
         if left > 0.0:
             time.sleep(left)
         for number, publisher in enumerate(publishers):
             place = 200 * number + k % 200
-            stamp = time.time_ns() + later
+            stamp = (start + round(k / rate * 1e9) if "even" in more else time.time_ns()) + later
             data = templates[place]
             data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")
             publisher.publish(bytes(data))
@@ -130,14 +131,19 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
 
 
 def listen(who: str, *forget: str) -> None:
-    """Until SIGTERM; prints stamps and delays by topic, unless it is to forget them."""
-    node, heard = rclpy.create_node("listener"), {}
+    """Until SIGTERM; prints stamps and delays by topic, or how many messages if it is to forget them."""
+    node, heard, counts = rclpy.create_node("listener"), {}, dict.fromkeys(OUT, 0)
     qos = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 
     def hear(name: str, kind: type) -> None:
         rows: Any = deque(maxlen=1 if forget else None)
         heard[name] = rows
-        node.create_subscription(kind, f"/{who}/{name}", lambda data: rows.append((data[:12], time.time_ns())), qos, raw=True)
+
+        def take(data: bytes) -> None:
+            counts[name] += 1
+            rows.append((data[:12], time.time_ns()))
+
+        node.create_subscription(kind, f"/{who}/{name}", take, qos, raw=True)
 
     for name, kind in OUT.items():
         hear(name, kind)
@@ -147,6 +153,9 @@ def listen(who: str, *forget: str) -> None:
     executor.add_node(node)
     while not ended:
         executor.spin_once(timeout_sec=0.1)
+    if forget:
+        print(json.dumps(counts))
+        return
     found = {name: [(stamp_in(data), now) for data, now in rows] for name, rows in heard.items()}
     print(json.dumps({name: [[stamp, now - stamp] for stamp, now in rows] for name, rows in found.items()}))
 
@@ -162,7 +171,7 @@ def memory(process: subprocess.Popen) -> float:
     return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
 
 
-def run(who: str, rate: float, duration: float, arguments: list[str]) -> dict[str, float]:
+def run(who: str, rate: float, duration: float, words: list[str], arguments: list[str]) -> dict[str, float]:
     """One answering process with source and listener."""
     own = [sys.executable, __file__]
     command = [sys.executable, "-m", "boom_twin.ros.node.main", *arguments] if who == "node" else [*own, who]
@@ -175,7 +184,7 @@ def run(who: str, rate: float, duration: float, arguments: list[str]) -> dict[st
                 if answering.poll() is not None:
                     raise SystemExit(log.read_text())
                 time.sleep(0.2)
-            sending = subprocess.Popen([*own, "source", str(rate), str(duration)], stdout=subprocess.PIPE, text=True)
+            sending = subprocess.Popen([*own, "source", str(rate), str(duration), *words], stdout=subprocess.PIPE, text=True)
             assert sending.stdout is not None
             sending.stdout.readline()
             before = cpu(answering)
@@ -207,9 +216,9 @@ def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, 
     }
 
 
-def compared(rate: float, duration: float, arguments: list[str]) -> dict[str, float]:
+def compared(rate: float, duration: float, words: list[str], arguments: list[str]) -> dict[str, float]:
     """The node, then the echoes, in one go."""
-    of = {who: run(who, rate, duration, arguments) for who in NAMES}
+    of = {who: run(who, rate, duration, words, arguments) for who in NAMES}
     found = {f"{who} {key}": value for who, numbers in of.items() for key, value in numbers.items()}
     for who in ("echo", "echo-events"):
         found[f"cpu over {who}"] = of["node"]["cpu"] / of[who]["cpu"]
@@ -228,9 +237,10 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=1000.0, help="of strokes and of angles, Hz (1000)")
     parser.add_argument("--duration", type=float, default=60.0, help="s (60)")
     parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--even", action="store_true", help="stamp with the time when a message was due")
     args, rest = parser.parse_known_args()
     with isolated():
-        runs = [compared(args.rate, args.duration, rest) for _ in range(args.runs)]
+        runs = [compared(args.rate, args.duration, ["even"] * args.even, rest) for _ in range(args.runs)]
     for name in runs[0]:
         values = [each[name] for each in runs]
         print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")

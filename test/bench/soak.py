@@ -1,17 +1,21 @@
-"""Memory of the live node over many minutes of 200 Hz: ``python test/bench/soak.py [--duration 600]``; also run by make soak.
+"""Memory, loss and log of the live node over many minutes: ``python test/bench/soak.py [--duration 600]``; also by make soak.
 
 The resident memory of the node is sampled every second. Exit code 1 if, after 100 s, a straight line through it rises by more
-than 1 MB.
+than 1 MB, if a sample has no prediction or no residual, or if the log has 100 lines or more.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from live import memory
@@ -22,6 +26,8 @@ SETTLING = 100.0
 """Time (s) before memory is looked at: windows of residuals, loads and alarms fill up to a minute and a half from the start."""
 LARGEST = 1.0
 """MB."""
+LINES = 100
+"""Lines of the log that are too many."""
 
 
 def main() -> int:
@@ -31,36 +37,59 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=200.0, help="of strokes and of angles, Hz (200)")
     args = parser.parse_args()
     with isolated():
-        rows = np.array(samples(args.rate, args.duration))
+        found = soaked(args.rate, args.duration)
+    rows = np.array(found.memory)
     time_s, resident = rows[rows[:, 0] > SETTLING].T
     slope = np.polyfit(time_s, resident, 1)[0]
     rise = slope * (time_s[-1] - time_s[0])
     print(f"{len(rows)} s at {args.rate:g} Hz: {resident[0]:.2f} MB after {SETTLING:g} s, {resident[-1]:.2f} MB at the end")
     print(f"slope {60.0 * slope:.3f} MB/min, rise {rise:.2f} MB, bound {LARGEST:g} MB")
-    return 0 if rise <= LARGEST else 1
+    lost = {name: found.sent - found.heard[name] for name in ("tip/position", "residuals")}
+    print(f"{found.sent} samples sent; without prediction {lost['tip/position']}, without residuals {lost['residuals']}")
+    print(f"{len(found.log)} lines in the log, fewer than {LINES} wanted; the last:", *found.log[-5:], sep="\n")
+    return 0 if rise <= LARGEST and not any(lost.values()) and len(found.log) < LINES else 1
 
 
-def samples(rate: float, duration: float) -> list[tuple[float, float]]:
-    """Time (s) since the first message, and resident memory (MB), every second while messages come."""
+@dataclass(frozen=True)
+class Soaked:
+    """Time (s) since the first message and resident memory (MB) every second; samples sent, messages heard; the log."""
+
+    memory: list[tuple[float, float]]
+    sent: int
+    heard: dict[str, int]
+    log: list[str]
+
+
+def soaked(rate: float, duration: float) -> Soaked:
+    """One node with source and listener; what it did while messages came."""
     live = [sys.executable, str(Path(__file__).with_name("live.py"))]
-    with tempfile.TemporaryFile("w+") as nowhere:
-        node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.node.main"], stdout=nowhere, stderr=nowhere)
-        listener = subprocess.Popen([*live, "listen", "boom_twin", "forget"], stdout=nowhere)
-        source = subprocess.Popen([*live, "source", str(rate), str(duration)], stdout=subprocess.PIPE, text=True)
+    with tempfile.TemporaryFile("w+") as told, tempfile.TemporaryFile("w+") as counted, tempfile.TemporaryFile("w+") as log:
+        node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.node.main"], stdout=log, stderr=log)
+        listener = subprocess.Popen([*live, "listen", "boom_twin", "forget"], stdout=counted)
+        source = subprocess.Popen([*live, "source", str(rate), str(duration)], stdout=told)
         try:
-            assert source.stdout is not None
-            if "sending" not in source.stdout.readline():
-                raise SystemExit("the node did not start")
+            while not _text(told):
+                if source.poll() is not None:
+                    raise SystemExit(f"the node did not start:\n{_text(log)}")
+                time.sleep(0.1)
             began, rows = time.monotonic(), []
-            while source.poll() is None and time.monotonic() - began < duration:
+            while source.poll() is None:
+                if node.poll() is not None:
+                    raise SystemExit(f"the node ended with {node.returncode}:\n{_text(log)}")
                 rows.append((time.monotonic() - began, memory(node)))
                 time.sleep(1.0)
-            if node.poll() is not None:
-                raise SystemExit(f"the node ended with {node.returncode}")
+            listener.terminate()
+            listener.wait(60.0)
+            sent = len(json.loads(_text(told).splitlines()[1])["sent"])
+            return Soaked(rows, sent, json.loads(_text(counted)), _text(log).splitlines())
         finally:
             for process in (source, listener, node):
                 process.kill()
-    return rows
+
+
+def _text(file: TextIO) -> str:
+    file.flush()
+    return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode()
 
 
 if __name__ == "__main__":

@@ -212,6 +212,19 @@ def test_stamps_in_another_unit_are_refused(scene, samples, unit):
             twin.update(Sample(s.stream, int(k * 0.005 * unit), s.values))
 
 
+@pytest.mark.parametrize(("late", "refused"), [(2, 2), (4, 3)])
+def test_a_row_sent_late_with_the_time_of_sending_is_refused_and_counted(scene, late, refused):
+    """A source that was kept waiting, and stamps what was due with the time of sending, 6 us apart: 20 us on, one is taken."""
+    rest, start, step = ROWS[0], 10**18, 1_000_000
+    stamps = [start + k * step for k in range(400)]
+    stamps[300 : 301 + late] = [stamps[300 + late] + 30_000 + 6_000 * k for k in range(late + 1)]
+    twin = Twin(scene)
+    found = tips(twin, [Sample(Stream.STROKES, stamp, rest) for stamp in stamps])
+    missing = [stamp for stamp in stamps if stamp not in found]
+    assert missing == stamps[301 : 301 + refused]
+    assert twin.counts == {"duplicate": refused}
+
+
 def test_hostile_phases_leave_no_trace():
     """50 of them; ``python test/twin/hostile.py`` has the distribution over 1000."""
     errors = np.array([error for _, error in phases(50, 1000)])
