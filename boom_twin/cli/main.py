@@ -21,14 +21,13 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError, Fault
+from ..system.blas_threads import use_one_blas_thread
 from ..system.terminal_text import PrintableStream
 from .examples import epilog_of
 from .parser import CommandParser
 from .quiet import QuietStream
 
-# Before numpy is loaded: threads slow small matrices down ten times and more, and results are to be the same on any number of
-# cores. What runs on several cores here does so as processes.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+use_one_blas_thread()
 
 if TYPE_CHECKING:
     from ..bag.reader import Session

@@ -31,10 +31,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
+from boom_twin import statics
 from boom_twin.messages.cdr_decoder import stamp_in
 from boom_twin.ros.isolation import isolated
 from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.scene.kinematics import strokes_of_posture
 
 OUT = {
     "tip/position": PointStamped,
@@ -102,7 +103,7 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
         time.sleep(0.1)
     time.sleep(1.0)
     random, rest = np.random.default_rng(1), strokes_of_posture(scene, "arch")
-    angles = joint_angles_of_strokes(scene, rest)
+    angles = statics(scene, "arch").joints
     templates = []
     for kind, values, sigma in (("cylinder", rest, 2e-5), ("joint", angles, 1.7e-4)):
         msg = JointState(name=[f"{kind}_{i}" for i in range(1, 5)])

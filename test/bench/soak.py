@@ -1,5 +1,7 @@
 """Memory, loss and log of the live node over many minutes: ``python test/bench/soak.py [--duration 600]``; also by make soak.
 
+Samples carry the time at which they were due: a source that a busy computer keeps waiting sends them late, not wrong.
+
 The resident memory of the node is sampled every second. Exit code 1 if, after 100 s, a straight line through it rises by more
 than 1 MB, if a sample has no prediction or no residual, or if the log has 100 lines or more.
 """
@@ -66,7 +68,7 @@ def soaked(rate: float, duration: float) -> Soaked:
     with tempfile.TemporaryFile("w+") as told, tempfile.TemporaryFile("w+") as counted, tempfile.TemporaryFile("w+") as log:
         node = subprocess.Popen([sys.executable, "-m", "boom_twin.ros.node.main"], stdout=log, stderr=log)
         listener = subprocess.Popen([*live, "listen", "boom_twin", "forget"], stdout=counted)
-        source = subprocess.Popen([*live, "source", str(rate), str(duration)], stdout=told)
+        source = subprocess.Popen([*live, "source", str(rate), str(duration), "even"], stdout=told)
         try:
             while not _text(told):
                 if source.poll() is not None:

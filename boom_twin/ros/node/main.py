@@ -12,7 +12,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
+from ...system.blas_threads import use_one_blas_thread
 from ..startup import StopSignal, require_rclpy
+
+use_one_blas_thread()
 
 if TYPE_CHECKING:
     from .node import TwinNode
