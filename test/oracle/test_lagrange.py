@@ -70,9 +70,12 @@ def test_oil_springs(kind):
 
 @pytest.mark.parametrize("kind", ["B1", "B2", "B3"])
 def test_incompressible_cylinders(kind):
-    """Kinematics are then exact at any step; forces and accelerations have the order of the integrator."""
+    """Kinematics are then exact at any step, but for what passes leave; forces and accelerations have the integrator's order.
+
+    Passes leave a share of a step's own error (`boom_twin.kernels.transfer.kept_tangent`): some 1e-10 rad at 4 ms.
+    """
     table, size = errors(two_sections(kind, True), np.array([0.6, -0.9]), [0.03, -0.02], STEPS)
-    assert np.all(table[:, [0, 2]] < 1e-11)
+    assert np.all(table[:, [0, 2]] < 1e-9) and np.all(table[2:, [0, 2]] < 1e-11)
     assert np.all(np.abs(slopes(table[:, [1, 3]]) - 2.0) < 0.2)
     assert np.all(table[-1, [1, 3]] < [5e-5, 5e-5 * size])
 
