@@ -75,8 +75,16 @@ def test_derivatives_of_frequencies_are_those_of_changed_scenes() -> None:
     known, strokes = parameters(scene), strokes_of_posture(scene, "arch")
     model = np.array(statics(scene, strokes, modes=2).frequencies)
     sensed = held(9.0, lambda t: np.zeros(6), swing)[0]._replace(strokes=strokes)
-    hold = Signatures(scene, known, (None,) * 4).hold(sensed)
-    assert hold is not None and hold.modes.tolist() == [0, 1]
+    signatures = Signatures(scene, known, (None,) * 4)
+    work = signatures.hold(sensed)
+    assert work is not None and not work.problem.frequencies[:, 1:].any()
+    calls = 1
+    while signatures.go_on(work):
+        assert signatures.at(strokes + 0.02 * calls / len(known)) is not None, "the boom moves on meanwhile"
+        calls += 1
+    hold = work.problem
+    assert calls == sum(each.form is Form.SCENE for each in known), "one parameter a call"
+    assert hold.modes.tolist() == [0, 1]
     expected = [each.frequency for each in sensed.vibrations] / model - 1.0
     assert hold.frequencies[:, 0] == pytest.approx(expected, abs=1e-5)
     for place, each in enumerate(known):

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
+from ...errors import BoomTwinError
 from ...scene.schema import Scene
 from ...types import NANO, Array, Mount, Stream, sensor_kind
 from ..baseline import judged_channels
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
 from .innovation_filter import ModalStates, modes_of
-from .sensitivities import Signature, Signatures
+from .sensitivities import HoldInWork, Signature, Signatures
 
 BLOCK = 100_000_000  # ns
 GRACE = 100_000_000  # ns that a block waits for late samples
@@ -240,7 +241,7 @@ class BlockProblem(NamedTuple):
         Mean square of the predicted tip acceleration lately, (m/s^2)^2; travel of the strokes since the block before, m.
     modes : ModalStates
     hold : HoldProblem or None
-        That ended with the block before.
+        That ended with the block before, or since then if derivatives of frequencies had to be made.
     """
 
     start: int
@@ -292,11 +293,14 @@ class LinearModel:
         self._before: Array | None = None
         self._shaking = 0.0
         self._holds = HoldCollector()
+        self._in_work: deque[HoldInWork] = deque()
 
     def take(self, block: BlockMeans, noise: StrokeNoise) -> BlockProblem | None:
         """One block; None while there is no equilibrium to linearise about."""
         held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], BLOCK)
-        hold = None if held is None else self.signatures.hold(held)
+        if held is not None and (begun := self.signatures.hold(held)) is not None:
+            self._in_work.append(begun)
+        hold = self._hold()
         if self.signature is None or np.abs(block.strokes - self.signature.strokes).max() > STEP:
             self.signature = self.signatures.at(block.strokes) or self.signature
         if self.signature is None:
@@ -312,6 +316,19 @@ class LinearModel:
         spread = (by * (SMOOTHED * block.variances)) @ by.T
         assert self._modes is not None
         return BlockProblem(block.start, self._table(block, self.signature), own, spread, shaking, travel, self._modes, hold)
+
+    def _hold(self) -> HoldProblem | None:
+        """Go on with the hold in work, by one parameter a block; gives it when it is done."""
+        if not self._in_work:
+            return None
+        work = self._in_work[0]
+        try:
+            if self.signatures.go_on(work):
+                return None
+        except BoomTwinError:
+            self._in_work.popleft()
+            return None
+        return self._in_work.popleft().problem
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
         table = np.column_stack([block.left, signature.channels])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...analysis.equilibrium import settle
 from ...analysis.modal import natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
-from ...errors import BoomTwinError
+from ...errors import BoomTwinError, SolverError
 from ...estimation.sensor_model import Mounting, Reading
 from ...kernels.integrators import REST, X, prepare
 from ...kernels.tables import OK, State, Work
@@ -115,11 +116,45 @@ class _Boom:
         )
         return self.reading.of(self.state) if status == OK else None
 
-    def follow(self, other: _Boom) -> None:
+    def follow(self, other: Stand) -> None:
         """Be where a boom with the same unknowns is; it may lack point masses that this one has."""
-        self.state.z[:] = other.state.z
+        self.state.z[:] = other.z
         self.state.history[X, : len(self.state.z)] = self.state.z
-        self.state.contacts[:], self.state.drives[:] = other.state.contacts, other.state.drives
+        self.state.contacts[:], self.state.drives[:] = other.contacts, other.drives
+
+    def stand(self) -> Stand:
+        """Where it is."""
+        return Stand(self.state.z.copy(), self.state.contacts.copy(), self.state.drives.copy())
+
+
+class Stand(NamedTuple):
+    """Where a boom rests: see `kernels.tables.State`."""
+
+    z: Array
+    contacts: Array
+    drives: Array
+
+
+@dataclass
+class HoldInWork:
+    """A hold of which derivatives of natural frequencies are still to be made.
+
+    Attributes
+    ----------
+    problem : HoldProblem
+        Its `frequencies` are filled as they come.
+    stand : Stand
+        Of the nominal boom.
+    model : ndarray, shape (m,)
+        Its natural frequencies that were measured, Hz.
+    made : int
+        Of the changed booms.
+    """
+
+    problem: HoldProblem
+    stand: Stand
+    model: Array
+    made: int = 0
 
 
 def _frequencies(boom: _Boom) -> Array:
@@ -149,14 +184,29 @@ class Signatures:
                 self._changed.append((place, step, _Boom(with_parameters(scene, values), mounts)))
         self._is_settled = False
 
-    def hold(self, readings: StillReadings) -> HoldProblem | None:
-        """A hold with the derivatives of means and natural frequencies there; None where there is no equilibrium."""
+    def hold(self, readings: StillReadings) -> HoldInWork | None:
+        """A hold with the derivatives of means there; None where there is no equilibrium."""
         try:
             return self._hold(readings)
         except BoomTwinError:
             return None
 
-    def _hold(self, readings: StillReadings) -> HoldProblem | None:
+    def go_on(self, work: HoldInWork) -> bool:
+        """Make the derivatives by one more parameter; whether there are more to come. SolverError without an equilibrium.
+
+        One a call: a changed boom takes 2 ms, all of them together would keep a sample waiting.
+        """
+        if work.made == len(self._changed) or not len(work.model):
+            return False
+        place, step, boom = self._changed[work.made]
+        boom.follow(work.stand)
+        if boom.rest(work.problem.strokes) is None:
+            raise SolverError("a changed boom finds no rest")
+        work.problem.frequencies[:, 1 + place] = (_frequencies(boom)[work.problem.modes] / work.model - 1.0) / step
+        work.made += 1
+        return work.made < len(self._changed)
+
+    def _hold(self, readings: StillReadings) -> HoldInWork | None:
         there = self.at(readings.strokes)
         if there is None:
             return None
@@ -171,11 +221,10 @@ class Signatures:
         modes = np.array(sorted(sensed), np.int64)
         frequencies = np.zeros((len(modes), 1 + len(self.known)))
         frequencies[:, 0] = [sensed[mode][0] for mode in modes.tolist()]
-        for place, step, boom in self._changed if len(modes) else ():
-            frequencies[:, 1 + place] = (_frequencies(boom)[modes] / model[modes] - 1.0) / step
         sigmas = np.array([sensed[mode][1] for mode in modes.tolist()])
         start, end, strokes = readings.start, readings.end, readings.strokes
-        return HoldProblem(start, end, strokes, table, readings.unrest, modes, frequencies, sigmas, there.tip)
+        problem = HoldProblem(start, end, strokes, table, readings.unrest, modes, frequencies, sigmas, there.tip)
+        return HoldInWork(problem, self.nominal.stand(), model[modes])
 
     def at(self, strokes: Array) -> Signature | None:
         """At `strokes` (m), shape (n,); None where there is no equilibrium."""
@@ -202,9 +251,9 @@ class Signatures:
             by_stroke[:, i] = (moved - base) / STROKE_STEP
         if self.nominal.rest(strokes) is None:
             return None
-        table = np.zeros((n + 4, len(self.known)))
+        table, stand = np.zeros((n + 4, len(self.known))), self.nominal.stand()
         for place, step, boom in self._changed:
-            boom.follow(self.nominal)
+            boom.follow(stand)
             moved = boom.rest(strokes)
             if moved is None:
                 return None

@@ -106,7 +106,7 @@ def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Find
         pressures = [abs(load.force) / area for load, (area, *_) in zip(loads, sides, strict=True)]
         worst = max((0, 1), key=pressures.__getitem__)
         if loads[worst].angles and not PRESSURE[0] <= pressures[worst] <= PRESSURE[1]:
-            load, (_area, acts, side) = loads[worst], sides[worst]
+            load, (_, acts, side) = loads[worst], sides[worst]
             expected = (
                 "at most {1:g} MPa in every posture" if pressures[worst] > PRESSURE[1] else "at least {0:g} MPa in one posture"
             )
