@@ -21,7 +21,7 @@ through a resonance: Crandall and Mark, Random Vibration in Mechanical Systems, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -96,6 +96,14 @@ class _AtRest:
         _, count = _checked(*count_below(*self._boom, omega, self._scratch))
         return count
 
+    def lowest(self, count: int, width: float, highest: float) -> Iterator[float]:
+        """The lowest `count` natural frequencies below `highest` (rad/s), ascending, to the relative accuracy `width`."""
+        base, low = self.count_below(0.0), 0.0
+        for k in range(min(count, self.count_below(highest) - base)):
+            omega = self.frequency(base, k, low, width)
+            yield omega
+            low = omega * (1.0 - 1e-9)
+
     def frequency(self, base: int, number: int, low: float, width: float) -> float:
         """The frequency (rad/s), above `low`, at which the count less `base` rises from at most `number` to more."""
         omega, _ = _checked(*bisect_frequency(*self._boom, base, number, low, width, self._scratch))
@@ -136,26 +144,18 @@ def natural_modes(
     `width` is the relative accuracy of the frequencies. The state stays as it is.
     """
     boom = _AtRest(plan, state, work)
-    base = boom.count_below(0.0)
     modes: list[Mode] = []
-    low = 0.0
-    for k in range(min(count, boom.count_below(highest) - base)):
-        omega = boom.frequency(base, k, low, width)
+    for omega in boom.lowest(count, width, highest):
         modes.append(_mode(plan, state, work, boom, omega, modes))
-        low = omega * (1.0 - 1e-9)
     place(plan.tables, state, work)
     return tuple(modes)
 
 
 def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
     """The lowest `count` natural frequencies (Hz) alone, or all if there are fewer; see `natural_modes`."""
-    boom, low = _AtRest(plan, state, work), 0.0
-    base, found = boom.count_below(0.0), []
-    for k in range(min(count, boom.count_below(HIGHEST) - base)):
-        found.append(boom.frequency(base, k, low, width))
-        low = found[-1] * (1.0 - 1e-9)
+    found = np.array(list(_AtRest(plan, state, work).lowest(count, width, HIGHEST)))
     place(plan.tables, state, work)
-    return np.array(found) / (2.0 * math.pi)
+    return found / (2.0 * math.pi)
 
 
 def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:

@@ -82,6 +82,9 @@ class HoldCollector:
     """Collects blocks while the boom stands still."""
 
     def __init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
         self._strokes: list[Array] = []
         self._left: list[Array] = []
         self._motion: list[tuple[NDArray[np.int64], Array]] = []
@@ -106,7 +109,7 @@ class HoldCollector:
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
             found = self._finished(block)
-            self.__init__()  # type: ignore[misc]
+            self._begin()
         self._starts.append(start)
         self._strokes.append(strokes)
         self._left.append(left)
