@@ -30,6 +30,7 @@ pytestmark = [
 ]
 PATIENCE = 20_000  # ms
 FAULT = 25.0  # s, where encoder 3 is known to be wrong
+RESPONSE = "twin.response.chart.plot.data.map(row => Array.from(row))"
 
 
 class Monitor:
@@ -435,9 +436,14 @@ def test_the_response_in_this_posture_with_the_measured_spectrum_over_it(page: A
     wait(page, "twin.response.chart && twin.response.chart.plot.data.length === 7")
     words = page.locator("#response-words").inner_text()
     assert words.startswith("amplitude of the tip's acceleration") and "measured by the IMU, last 40 s" in words
-    frequencies, *curves, measured = page.evaluate("twin.response.chart.plot.data.map(row => Array.from(row))")
-    expected = frequency_response(None, np.array(frequencies), strokes=feed.strokes(FAULT), drive=2).tip_acceleration
-    assert np.array(curves[2]) == pytest.approx(1e-3 * np.linalg.norm(expected, axis=1), rel=2e-2)
+    frequencies, *curves, measured = page.evaluate(RESPONSE)
+    response = frequency_response(None, np.array(frequencies), strokes=feed.strokes(FAULT), drive=2).tip_acceleration
+    expected = pytest.approx(1e-3 * np.linalg.norm(response, axis=1), rel=2e-2)
+    end = time.monotonic() + PATIENCE / 1000
+    while np.array(curves[2]) != expected and time.monotonic() < end:  # what is drawn may still be of the posture before
+        page.wait_for_timeout(50)
+        frequencies, *curves, measured = page.evaluate(RESPONSE)
+    assert np.array(curves[2]) == expected
     assert len(curves) == 5 and sum(value is not None for value in measured) > 300
     labels = page.locator("#answers .u-label").all_inner_texts()
     assert labels[1:3] == ["1 N at the tip, up", "1 mm of cylinder 1"] and "measured by the IMU" in labels[-1]
