@@ -171,7 +171,7 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         variances=np.zeros(n), pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
-        chances=np.zeros(n + 2),
+        shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
         spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
         last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip

@@ -113,6 +113,7 @@ class DeviationFilter(NamedTuple):
     variances : (n,) of the strokes' estimates, m^2. pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (8, s) scratch.
     within, cross : (8, 8), (8, n) scratch, covariances of what the rows read with one another and with a.
+    shifts : (8, n + 1) scratch, by how much the causes change what the rows read; that all are off changes nothing.
     inverse, healed, drag : (n, n), (8, n), (n,) scratch, B of `weigh_causes`, and B times `cross` and times the mean of a.
     chances : (n + 2,) of the causes: no cylinder is off, one of them is, all are.
     last : (c,) innovations. level : (1,) N.
@@ -156,6 +157,7 @@ class DeviationFilter(NamedTuple):
     healed: Array
     inverse: Array
     drag: Array
+    shifts: Array
     chances: Array
     spread: Array
     level: Array
@@ -338,7 +340,11 @@ def oscillate(omega, decay, h):
 
 @inner
 def step_state(f, h):
-    """Mean and covariance h (s) later: half a step of the inputs, one of the modes under these, the other half (Strang)."""
+    """Mean and covariance h (s) later: half a step of the inputs, one of the modes under these, the other half (Strang).
+
+    The covariance is symmetric, to the bit: of what changes, rows are computed and columns are copied. Along a row a processor
+    takes four numbers at once.
+    """
     size, inputs = states_of(f), f.coupling.shape[1]
     x, p, row = f.x, f.p, f.row
     step_inputs(f, 0.5 * h, size)
@@ -347,29 +353,28 @@ def step_state(f, h):
         a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], h)
         g1, g2 = (1.0 - a11) / (f.omega[j] * f.omega[j]), -a21 / (f.omega[j] * f.omega[j])
         force = 0.0
-        for k in range(size):
-            row[k] = 0.0
+        clear(row, size)
         for b in range(inputs):
             place = input_place(f, b)
             force += c[b] * x[place]
-            for k in range(size):
-                row[k] += c[b] * p[place, k]
+            add_row(row, c[b], p[place], size)
         x[at], x[at + 1] = a11 * x[at] + a12 * x[at + 1] + g1 * force, a21 * x[at] + a22 * x[at + 1] + g2 * force
-        for k in range(size):
-            q, rate = p[at, k], p[at + 1, k]
-            p[at, k], p[at + 1, k] = a11 * q + a12 * rate + g1 * row[k], a21 * q + a22 * rate + g2 * row[k]
-        for k in range(size):
-            force = 0.0
-            for b in range(inputs):
-                force += c[b] * p[k, input_place(f, b)]
-            q, rate = p[k, at], p[k, at + 1]
-            p[k, at], p[k, at + 1] = a11 * q + a12 * rate + g1 * force, a21 * q + a22 * rate + g2 * force
+        mix_rows(p[at], p[at + 1], a11, a12, a21, a22, f.gain, size)
+        add_row(p[at], g1, row, size)
+        add_row(p[at + 1], g2, row, size)
+        by_q, by_rate = 0.0, 0.0
+        for b in range(inputs):
+            place = input_place(f, b)
+            by_q += c[b] * p[at, place]
+            by_rate += c[b] * p[at + 1, place]
         _, b12, _, b22 = oscillate(f.omega[j], f.decay[j], 0.5 * h)
         share = f.density[j] * h / 6.0  # of the noise's integral, by Simpson's rule
-        p[at, at] += share * (4.0 * b12 * b12 + a12 * a12)
-        p[at, at + 1] += share * (4.0 * b12 * b22 + a12 * a22)
-        p[at + 1, at] += share * (4.0 * b12 * b22 + a12 * a22)
-        p[at + 1, at + 1] += share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
+        q2 = a11 * p[at, at] + a12 * p[at, at + 1] + g1 * by_q + share * (4.0 * b12 * b12 + a12 * a12)
+        both = a21 * p[at, at] + a22 * p[at, at + 1] + g2 * by_q + share * (4.0 * b12 * b22 + a12 * a22)
+        rate2 = a21 * p[at + 1, at] + a22 * p[at + 1, at + 1] + g2 * by_rate + share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
+        copy_columns(p, at, size)
+        copy_columns(p, at + 1, size)
+        p[at, at], p[at, at + 1], p[at + 1, at], p[at + 1, at + 1] = q2, both, both, rate2
     step_inputs(f, 0.5 * h, size)
     kept = math.exp(-h / JERK_TIME)
     for b in range(2):
@@ -395,17 +400,14 @@ def step_load(f, place, change, h, size):
     x, p, e, level2 = f.x, f.p, math.exp(-LOAD_RATE * h), f.level[0] * f.level[0]
     a11, a12, a21, a22 = e * (1.0 + LOAD_RATE * h), e * h, -e * LOAD_RATE * LOAD_RATE * h, e * (1.0 - LOAD_RATE * h)
     x[place], x[change] = a11 * x[place] + a12 * x[change], a21 * x[place] + a22 * x[change]
-    for k in range(size):
-        u, v = p[place, k], p[change, k]
-        p[place, k], p[change, k] = a11 * u + a12 * v, a21 * u + a22 * v
-    for k in range(size):
-        u, v = p[k, place], p[k, change]
-        p[k, place], p[k, change] = a11 * u + a12 * v, a21 * u + a22 * v
+    mix_rows(p[place], p[change], a11, a12, a21, a22, f.gain, size)
     rate2 = LOAD_RATE * LOAD_RATE * level2  # at rest in itself, load and rate have these variances and no covariance
-    p[place, place] += level2 - a11 * a11 * level2 - a12 * a12 * rate2
-    p[place, change] -= a11 * a21 * level2 + a12 * a22 * rate2
-    p[change, place] -= a11 * a21 * level2 + a12 * a22 * rate2
-    p[change, change] += rate2 - a21 * a21 * level2 - a22 * a22 * rate2
+    load = a11 * p[place, place] + a12 * p[place, change] + level2 - a11 * a11 * level2 - a12 * a12 * rate2
+    both = a21 * p[place, place] + a22 * p[place, change] - a11 * a21 * level2 - a12 * a22 * rate2
+    rate = a21 * p[change, place] + a22 * p[change, change] + rate2 - a21 * a21 * level2 - a22 * a22 * rate2
+    copy_columns(p, place, size)
+    copy_columns(p, change, size)
+    p[place, place], p[place, change], p[change, place], p[change, change] = load, both, both, rate
 
 
 @inner
@@ -421,11 +423,45 @@ def input_place(f, b):
 def fade(f, place, kept, variance, size):
     """A step of the Gauss-Markov process at `place`, of this variance."""
     f.x[place] *= kept
+    row = f.p[place]
     for k in range(size):
-        f.p[place, k] *= kept
+        row[k] *= kept
+    row[place] = kept * row[place] + variance * (1.0 - kept * kept)
+    copy_columns(f.p, place, size)
+
+
+@inner
+def copy_columns(p, place, size):
+    """The column of a symmetric matrix at `place`, from its row."""
     for k in range(size):
-        f.p[k, place] *= kept
-    f.p[place, place] += variance * (1.0 - kept * kept)
+        p[k, place] = p[place, k]
+
+
+@inner
+def add_row(row, share, of, size):
+    """Add to a row a share of another; nothing if the share is 0."""
+    if share != 0.0:
+        for k in range(size):
+            row[k] += share * of[k]
+
+
+@inner
+def mix_rows(one, other, a11, a12, a21, a22, before, size):
+    """Two rows become a 2 by 2 matrix times them; `before` (s,) is scratch. A loop that writes one row only is vectorised."""
+    for k in range(size):
+        before[k] = one[k]
+    for k in range(size):
+        one[k] = a11 * one[k] + a12 * other[k]
+    for k in range(size):
+        other[k] = a21 * before[k] + a22 * other[k]
+
+
+@inner
+def covary(p, row, gain, size):
+    """Covariance `gain` of all states with what `row` reads: P times it, by rows of P, which is symmetric."""
+    clear(gain, size)
+    for k in range(size):
+        add_row(gain, row[k], p[k], size)
 
 
 # -- rows of what is read ------------------------------------------------------------------------------------------------
@@ -580,24 +616,22 @@ def correct(f, channel, residual, variance, age):
             at = mode_place(f, j)
             a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
             row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+    covary(p, row, gain, size)
     spread, off = variance, residual
     for k in range(size):
-        total = 0.0
-        for b in range(size):
-            total += p[k, b] * row[b]
-        gain[k] = total
-        spread += row[k] * total
+        spread += row[k] * gain[k]
         off -= row[k] * x[k]
     innovation = off / math.sqrt(spread)
     alike = min(max(innovation * f.last[channel], -ALIKE), ALIKE)
     f.last[channel] = innovation
     if abs(innovation) > UNLIKELY:
         spread *= (innovation / UNLIKELY) ** 2
+    deviation = math.sqrt(spread)
     for k in range(size):
-        share = gain[k] / spread
-        x[k] += share * off
-        for b in range(size):
-            p[k, b] -= share * gain[b]
+        gain[k] /= deviation
+    add_row(x, off / deviation, gain, size)
+    for k in range(size):
+        add_row(p[k], -gain[k], gain, size)
     return alike
 
 
@@ -710,10 +744,8 @@ def invert(b):
 
 @inner
 def shift_by(f, a, cause):
-    """By how much a cause (0 none, i cylinder i, n + 1 all) changes what row a reads."""
+    """By how much a cause (0 none, i cylinder i) changes what row a reads."""
     n, shift = f.softness.shape[0], 0.0
-    if cause == n + 1:
-        return 0.0
     for i in range(n):
         shift -= f.cross[a, i] * f.drag[i]
     if cause > 0:
@@ -729,7 +761,7 @@ def mean_of(f, a, size):
         total += f.rows[a, k] * f.x[k]
     for cause in range(f.softness.shape[0] + 1):
         if f.chances[cause] > 0.0:
-            total += f.chances[cause] * shift_by(f, a, cause)
+            total += f.chances[cause] * f.shifts[a, cause]
     return total
 
 
@@ -785,11 +817,7 @@ def read_covariances(f, size):
     """Of every row its covariance with the rows of its own three or two and with the shares, before causes are weighed."""
     n = f.softness.shape[0]
     for a in range(8):
-        for k in range(size):
-            total = 0.0
-            for b in range(size):
-                total += f.p[k, b] * f.rows[a, b]
-            f.gain[k] = total
+        covary(f.p, f.rows[a], f.gain, size)
         for b in range(a, min(a - a % 3 + 3, 8)):
             total = 0.0
             for k in range(size):
@@ -802,6 +830,8 @@ def read_covariances(f, size):
             for k in range(n):
                 total += f.inverse[i, k] * f.cross[a, k]
             f.healed[a, i] = total
+        for cause in range(n + 1):
+            f.shifts[a, cause] = shift_by(f, a, cause)
 
 
 @inner
@@ -813,7 +843,7 @@ def covariance_of(f, a, b):
     for cause in range(n + 1):
         chance = f.chances[cause]
         if chance > 0.0:
-            one, other = shift_by(f, a, cause), shift_by(f, b, cause)
+            one, other = f.shifts[a, cause], f.shifts[b, cause]
             total += chance * one * other
             shift_a, shift_b = shift_a + chance * one, shift_b + chance * other
             if cause > 0:
