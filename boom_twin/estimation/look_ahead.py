@@ -27,6 +27,7 @@ from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, ne
 TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left is about its square
 LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
 LOOK_SHARE = 0.58  # of the lag, longest step ahead of the anchor: two steps
+ROUNDING = 1e-9  # s, by which stamps that are a step apart may be further apart
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
 REST_PASSES, REST_INCREMENT = np.int64(60), 0.1
@@ -96,7 +97,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     look_step, lag = min(tuning.look_step, LOOK_SHARE * lag), max(lag, tuning.least_lag)
     boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
     while True:
-        if not ahead and not anchor_must_advance(track, lag, old):
+        if not ahead and not anchor_must_advance(track, lag, old, longest):
             track.nodes[0] = old + 1
             if track.moved[0] == 0:
                 hold(track, nodes[old])
@@ -112,9 +113,7 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
         if old == 0:
             report(t, live, track, out)
             return OK
-        new = old - 1
-        if ahead:
-            new = next_node(track, old, longest)
+        new = next_node(track, old, longest)
         span = track.times[new] - track.times[old]
         steps = max(1, math.ceil(span / longest - 1e-6))
         scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
@@ -135,16 +134,16 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
 
 
 @inner
-def anchor_must_advance(track, lag, old):
-    """Whether the anchor, at the oldest node, has to go on: the node before it is older than the lag, or room runs out."""
-    return old > 1 and (track.times[0] - track.times[old - 1] >= lag or old == NODES - 1)
+def anchor_must_advance(track, lag, old, longest):
+    """Whether the anchor, at the oldest node, has to go on: all of its next step is older than the lag, or room runs out."""
+    return old > 1 and (track.times[0] - track.times[next_node(track, old, longest)] >= lag or old == NODES - 1)
 
 
 @inner
 def next_node(track, old, longest):
-    """The youngest node within one long step ahead of `old`, at least the next one."""
+    """The youngest node within one step of at most `longest` ahead of `old`, at least the next one."""
     new = old - 1
-    while new > 0 and track.times[new - 1] - track.times[old] <= longest:
+    while new > 0 and track.times[new - 1] - track.times[old] <= longest + ROUNDING:
         new -= 1
     return new
 

@@ -6,16 +6,20 @@ writer, so order and bytes are those of doing it all in one place.
 
 from __future__ import annotations
 
+import fcntl
 import gc
 import pickle
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import IO, Any
 
 from ..errors import BagError
 from ..system.child_process import python_command
 
+ROOM = 2**20
+"""Bytes that a pipe may hold: a few batches, so that neither end waits for the other's next turn; no user may ask for more."""
 READY = "ready"
 """First thing a process sends: its imports are done."""
 END = "end"
@@ -43,6 +47,9 @@ class Pipe:
         command = python_command(module, *arguments)
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=inherited)
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
+        for end in (self._stdin, self._stdout):
+            assert end is not None
+            _make_roomy(end)
 
     def wait_ready(self) -> None:
         """Until the process has its imports done."""
@@ -80,6 +87,13 @@ class Pipe:
         """End the process at once, whatever it is doing."""
         self._process.kill()
         self._process.communicate()
+
+
+def _make_roomy(end: IO[bytes]) -> None:
+    """Let a pipe hold `ROOM` bytes, where the system can do that and allows it; else it stays as it is."""
+    if hasattr(fcntl, "F_SETPIPE_SZ"):
+        with suppress(OSError):
+            fcntl.fcntl(end, fcntl.F_SETPIPE_SZ, ROOM)
 
 
 def received(stream: IO[bytes]) -> Iterator[Any]:

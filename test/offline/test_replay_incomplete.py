@@ -166,6 +166,7 @@ def test_a_process_of_a_replay_that_dies_is_an_error(
         started[module.rsplit(".", 1)[1]] = pipe
 
     monkeypatch.setattr(Pipe, "__init__", kept)
+    monkeypatch.setattr("boom_twin.offline.process_pipe.ROOM", 2**16)  # so that not all of this short session is sent at once
 
     class Killing:
         def __init__(self, total: int) -> None:
