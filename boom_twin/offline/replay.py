@@ -375,7 +375,6 @@ def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Base
 @contextmanager
 def _unhurried_collector() -> Iterator[None]:
     """Keep the garbage collector away: a replay makes many small objects that last."""
-    gc.collect()
     gc.freeze()
     gc.disable()
     try:
