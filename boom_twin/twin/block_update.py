@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Str
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, STROKES, UNMATCHED, Limits, TwinState, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, new_output
 from .stroke_check import FAR
 from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 
@@ -201,19 +202,26 @@ class BlockUpdate:
         if self._judge is not None and self._shedding.leaves_out_health():
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
-            self._tell_health()
+            self._tell_health(run.newest // SLOT * SLOT)
             off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
             health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
             if health is not None:
                 news.health[row] = health
             self._modes.mask(self._judge.masked)
 
-    def _tell_health(self) -> None:
-        """Give the health monitor what has come since it was told last."""
+    def _tell_health(self, end: float = inf) -> None:
+        """Give the health monitor what has come since it was told last, but for what came last from `end` (ns) on.
+
+        The first of a slot so come with the rest of it, in one piece.
+        """
         found, at = self._found, self._boom.places
         if self._judge is None:
             return
-        new, last = (slice(told, count) for told, count in zip(self._told, found.counts.tolist(), strict=True))
+        counts = found.counts.tolist()
+        for which, stamps in enumerate((found.stamps, found.residual_stamps)):
+            while counts[which] > self._told[which] and stamps[counts[which] - 1] >= end:
+                counts[which] -= 1
+        new, last = (slice(told, count) for told, count in zip(self._told, counts, strict=True))
         if new.stop > new.start:
             rows = found.rows[new].copy()
             acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
