@@ -22,21 +22,12 @@ from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import SECOND, SENSORS, Array, Mount, Stream
 from .boom_predictor import BoomPredictor
+from .deviation_filter import USUAL_LOAD
 from .deviation_modes import DeviationModes
+from .deviation_readings import take_angles, take_forces, take_imu
+from .deviation_step import advance_estimate
 from .stroke_filter import corners
-from .tip_estimate import (
-    ACCELERATION_COVARIANCE,
-    FORCE_VARIANCE,
-    TIP_COVARIANCE,
-    USUAL_LOAD,
-    VARIANCES,
-    WIDTH,
-    advance_estimate,
-    take_angles,
-    take_forces,
-    take_imu,
-    write_estimate,
-)
+from .tip_estimate import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH, write_estimate
 
 SETTLED = 20.0  # s
 SHARE = 2.0  # of the variance of an integrated white jerk filtered at omega_c: P = 2 omega_c T r while omega_c T is small

@@ -20,18 +20,8 @@ from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
+from .deviation_filter import ANGLES_STAMP, COUNT, FED, MODES, SHARES, STAMP, STARTED, USUAL_LOAD, DeviationFilter
 from .sensor_model import Mounting
-from .tip_estimate import (
-    ANGLES_STAMP,
-    COUNT,
-    FED,
-    MODES,
-    SHARES,
-    STAMP,
-    STARTED,
-    USUAL_LOAD,
-    DeviationFilter,
-)
 
 LOADS = np.array([1.0, 31.0, 9.2])
 """See `DeviationFilter.loads`, in loads that turn the joints by one standard deviation of their sensors: 6.5 N of the

@@ -10,15 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.tip_estimate import (
-    ACCELERATION,
-    ACCELERATION_COVARIANCE,
-    FORCE,
-    FORCE_VARIANCE,
-    TIP,
-    TIP_COVARIANCE,
-    WIDTH,
-)
+from ..estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP, TIP_COVARIANCE, WIDTH
 from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]

@@ -11,9 +11,11 @@ import math
 
 import numpy as np
 
+from ..estimation.deviation_readings import take_angles, take_forces, take_imu
+from ..estimation.deviation_step import advance_estimate
 from ..estimation.look_ahead import follow
 from ..estimation.sensor_model import TURN
-from ..estimation.tip_estimate import advance_estimate, take_angles, take_forces, take_imu, write_estimate
+from ..estimation.tip_estimate import write_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK

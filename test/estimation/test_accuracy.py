@@ -10,7 +10,7 @@ import pytest
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.cli.accuracy import sensors_of, sets_of
 from boom_twin.errors import UsageError
-from boom_twin.estimation import tip_estimate
+from boom_twin.estimation import deviation_filter
 from boom_twin.estimation.accuracy import TipAccuracy, accuracy_at
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Array
@@ -42,7 +42,7 @@ def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, ARCH + 2e-5 * rng.normal(size=4)))
         assert report.prediction is not None and report.estimate is not None
         angles = report.prediction.joints if angles is None else angles
-        twin._modes.filter.level[0] = twin._modes.filter.loads[tip_estimate.USUAL_LOAD]
+        twin._modes.filter.level[0] = twin._modes.filter.loads[deviation_filter.USUAL_LOAD]
         twin.update(Sample(Stream.ANGLES, 5_000_000 * k, _noisy(angles, rng)))
         estimates.append(np.sqrt(report.estimate.tip_covariance[[0, 3, 5]]))
     assert estimates[-1] == pytest.approx(stated.tip, rel=0.1)

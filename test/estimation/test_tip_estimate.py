@@ -12,10 +12,13 @@ from boom_twin import load_scene, statics
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import StrokeNoise, natural_modes
 from boom_twin.config.settings import Settings
-from boom_twin.estimation import tip_estimate as tip
+from boom_twin.estimation import cause_mixture as mix
+from boom_twin.estimation import deviation_filter as layout
+from boom_twin.estimation import deviation_readings as reading
+from boom_twin.estimation import deviation_step as stepping
 from boom_twin.estimation.boom_predictor import BoomPredictor
+from boom_twin.estimation.deviation_filter import DeviationFilter
 from boom_twin.estimation.deviation_modes import DeviationModes
-from boom_twin.estimation.tip_estimate import DeviationFilter
 from boom_twin.health.baseline import Baseline
 from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
 from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
@@ -46,7 +49,7 @@ class Posed:
         self.modes.begin()
         self.modes.refresh(strokes, self.boom.angles, NO_NOISE)
         self.follow()
-        tip.start_state(self.modes.filter)
+        stepping.start_state(self.modes.filter)
 
     def rest(self, strokes: Array) -> None:
         boom = self.boom
@@ -58,8 +61,8 @@ class Posed:
         boom, f = self.boom, self.modes.filter
         results, estimates = rows_of(boom)
         moments = boom.compiled.bending @ boom.live.z
-        tip.follow_posture(f, boom.live)
-        tip.follow_prediction(f, results, estimates, moments, np.array(boom.plan.tables.gravity))
+        stepping.follow_posture(f, boom.live)
+        stepping.follow_prediction(f, results, estimates, moments, np.array(boom.plan.tables.gravity))
 
 
 def rows_of(boom: BoomPredictor) -> tuple[Results, Estimates]:
@@ -77,22 +80,32 @@ def posed(scene: Scene) -> Posed:
 
 def dense(f: DeviationFilter) -> tuple[Array, Array]:
     """Continuous system x' = A x + white noise of density Q, from the equations in the module's text."""
-    n, count, size = len(f.softness), int(f.status[tip.COUNT]), int(tip.states_of(f))
+    n, count, size = len(f.softness), int(f.status[layout.COUNT]), int(layout.states_of(f))
     a, q = np.zeros((size, size)), np.zeros((size, size))
     for k in (0, 1):
-        load, change, error = tip.LOAD + k, tip.LOAD_CHANGE + k, tip.ERROR + k
-        a[load, change], a[change, load], a[change, change] = 1.0, -(tip.LOAD_RATE**2), -2.0 * tip.LOAD_RATE
-        q[change, change] = 4.0 * tip.LOAD_RATE**3 * f.level[0] ** 2
-        a[error, error], q[error, error] = -1.0 / tip.JERK_TIME, 2.0 * f.pushes[k] / tip.JERK_TIME
-        q[tip.BIAS + k, tip.BIAS + k] = tip.BIAS_DRIFT**2
-        stays = tip.STAYING + k
-        a[stays, stays] = -1.0 / tip.STAY_TIME
-        q[stays, stays] = 2.0 * (tip.STAYS * f.loads[tip.USUAL_LOAD]) ** 2 / tip.STAY_TIME
+        load, change, error = layout.LOAD + k, layout.LOAD_CHANGE + k, layout.ERROR + k
+        a[load, change], a[change, load], a[change, change] = (
+            1.0,
+            -(stepping.LOAD_RATE**2),
+            -2.0 * stepping.LOAD_RATE,
+        )
+        q[change, change] = 4.0 * stepping.LOAD_RATE**3 * f.level[0] ** 2
+        a[error, error], q[error, error] = -1.0 / stepping.JERK_TIME, 2.0 * f.pushes[k] / stepping.JERK_TIME
+        q[layout.BIAS + k, layout.BIAS + k] = stepping.BIAS_DRIFT**2
+        stays = layout.STAYING + k
+        a[stays, stays] = -1.0 / layout.STAY_TIME
+        q[stays, stays] = 2.0 * (layout.STAYS * f.loads[layout.USUAL_LOAD]) ** 2 / layout.STAY_TIME
     for i in range(n):
-        q[tip.SHARES + i, tip.SHARES + i] = tip.SOFTENING**2
-    places = [0, 1, *range(tip.SHARES, tip.SHARES + 2 * n), tip.STAYING, tip.STAYING + 1]
+        q[layout.SHARES + i, layout.SHARES + i] = layout.SOFTENING**2
+    places = [
+        0,
+        1,
+        *range(layout.SHARES, layout.SHARES + 2 * n),
+        layout.STAYING,
+        layout.STAYING + 1,
+    ]
     for j in range(count):
-        at = tip.SHARES + 2 * n + 2 * j
+        at = layout.SHARES + 2 * n + 2 * j
         a[at, at + 1] = 1.0
         a[at + 1, at], a[at + 1, at + 1] = -(f.omega[j] ** 2), -f.decay[j]
         a[at + 1, places] = f.coupling[j]
@@ -113,7 +126,7 @@ def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
     f = posed.modes.filter
     rng = np.random.default_rng(1)
     f.density[:] = rng.uniform(0.0, 1e-4, len(f.density))
-    size = int(tip.states_of(f))
+    size = int(layout.states_of(f))
     scale = np.sqrt(np.diag(f.p)[:size] + 1e-12)
     start_x, start_p = scale * rng.normal(size=size), f.p[:size, :size].copy()
     a, q = dense(f)
@@ -121,7 +134,7 @@ def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
     for steps in (1, 4, 16):
         f.x[:size], f.p[:size, :size] = start_x, start_p
         for _ in range(steps):
-            tip.step_state(f, 0.02 / steps)
+            stepping.step_state(f, 0.02 / steps)
         turn, noise = discrete(a, q, 0.02)
         x, p = turn @ start_x, turn @ start_p @ turn.T + noise
         size_p = np.sqrt(np.diag(p) + 1e-12)
@@ -135,13 +148,13 @@ def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
 
 def test_corrections_are_those_of_the_dense_filter(posed: Posed) -> None:
     f = posed.modes.filter
-    size, rng = int(tip.states_of(f)), np.random.default_rng(2)
+    size, rng = int(layout.states_of(f)), np.random.default_rng(2)
     x, p = np.zeros(size), f.p[:size, :size].copy()
-    f.status[tip.FED] = 1
+    f.status[layout.FED] = 1
     for i in (0, 3):
-        tip.read_angle(f, i, f.row)
+        reading.read_angle(f, i, f.row)
         row, value, variance = f.row[:size].copy(), 1e-4 * rng.normal(), 1e-8
-        tip.correct(f, i, value, variance, 0.0)
+        reading.correct(f, i, value, variance, 0.0)
         gain = p @ row / (row @ p @ row + variance)
         x, p = x + gain * (value - row @ x), p - np.outer(gain, row @ p)
     scale = np.sqrt(np.diag(p) + 1e-15)
@@ -152,15 +165,15 @@ def test_corrections_are_those_of_the_dense_filter(posed: Posed) -> None:
 def test_a_late_reading_is_read_by_the_state_as_it_was(posed: Posed) -> None:
     """A row turned back by an age reads of the state now what the row read then: without noise and inputs."""
     f = posed.modes.filter
-    size = int(tip.states_of(f))
-    first = tip.SHARES + 8
+    size = int(layout.states_of(f))
+    first = layout.SHARES + 8
     f.x[first:size] = np.random.default_rng(3).normal(size=size - first)
-    tip.read_angle(f, 2, f.row)
+    reading.read_angle(f, 2, f.row)
     then = float(f.row[first:size] @ f.x[first:size])
-    tip.step_state(f, 0.03)
-    tip.read_angle(f, 2, f.row)
+    stepping.step_state(f, 0.03)
+    reading.read_angle(f, 2, f.row)
     f.p[:] = 0.0
-    tip.correct(f, 2, 0.0, 1.0, 0.03)
+    reading.correct(f, 2, 0.0, 1.0, 0.03)
     assert float(f.row[first:size] @ f.x[first:size]) == pytest.approx(then, rel=1e-9)
 
 
@@ -172,7 +185,7 @@ def test_motion_of_the_tip_follows_the_posture(scene: Scene, posture: str) -> No
     posed.rest(there)
     posed.follow()
     f, frames = posed.modes.filter, posed.boom.live.frames
-    for j in range(int(f.status[tip.COUNT])):
+    for j in range(int(f.status[layout.COUNT])):
         sides = []
         for sign in (1e-6, -1e-6):
             place, heading = frames[0, [FRAME_X, FRAME_Y]].copy(), frames[0, FRAME_ANGLE]
@@ -211,21 +224,21 @@ def test_shares_do_at_rest_what_the_changed_scene_does(scene: Scene, name: str, 
     changed = with_parameters(scene, {name: parameter(scene, name) * change})
     base, other = statics(scene, strokes=strokes), statics(changed, strokes=strokes)
     f, n = posed.modes.filter, 4
-    place = tip.SHARES + int(name[name.index("_") + 1]) - 1 + (n if name.startswith("section") else 0)
+    place = layout.SHARES + int(name[name.index("_") + 1]) - 1 + (n if name.startswith("section") else 0)
     f.x[:] = 0.0
     f.x[place] = 1.0 / change - 1.0
-    for j in range(int(f.status[tip.COUNT])):
-        f.x[tip.SHARES + 2 * n + 2 * j] = f.coupling[j, place - tip.SHARES + 2] * f.x[place] / f.omega[j] ** 2
+    for j in range(int(f.status[layout.COUNT])):
+        f.x[layout.SHARES + 2 * n + 2 * j] = f.coupling[j, place - layout.SHARES + 2] * f.x[place] / f.omega[j] ** 2
     found = []
     for axis in (0, 1):
-        tip.read_tip(f, axis, f.row)
+        reading.read_tip(f, axis, f.row)
         found.append(float(f.row @ f.x))
     assert found == pytest.approx(
         np.subtract(other.tip, base.tip).tolist(), abs=tolerance * float(np.hypot(*np.subtract(other.tip, base.tip)))
     )
     turns = np.subtract(other.joints, base.joints)
     for i in range(n):
-        tip.read_angle(f, i, f.row)
+        reading.read_angle(f, i, f.row)
         assert float(f.row @ f.x) == pytest.approx(turns[i], abs=tolerance * max(1e-3, float(np.abs(turns).max())))
 
 
@@ -276,25 +289,29 @@ def test_a_soft_cylinder_is_no_load(scene: Scene) -> None:
 def test_causes_are_weighed_as_gaussians_are(posed: Posed) -> None:
     """Chances, mean and covariance of the mixture, against Bayes' rule cause by cause in dense matrices."""
     f, rng = posed.modes.filter, np.random.default_rng(5)
-    size, shares = int(tip.states_of(f)), slice(tip.SHARES, tip.SHARES + 4)
-    f.status[tip.FED] = 1
+    size, shares = int(layout.states_of(f)), slice(layout.SHARES, layout.SHARES + 4)
+    f.status[layout.FED] = 1
     root = rng.normal(size=(size, size)) * np.sqrt(np.diag(f.p)[:size] + 1e-4)[:, None]
     f.p[:size, :size] = 0.1 * root @ root.T
     f.x[:size] = 0.0
     f.x[shares] = [0.01, 0.08, -0.02, 0.015]
     f.rows[:] = 0.0
     f.rows[:, :size] = rng.normal(size=(8, size))
-    tip.weigh_causes(f)
-    tip.read_covariances(f, size)
+    mix.weigh_causes(f)
+    mix.read_covariances(f, size)
 
     p, x, rows = f.p[:size, :size], f.x[:size], f.rows[:, :size]
-    wide, error2 = tip.SOFT**2 + 2.0 * tip.SCENE_ERROR**2, tip.SCENE_ERROR**2
+    wide, error2 = layout.SOFT**2 + 2.0 * layout.SCENE_ERROR**2, layout.SCENE_ERROR**2
     weights, means, covariances = [], [], []
     for held in [range(4), *([k for k in range(4) if k != i] for i in range(4)), []]:
-        at = tip.SHARES + np.array(held, int)
+        at = layout.SHARES + np.array(held, int)
         spread = p[np.ix_(at, at)] + error2 * np.eye(len(at))
         inverse = np.linalg.inv(spread)
-        prior = {4: 1.0 - 4.0 * tip.ONE_SOFT - tip.ALL_SOFT, 3: tip.ONE_SOFT, 0: tip.ALL_SOFT}[len(at)]
+        prior = {
+            4: 1.0 - 4.0 * mix.ONE_SOFT - mix.ALL_SOFT,
+            3: mix.ONE_SOFT,
+            0: mix.ALL_SOFT,
+        }[len(at)]
         weights.append(prior * math.exp(-0.5 * x[at] @ inverse @ x[at]) * math.sqrt(np.linalg.det(inverse) * wide ** len(at)))
         means.append(rows @ (x - p[:, at] @ inverse @ x[at]))
         covariances.append(rows @ (p - p[:, at] @ inverse @ p[at]) @ rows.T)
@@ -305,9 +322,9 @@ def test_causes_are_weighed_as_gaussians_are(posed: Posed) -> None:
     )
     assert f.chances == pytest.approx(chances, rel=1e-6)
     for a in range(8):
-        assert tip.mean_of(f, a, size) == pytest.approx(mean[a], rel=1e-6)
-        assert tip.covariance_of(f, a, a) == pytest.approx(covariance[a, a], rel=1e-6)
-    assert tip.covariance_of(f, 3, 5) == pytest.approx(covariance[3, 5], rel=1e-6)
+        assert mix.mean_of(f, a, size) == pytest.approx(mean[a], rel=1e-6)
+        assert mix.covariance_of(f, a, a) == pytest.approx(covariance[a, a], rel=1e-6)
+    assert mix.covariance_of(f, 3, 5) == pytest.approx(covariance[3, 5], rel=1e-6)
 
 
 def with_imu(scene: Scene, true: Scene, samples: list[Sample]) -> list[Sample]:
@@ -387,7 +404,7 @@ def test_the_covariance_stays_one(scene: Scene) -> None:
     for sample in samples:
         twin.update(sample)
     f = twin._modes.filter
-    size = int(tip.states_of(f))
+    size = int(layout.states_of(f))
     p = f.p[:size, :size]
     scale = np.sqrt(np.diag(p)[:, None] * np.diag(p)) + 1e-300
     normal = p / scale
@@ -446,4 +463,4 @@ def test_a_boom_without_springs_or_beams_has_one_too(scene: Scene, drop: str) ->
     f = twin._modes.filter
     assert np.isfinite(row_of(estimates[-1])).all() and (estimates[-1].tip_covariance[[0, 3, 5]] > 0.0).all()
     if drop == "k":
-        assert not f.x[tip.SHARES : tip.SHARES + 4].any()
+        assert not f.x[layout.SHARES : layout.SHARES + 4].any()

@@ -34,8 +34,8 @@ import numpy as np
 
 from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
+from ...estimation.deviation_filter import oscillate
 from ...estimation.sensor_model import Reading, specific_force
-from ...estimation.tip_estimate import oscillate
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
 from .kalman_update import filter_block

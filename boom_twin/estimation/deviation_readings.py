@@ -1,0 +1,198 @@
+"""Measurements of the filter behind the estimate of the tip: rows by which sensors read its state, and corrections by them.
+
+What the states are, and the equations: `boom_twin.estimation.tip_estimate`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from ..types import NANO
+from .deviation_filter import (
+    ANGLE,
+    ANGLES_STAMP,
+    BIAS,
+    COUNT,
+    ERROR,
+    FED,
+    FELT_X,
+    FELT_Y,
+    LEAST_LOAD,
+    MOST_LOAD,
+    SHARES,
+    SOFT,
+    STAMP,
+    add_row,
+    clear,
+    covary,
+    input_place,
+    mode_place,
+    oscillate,
+    states_of,
+)
+from .deviation_step import LONGEST_STEP, add_unknown
+
+AGILITY, RETREAT = 2.0, 0.03  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
+UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
+ALIKE = 4.0  # most that one product of successive innovations counts
+
+OLDEST = 0.25  # s, age of a sample that still counts
+
+
+@inner
+def read_tip(f, axis, row):
+    """Row of the tip's x, y or angle."""
+    n, size = f.softness.shape[0], states_of(f)
+    clear(row, size)
+    for i in range(n):
+        row[SHARES + i] = f.lever[i, axis] * f.drawn[i]
+    for j in range(f.status[COUNT]):
+        at, still = mode_place(f, j), f.tip[j, axis] / (f.omega[j] * f.omega[j])
+        row[at] = f.tip[j, axis]
+        for i in range(n):
+            row[SHARES + i] -= still * f.coupling[j, 2 + i]
+
+
+@inner
+def read_angle(f, i, row):
+    """Row of an angle sensor; gives the variance that strokes' noise adds to it."""
+    n, size, variance = f.softness.shape[0], states_of(f), 0.0
+    clear(row, size)
+    for k in range(n):
+        if k == i or (f.absolute[i] and k < i):
+            row[SHARES + k] = f.drawn[k] / f.slopes[k]
+            variance += f.variances[k] / (f.slopes[k] * f.slopes[k])
+    for j in range(f.status[COUNT]):
+        at, still = mode_place(f, j), f.turns[j, i] / (f.omega[j] * f.omega[j])
+        row[at] = f.turns[j, i]
+        for k in range(n):
+            row[SHARES + k] -= still * f.coupling[j, 2 + k]
+            if not f.absolute[i]:
+                row[SHARES + n + k] -= still * f.coupling[j, 2 + n + k]
+    return variance
+
+
+@inner
+def read_force(f, i, row):
+    """Row of a cylinder's force, which no share changes at rest."""
+    n, size = f.softness.shape[0], states_of(f)
+    clear(row, size)
+    for j in range(f.status[COUNT]):
+        at, still = mode_place(f, j), f.forces[j, i] / (f.omega[j] * f.omega[j])
+        row[at] = f.forces[j, i]
+        for k in range(2 * n):
+            row[SHARES + k] -= still * f.coupling[j, 2 + k]
+
+
+@inner
+def read_acceleration(f, x, y, turn, turned, row):
+    """Row of the tip's acceleration along (x, y), `turn` times its angular one and `turned` times its turn beside."""
+    size = states_of(f)
+    clear(row, size)
+    row[ERROR], row[ERROR + 1] = x, y
+    for j in range(f.status[COUNT]):
+        at = mode_place(f, j)
+        along = x * f.tip[j, 0] + y * f.tip[j, 1] + turn * f.tip[j, 2]
+        row[at] = -f.omega[j] * f.omega[j] * along + turned * f.tip[j, 2]
+        row[at + 1] = -f.decay[j] * along
+        for b in range(f.coupling.shape[1]):
+            row[input_place(f, b)] += along * f.coupling[j, b]
+
+
+@inner
+def age_of(f, stamp):
+    """Age (s) of what was measured at `stamp` (ns). The filter runs from the first reading on that is not too old.
+
+    What cylinders may be off by will then show.
+    """
+    age = (f.status[STAMP] - stamp) * NANO
+    if f.status[FED] == 0 and age <= OLDEST:
+        f.status[FED] = 1
+        for i in range(f.softness.shape[0]):
+            if f.softness[i] > 0.0:
+                add_unknown(f, 2 + i, SOFT)
+    return age
+
+
+@inner
+def take_angles(f, residuals, first, stamp):
+    """Use what angle sensors read at `stamp` (ns) less what they should have read (rad, NaN = not measured)."""
+    age = age_of(f, stamp)
+    if age > OLDEST:
+        return
+    alike, count = 0.0, 0
+    for i in range(f.softness.shape[0]):
+        if usable(f, first + i, residuals[i]):
+            variance = f.noise[first + i] + read_angle(f, i, f.row)
+            alike += correct(f, first + i, residuals[i], variance, age)
+            count += 1
+    if count > 0 and stamp > f.status[ANGLES_STAMP]:
+        h = min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP)
+        level = f.level[0] * math.exp(AGILITY * h * (alike / math.sqrt(count) - RETREAT))
+        f.level[0] = min(max(level, f.loads[LEAST_LOAD]), f.loads[MOST_LOAD])
+        f.status[ANGLES_STAMP] = stamp
+
+
+@inner
+def take_imu(f, residuals, first, stamp):
+    """Likewise of the tip IMU's x and z, m/s^2."""
+    age = age_of(f, stamp)
+    if age > OLDEST:
+        return
+    c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
+    if usable(f, first, residuals[0]):
+        read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
+        f.row[BIAS] = 1.0
+        correct(f, first, residuals[0], f.noise[first], age)
+    if usable(f, first + 1, residuals[1]):
+        read_acceleration(f, -s, c, 0.0, -c * f.now[FELT_X] - s * f.now[FELT_Y], f.row)
+        f.row[BIAS + 1] = 1.0
+        correct(f, first + 1, residuals[1], f.noise[first + 1], age)
+
+
+@inner
+def take_forces(f, residuals, first, stamp):
+    """Likewise of the cylinder forces, N."""
+    age = age_of(f, stamp)
+    if age > OLDEST:
+        return
+    for i in range(f.softness.shape[0]):
+        if usable(f, first + i, residuals[i]):
+            read_force(f, i, f.row)
+            correct(f, first + i, residuals[i], f.noise[first + i], age)
+
+
+@inner
+def usable(f, channel, residual):
+    """Whether a reading may be used."""
+    return math.isfinite(residual) and not f.masked[channel]
+
+
+@inner
+def correct(f, channel, residual, variance, age):
+    """Correct the state by one reading that is read by `f.row`; gives the product of its innovation with the one before."""
+    size = states_of(f)
+    x, p, row, gain = f.x, f.p, f.row, f.gain
+    if age > 0.0:
+        for j in range(f.status[COUNT]):
+            at = mode_place(f, j)
+            a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
+            row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+    covary(p, row, gain, size)
+    spread, off = variance, residual
+    for k in range(size):
+        spread += row[k] * gain[k]
+        off -= row[k] * x[k]
+    innovation = off / math.sqrt(spread)
+    alike = min(max(innovation * f.last[channel], -ALIKE), ALIKE)
+    f.last[channel] = innovation
+    if abs(innovation) > UNLIKELY:
+        spread *= (innovation / UNLIKELY) ** 2
+    deviation = math.sqrt(spread)
+    for k in range(size):
+        gain[k] /= deviation
+    add_row(x, off / deviation, gain, size)
+    for k in range(size):
+        add_row(p[k], -gain[k], gain, size)
+    return alike

@@ -1,0 +1,270 @@
+"""Time step of the filter behind the estimate of the tip: how load, shares and modes go on to the newest strokes.
+
+What the states are, and the equations: `boom_twin.estimation.tip_estimate`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
+from ..types import NANO
+from .deviation_filter import (
+    ANGLE,
+    BIAS,
+    COUNT,
+    ERROR,
+    FED,
+    FELT_X,
+    FELT_Y,
+    LOAD,
+    LOAD_CHANGE,
+    SCENE_ERROR,
+    SHARES,
+    SOFTENING,
+    STAMP,
+    STARTED,
+    STAY_TIME,
+    STAYING,
+    STAYS,
+    STEP,
+    USUAL_LOAD,
+    add_row,
+    clear,
+    copy_columns,
+    input_place,
+    mix_rows,
+    mode_place,
+    oscillate,
+    states_of,
+)
+
+LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
+SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
+BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
+LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
+
+LONGEST_STEP = 0.05  # s, of the covariance's differential equation
+
+
+@inner
+def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
+    """Go on to the newest strokes, of this stamp (ns), and follow the prediction there.
+
+    Parameters
+    ----------
+    f : DeviationFilter
+    live : State
+        The boom as predicted.
+    results, estimates : Results, Estimates
+        See `boom_twin.kernels.result_row`.
+    moments : ndarray, shape (stations,)
+        Predicted, N m.
+    gravity : ndarray, shape (2,)
+        m/s^2.
+    """
+    h = (stamp - f.status[STAMP]) * NANO
+    f.status[STAMP], f.now[STEP] = stamp, h
+    follow_posture(f, live)
+    follow_prediction(f, results, estimates, moments, gravity)
+    if f.status[STARTED] == 0:
+        start_state(f)
+    if f.status[FED] == 0 or h <= 0.0:
+        return
+    steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
+    for _ in range(steps):
+        step_state(f, h / steps)
+    if not is_finite(f):
+        start_state(f)
+        f.status[FED] = 0
+
+
+@inner
+def is_finite(f):
+    """Whether state and variances are numbers: readings near the largest that are taken may have driven them beyond."""
+    total = 0.0
+    for k in range(states_of(f)):
+        total += abs(f.x[k]) + f.p[k, k]
+    return math.isfinite(total)
+
+
+@inner
+def start_state(f):
+    """What is not known at the start: load and shares, with the deflection that they have caused, and vibration beside."""
+    n = f.softness.shape[0]
+    for k in range(f.x.shape[0]):
+        f.x[k] = 0.0
+        for b in range(f.x.shape[0]):
+            f.p[k, b] = 0.0
+    f.level[0] = f.loads[USUAL_LOAD]
+    for b in range(2):
+        add_unknown(f, b, f.loads[USUAL_LOAD])
+        add_unknown(f, 2 + 2 * n + b, STAYS * f.loads[USUAL_LOAD])
+        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.loads[USUAL_LOAD]) ** 2
+        f.p[ERROR + b, ERROR + b] = f.pushes[b]
+        f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
+    for i in range(n):
+        if f.softness[i] > 0.0:
+            add_unknown(f, 2 + i, SCENE_ERROR)
+        add_unknown(f, 2 + n + i, f.sections_off[i])
+    for j in range(f.status[COUNT]):
+        at = mode_place(f, j)
+        swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
+        f.p[at, at] += swing * swing
+        f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
+    f.status[STARTED] = 1
+
+
+@inner
+def add_unknown(f, b, deviation):
+    """Add to what is not known an input of the modes, of this standard deviation, and what it has done at rest."""
+    size = states_of(f)
+    clear(f.row, size)
+    f.row[input_place(f, b)] = deviation
+    for j in range(f.status[COUNT]):
+        at = mode_place(f, j)
+        f.row[at] = deviation * f.coupling[j, b] / (f.omega[j] * f.omega[j])
+    for k in range(size):
+        for i in range(size):
+            f.p[k, i] += f.row[k] * f.row[i]
+
+
+@inner
+def follow_posture(f, live):
+    """Motion of the tip and turns of the angle sensors by the modes, and of the tip by strokes, as the boom now stands."""
+    n, last = f.softness.shape[0], live.frames.shape[0] - 1
+    tip_x, tip_y = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
+    for j in range(f.status[COUNT]):
+        x, y, turn = 0.0, 0.0, 0.0
+        for k in range(1, last + 1):
+            before = live.frames[k - 1]
+            c, s = before[FRAME_COS], before[FRAME_SIN]
+            own = f.relative[k, j]
+            x += c * own[0] - s * own[1] - own[2] * (tip_y - live.frames[k, FRAME_Y])
+            y += s * own[0] + c * own[1] + own[2] * (tip_x - live.frames[k, FRAME_X])
+            turn += own[2]
+            for i in range(n):
+                if f.absolute[i] and f.sensed[i] == k:
+                    f.turns[j, i] = turn
+        f.tip[j, 0], f.tip[j, 1], f.tip[j, 2] = x, y, turn
+    for i in range(n):
+        pivot = live.frames[f.roots[i]]
+        f.lever[i, 0] = -(tip_y - pivot[FRAME_Y]) / f.slopes[i]
+        f.lever[i, 1] = (tip_x - pivot[FRAME_X]) / f.slopes[i]
+        f.lever[i, 2] = 1.0 / f.slopes[i]
+
+
+@inner
+def follow_prediction(f, results, estimates, moments, gravity):
+    """How load and shares drive the modes at the predicted forces and moments."""
+    n = f.softness.shape[0]
+    kept = math.exp(-min(max(f.now[STEP], 0.0) / SLOW, 50.0)) if f.status[STARTED] else 0.0
+    for i in range(n):
+        newest = results.cylinder_forces[i] * f.softness[i]
+        f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * newest
+        f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
+        f.variances[i] = estimates.variances[i]
+    follow_errors(f)
+    for j in range(f.status[COUNT]):
+        c = f.coupling[j]
+        c[0], c[1] = f.tip[j, 0], f.tip[j, 1]
+        c[2 + 2 * n], c[3 + 2 * n] = c[0], c[1]
+        for i in range(n):
+            c[2 + i], c[2 + n + i] = f.forces[j, i] * f.drawn[i], kept * c[2 + n + i]
+        for k in range(moments.shape[0]):
+            c[2 + n + f.sections[k]] += (1.0 - kept) * f.bending[j, k] * moments[k]
+    f.now[ANGLE] = results.tip[0, 2]
+    f.now[FELT_X], f.now[FELT_Y] = results.tip[2, 0] - gravity[0], results.tip[2, 1] - gravity[1]
+
+
+@inner
+def follow_errors(f):
+    """Variances of the acceleration that errors of the strokes push the tip with."""
+    f.pushes[0], f.pushes[1] = LEAST_ERROR * LEAST_ERROR, LEAST_ERROR * LEAST_ERROR
+    for i in range(f.softness.shape[0]):
+        x, y = 0.0, 0.0
+        for j in range(f.status[COUNT]):
+            x += f.forces[j, i] * f.tip[j, 0]
+            y += f.forces[j, i] * f.tip[j, 1]
+        f.pushes[0] += x * x * f.variances[i]
+        f.pushes[1] += y * y * f.variances[i]
+
+
+@inner
+def step_state(f, h):
+    """Mean and covariance h (s) later: half a step of the inputs, one of the modes under these, the other half (Strang)."""
+    size, inputs = states_of(f), f.coupling.shape[1]
+    x, p, row = f.x, f.p, f.row
+    step_inputs(f, 0.5 * h, size)
+    for j in range(f.status[COUNT]):
+        c, at = f.coupling[j], mode_place(f, j)
+        a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], h)
+        g1, g2 = (1.0 - a11) / (f.omega[j] * f.omega[j]), -a21 / (f.omega[j] * f.omega[j])
+        force = 0.0
+        clear(row, size)
+        for b in range(inputs):
+            place = input_place(f, b)
+            force += c[b] * x[place]
+            add_row(row, c[b], p[place], size)
+        x[at], x[at + 1] = a11 * x[at] + a12 * x[at + 1] + g1 * force, a21 * x[at] + a22 * x[at + 1] + g2 * force
+        mix_rows(p[at], p[at + 1], a11, a12, a21, a22, f.gain, size)
+        add_row(p[at], g1, row, size)
+        add_row(p[at + 1], g2, row, size)
+        by_q, by_rate = 0.0, 0.0
+        for b in range(inputs):
+            place = input_place(f, b)
+            by_q += c[b] * p[at, place]
+            by_rate += c[b] * p[at + 1, place]
+        _, b12, _, b22 = oscillate(f.omega[j], f.decay[j], 0.5 * h)
+        share = f.density[j] * h / 6.0  # of the noise's integral, by Simpson's rule
+        q2 = a11 * p[at, at] + a12 * p[at, at + 1] + g1 * by_q + share * (4.0 * b12 * b12 + a12 * a12)
+        both = a21 * p[at, at] + a22 * p[at, at + 1] + g2 * by_q + share * (4.0 * b12 * b22 + a12 * a22)
+        rate2 = a21 * p[at + 1, at] + a22 * p[at + 1, at + 1] + g2 * by_rate + share * (1.0 + 4.0 * b22 * b22 + a22 * a22)
+        copy_columns(p, at, size)
+        copy_columns(p, at + 1, size)
+        p[at, at], p[at, at + 1], p[at + 1, at], p[at + 1, at + 1] = q2, both, both, rate2
+    step_inputs(f, 0.5 * h, size)
+    kept = math.exp(-h / JERK_TIME)
+    for b in range(2):
+        fade(f, ERROR + b, kept, f.pushes[b], size)
+        f.p[BIAS + b, BIAS + b] += BIAS_DRIFT * BIAS_DRIFT * h
+
+
+@inner
+def step_inputs(f, h, size):
+    """Load and shares h (s) later."""
+    for b in range(2):
+        step_load(f, LOAD + b, LOAD_CHANGE + b, h, size)
+        fade(f, STAYING + b, math.exp(-h / STAY_TIME), (STAYS * f.loads[USUAL_LOAD]) ** 2, size)
+    for i in range(f.softness.shape[0]):
+        if f.drawn[i] != 0.0:
+            lag = f.x[SHARES + i] * f.ahead[i]
+            f.p[SHARES + i, SHARES + i] += (SOFTENING * SOFTENING + lag * lag / SLOW) * h
+
+
+@inner
+def step_load(f, place, change, h, size):
+    """A component of the load and its rate h (s) later, at these places: exact."""
+    x, p, e, level2 = f.x, f.p, math.exp(-LOAD_RATE * h), f.level[0] * f.level[0]
+    a11, a12, a21, a22 = e * (1.0 + LOAD_RATE * h), e * h, -e * LOAD_RATE * LOAD_RATE * h, e * (1.0 - LOAD_RATE * h)
+    x[place], x[change] = a11 * x[place] + a12 * x[change], a21 * x[place] + a22 * x[change]
+    mix_rows(p[place], p[change], a11, a12, a21, a22, f.gain, size)
+    rate2 = LOAD_RATE * LOAD_RATE * level2  # at rest in itself, load and rate have these variances and no covariance
+    load = a11 * p[place, place] + a12 * p[place, change] + level2 - a11 * a11 * level2 - a12 * a12 * rate2
+    both = a21 * p[place, place] + a22 * p[place, change] - a11 * a21 * level2 - a12 * a22 * rate2
+    rate = a21 * p[change, place] + a22 * p[change, change] + rate2 - a21 * a21 * level2 - a22 * a22 * rate2
+    copy_columns(p, place, size)
+    copy_columns(p, change, size)
+    p[place, place], p[place, change], p[change, place], p[change, change] = load, both, both, rate
+
+
+@inner
+def fade(f, place, kept, variance, size):
+    """A step of the Gauss-Markov process at `place`, of this variance."""
+    f.x[place] *= kept
+    row = f.p[place]
+    for k in range(size):
+        row[k] *= kept
+    row[place] = kept * row[place] + variance * (1.0 - kept * kept)
+    copy_columns(f.p, place, size)
