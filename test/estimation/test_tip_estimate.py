@@ -44,7 +44,7 @@ class Posed:
         self.modes = DeviationModes(scene, self.boom.plan, settings or Settings(), ())
         self.rest(strokes)
         self.modes.begin()
-        self.modes.refresh(strokes, self.boom.angles, NO_NOISE)
+        self.modes.refresh(strokes, self.boom.angles, self.boom.live, NO_NOISE)
         self.follow()
         tip.start_state(self.modes.filter)
 
