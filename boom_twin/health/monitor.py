@@ -12,6 +12,7 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
+from .delay_monitor import DelayMonitor
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
@@ -30,6 +31,8 @@ CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
 """Those whose noise is told: what an IMU reads of vibration is not told from noise."""
+DELAYED = (Stream.IMU, Stream.FORCES)
+"""Those whose lag is told by `DelayMonitor`; that of the angles is among the causes of residuals."""
 
 
 class HealthMonitor:
@@ -61,6 +64,7 @@ class HealthMonitor:
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
+        self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -77,6 +81,8 @@ class HealthMonitor:
         self._ended += self.residuals.close(self._told)
         self._noise2 = {stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED}
         self.residuals.begin()
+        for monitor in self._delays.values():
+            monitor.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
@@ -120,6 +126,7 @@ class HealthMonitor:
         for monitor in self._sensors.values():
             alarms += monitor.alarms
         alarms += self.residuals.alarms
+        alarms += [monitor.alarm for monitor in self._delays.values() if monitor.alarm is not None]
         measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
 
@@ -132,6 +139,7 @@ class HealthMonitor:
             if stream in CHECKED and stream is not Stream.STROKES:
                 expected = raw - left if is_followed else np.full_like(raw, np.nan)
                 news += self._check(stream, block, stamps, raw, expected)
+        news += self._judge_delays(block, readings) if is_followed else []
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
@@ -141,6 +149,16 @@ class HealthMonitor:
             return news
         averaged = self._means(block, predictions, readings)
         return news + self.residuals.take(averaged, self._noise)
+
+    def _judge_delays(self, block: Block, readings: dict[Stream, MeasuredRows]) -> list[Alarm]:
+        """Look for lags; gives the alarms that began, changed or ended."""
+        news: list[Alarm] = []
+        for stream, monitor in self._delays.items():
+            stamps, raw, left = readings[stream]
+            if stream in self._sensors:
+                left = np.where(self._sensors[stream].masked, np.nan, left)
+            news += monitor.take(block.number, np.asarray((stamps - block.number * BLOCK) * NANO), left, raw - left, block.end)
+        return news
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
