@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,8 +126,11 @@ class HealthMonitor:
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
             alarms += monitor.alarms
-        alarms += self.residuals.alarms
-        alarms += [monitor.alarm for monitor in self._delays.values() if monitor.alarm is not None]
+        lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
+        for alarm in self.residuals.alarms:  # which take vibration for a load: the size is the other's
+            lag = lags.get(alarm.cause)
+            alarms.append(alarm if lag is None else replace(alarm, told=lag.told, ranked=lag.ranked))
+        alarms += lags.values()
         measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
 
@@ -185,16 +189,15 @@ class HealthMonitor:
             if stream in self._sensors:
                 mean[self._sensors[stream].masked] = np.nan
             found.append((mean, count))
-        span = int(stamps[-1] - stamps[0]) * NANO
-        joints = predictions.joints
-        rates = (joints[-1] - joints[0]) / span if span > 0.0 else np.zeros_like(joints[0])
+        imu = readings[Stream.IMU]
+        rates = np.concatenate([_rates(stamps, predictions.joints), _rates(imu.stamps, imu.raw - imu.left)])
         return BlockMeans(
             start=block.number * BLOCK,
             left=np.concatenate([mean for mean, _ in found]),
             counts=np.concatenate([count for _, count in found]),
             strokes=predictions.strokes[len(stamps) // 2],
             variances=predictions.variances.mean(axis=0),
-            rates=rates,
+            rates=np.where(np.isfinite(rates), rates, 0.0),
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
             motion=readings[Stream.IMU if len(readings[Stream.IMU].stamps) else Stream.ANGLES],
         )
@@ -214,6 +217,13 @@ class HealthMonitor:
             return np.full(2, np.nan)
         by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + self._tip**2
         return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))
+
+
+def _rates(stamps: NDArray[np.int64], values: Array) -> Array:
+    """Mean rate (channels,) of `values` (k, channels) at `stamps` (ns), per s."""
+    if len(stamps) < 2 or stamps[-1] <= stamps[0]:
+        return np.zeros(values.shape[1])
+    return np.asarray((values[-1] - values[0]) / (int(stamps[-1] - stamps[0]) * NANO))
 
 
 def warm_up() -> None:

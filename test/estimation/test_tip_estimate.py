@@ -15,6 +15,7 @@ from boom_twin.config.settings import Settings
 from boom_twin.estimation import tip_estimate as tip
 from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.estimation.posture_modes import GRID
 from boom_twin.estimation.tip_estimate import DeviationFilter
 from boom_twin.health.baseline import Baseline
 from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
@@ -40,7 +41,7 @@ class Posed:
     """A boom at rest, and its filter there."""
 
     def __init__(self, scene: Scene, strokes: Array, settings: Settings | None = None) -> None:
-        self.boom = BoomPredictor(scene)
+        self.boom, self.strokes = BoomPredictor(scene), strokes
         self.modes = DeviationModes(scene, self.boom.plan, settings or Settings(), ())
         self.rest(strokes)
         self.modes.begin()
@@ -192,7 +193,10 @@ def test_motion_of_the_tip_follows_the_posture(scene: Scene, posture: str) -> No
 
 
 def test_modes_move_the_tip_as_they_do_where_they_were_made(posed: Posed) -> None:
+    """At the nearest strokes of the grid."""
     plan, f = posed.boom.plan, posed.modes.filter
+    posed.rest(np.round(posed.strokes / GRID) * GRID)
+    posed.follow()
     modes = natural_modes(plan, posed.boom.live, posed.boom.compiled.work, 4, 1e-6)
     for j, mode in enumerate(modes):
         motion = mode.motion[plan.tables.tip : plan.tables.tip + 3]
