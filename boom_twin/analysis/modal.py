@@ -21,7 +21,7 @@ through a resonance: Crandall and Mark, Random Vibration in Mechanical Systems, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -96,10 +96,14 @@ class _AtRest:
         _, count = _checked(*count_below(*self._boom, omega, self._scratch))
         return count
 
-    def lowest(self, count: int, width: float, highest: float) -> Iterator[float]:
-        """The lowest `count` natural frequencies below `highest` (rad/s), ascending, to the relative accuracy `width`."""
-        base, low = self.count_below(0.0), 0.0
-        for k in range(min(count, self.count_below(highest) - base)):
+    def lowest(self, count: int, width: float, highest: float, known: Sequence[float] = ()) -> Iterator[float]:
+        """The lowest `count` natural frequencies below `highest` (rad/s), ascending, to the relative accuracy `width`.
+
+        Of the lowest, which are `known`, none is given.
+        """
+        base = self.count_below(0.0)
+        low = known[-1] * (1.0 - 1e-9) if known else 0.0
+        for k in range(len(known), min(count, self.count_below(highest) - base)):
             omega = self.frequency(base, k, low, width)
             yield omega
             low = omega * (1.0 - 1e-9)
@@ -143,12 +147,37 @@ def natural_modes(
 
     `width` is the relative accuracy of the frequencies. The state stays as it is.
     """
-    boom = _AtRest(plan, state, work)
-    modes: list[Mode] = []
-    for omega in boom.lowest(count, width, highest):
-        modes.append(_mode(plan, state, work, boom, omega, modes))
-    place(plan.tables, state, work)
-    return tuple(modes)
+    return ModeSeries(plan, state, work, width).lowest(count, highest)
+
+
+class ModeSeries:
+    """Natural modes about the equilibrium in `state`, computed from the lowest on as they are asked for, and kept.
+
+    Parameters
+    ----------
+    plan : Plan
+    state : State
+        Stays as it is, and must.
+    work : Work
+        Scratch.
+    width : float
+        Relative accuracy of the frequencies.
+    """
+
+    def __init__(self, plan: Plan, state: State, work: Work, width: float) -> None:
+        self._plan, self._state, self._work, self._width = plan, state, work, width
+        self._boom, self._omegas, self._modes = _AtRest(plan, state, work), list[float](), list[Mode]()
+
+    def lowest(self, count: int, highest: float) -> tuple[Mode, ...]:
+        """The lowest `count` modes below `highest` (rad/s), or all if there are fewer."""
+        parts, below = (self._plan, self._state, self._work), sum(omega < highest for omega in self._omegas)
+        if below == len(self._omegas) < count:
+            for omega in self._boom.lowest(count, self._width, highest, tuple(self._omegas)):
+                self._modes.append(_mode(*parts, self._boom, omega, self._modes))
+                self._omegas.append(omega)
+            place(self._plan.tables, self._state, self._work)
+            below = len(self._omegas)
+        return tuple(self._modes[: min(count, below)])
 
 
 def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
@@ -328,18 +357,24 @@ class StrokeNoise:
 
 def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum) -> StrokeNoise:
     """Propagate noise of the strokes to the natural modes within the band of the quickest smoother."""
-    n = plan.joints
     modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=float(spectrum.corners[-1]))
+    found = [(mode, damping_ratio(plan, mode), joint_increments(plan, state, work, mode)) for mode in modes]
+    return stroke_noise_of(plan, found, spectrum)
+
+
+def stroke_noise_of(plan: Plan, found: Sequence[tuple[Mode, float, Array]], spectrum: StrokeSpectrum) -> StrokeNoise:
+    """Propagate noise of the strokes to modes with their damping ratios, and what they turn the joints by (n,)."""
+    n, modes = plan.joints, tuple(mode for mode, _, _ in found)
     joints, response, decay = [], [], []
-    for mode in modes:
-        omega, zeta = 2.0 * np.pi * mode.frequency, damping_ratio(plan, mode)
-        joints.append(joint_increments(plan, state, work, mode) ** 2)
+    for mode, zeta, turns in found:
+        omega = 2.0 * np.pi * mode.frequency
+        joints.append(turns**2)
         response.append(mode.increments[plan.tables.cylinders.z] ** 2 / (4.0 * max(zeta, 1e-6) * omega**3))
         decay.append(2.0 * zeta * omega)
-    found = StrokeNoise(
+    noise = StrokeNoise(
         np.array(joints).reshape(-1, n), np.array(decay), np.array(response).reshape(-1, n), np.zeros(len(modes)), modes
     )
-    return replace(found, collected=found.collected_of(spectrum))
+    return replace(noise, collected=noise.collected_of(spectrum))
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

@@ -25,12 +25,15 @@ class Peers:
         Those of them that cannot hear or be heard for their quality of service, and why, in words.
     ids : sequence of str
         GIDs, hexadecimal, in the order of `names`.
+    rivals : int
+        Publishers of an output beside the node's own.
     """
 
     address: str = ""
     names: Sequence[str] = ()
     incompatible: Sequence[str] = ()
     ids: Sequence[str] = ()
+    rivals: int = 0
 
 
 class TopicJudge:
@@ -111,10 +114,14 @@ class OutputsJudge:
 
     def status(self, peers: Iterable[Peers], at: Evaluation) -> Status:
         """State of the outputs; `peers` are their subscribers."""
-        judge = self._judge
+        judge, shared = self._judge, 0
         judge.begin(at)
         for each in peers:
+            shared += each.rivals > 0
             judge.note(f"subscribers {each.address}", len(each.names))
             if each.incompatible:
                 judge.fault(Level.WARN, f"{each.address}: incompatible QoS: {'; '.join(each.incompatible)}")
+        if shared:
+            told = f"{shared} of them are published by another node too: give each node a namespace of its own, or end one"
+            judge.fault(Level.ERROR, told)
         return judge.finish("offered")

@@ -82,7 +82,7 @@ def accuracy_at(
     spectrum = StrokeSpectrum(settings.stroke_variance, 1.0 / rate, quietest, at_rest, np.zeros(plan.joints))
     noise = stroke_noise(plan, live, work, spectrum)
     modes.begin()
-    modes.refresh(strokes, angles, noise)
+    modes.refresh(strokes, angles, live, noise)
     row, results = boom.compiled.row, first_row(plan, live)
     row[:] = 0.0
     row[: len(results)] = results

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -28,18 +27,17 @@ class UndeflectedPredictor:
         self._plan, self._pivot = plan, np.array(scene.base.pivot)
         self._lengths = np.array([section.length for section in scene.sections])
         self._reach = np.concatenate([[0.0], np.cumsum(self._lengths)])
-        self._middle = np.radians([sum(joint.range_deg) / 2 for joint in scene.joints])
+        self._along = self._points_along(np.radians([sum(joint.range_deg) / 2 for joint in scene.joints]))
 
     def at(self, angles: Array) -> Array:
         """Points (k, 2), m, at relative joint `angles` (rad), shape (n,)."""
         _, pivots = rigid_chain(self._pivot, self._lengths, angles)
         return np.stack([np.interp(self._along, self._reach, column) for column in pivots.T], axis=1)
 
-    @cached_property
-    def _along(self) -> Array:
-        """How far along the sections every point is, m, shape (k,): all pivots are among the points."""
+    def _points_along(self, angles: Array) -> Array:
+        """How far along the sections every point is, m, shape (k,): all pivots are among the points; found at some angles."""
         state, work = self._plan.state(), self._plan.work()
-        set_undeformed(self._plan, state, self._middle)
+        set_undeformed(self._plan, state, angles)
         place(self._plan.tables, state, work)
         line = outline(self._plan, state, work.position)
         steps = np.hypot(*np.diff(line, axis=0, prepend=self._pivot[None, :]).T)

@@ -9,18 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.bending_moments import flexibility_by_station, moments_by_unknowns, stations
-from ..analysis.equilibrium import settle
-from ..analysis.modal import Mode, StrokeNoise, along, damping_ratio, natural_modes
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..analysis.modal import StrokeNoise
+from ..compiler.plan import Plan
 from ..config.settings import Settings
-from ..errors import BoomTwinError
-from ..kernels.elements.linkage import cylinder_length
-from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
+from ..kernels.elements.linkage import levers
+from ..kernels.tables import State
 from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
 from .deviation_filter import ANGLES_STAMP, COUNT, FED, MODES, SHARES, STAMP, STARTED, USUAL_LOAD, DeviationFilter
+from .posture_modes import PostureMode, PostureModes
 from .sensor_model import Mounting
 
 LOADS = np.array([1.0, 31.0, 9.2])
@@ -28,7 +27,6 @@ LOADS = np.array([1.0, 31.0, 9.2])
 default boom in posture arch, 21 N of the 36 m Z fold."""
 STIFFEST = 1e-3  # of the boom's weight: most that such a load is taken for
 HIGHEST = 25.0  # Hz; what is faster follows a load without vibration of its own
-WIDTH = 1e-3  # relative accuracy of frequencies
 POSTURE_STEP = 0.03  # m of stroke after which the modes are made anew
 
 
@@ -48,10 +46,11 @@ class DeviationModes:
     Attributes
     ----------
     filter : DeviationFilter
+    postures : PostureModes
     """
 
     def __init__(self, scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None]) -> None:
-        self._plan, self._probe, self._work = plan, plan.state(), plan.work()
+        self._plan, self.postures = plan, PostureModes(scene, plan)
         self._bending = moments_by_unknowns(plan) * flexibility_by_station(scene)[:, None]
         mounting = Mounting(plan, scene.base.inclination, mounts)
         self.filter = _new_filter(scene, plan, settings, mounting)
@@ -81,38 +80,34 @@ class DeviationModes:
         self.filter.status[STAMP] += shift
         self.filter.status[ANGLES_STAMP] += shift
 
-    def refresh(self, strokes: Array, angles: Array, noise: StrokeNoise) -> None:
-        """Make the modes anew, about the equilibrium at `strokes` (m), shape (n,), if these have moved far enough.
-
-        Where there is no equilibrium, they stay as they are.
+    def refresh(self, strokes: Array, angles: Array, live: State, noise: StrokeNoise) -> None:
+        """Take other modes, about an equilibrium near `strokes` (m), shape (n,), if these have moved far enough.
 
         Parameters
         ----------
         angles : ndarray, shape (n,)
             Joint angles of the rigid boom, rad.
+        live : State
+            The boom; left as it is.
         noise : StrokeNoise
             As it is now.
         """
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
-            self._at = strokes.copy()
-            self._make(strokes, angles)
+            self._make(strokes, angles, live)
         f, known = self.filter, min(len(noise.modes), int(self.filter.status[COUNT]))
         f.density[:] = 0.0
         f.density[:known] = 2.0 * noise.collected[:known] * f.decay[:known] * f.omega[:known] ** 2
 
-    def _make(self, strokes: Array, angles: Array) -> None:
+    def _make(self, strokes: Array, angles: Array, live: State) -> None:
         f, plan = self.filter, self._plan
-        try:
-            settle(plan, self._probe, self._work, strokes, angles)
-        except BoomTwinError:
-            return
-        modes = natural_modes(plan, self._probe, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
+        posture = self.postures.at(strokes, angles, live)
+        modes, self._at = posture.lowest(MODES, 2.0 * math.pi * HIGHEST), posture.strokes
         kept = []
-        for j, mode in enumerate(modes):
-            is_turned = j < len(self._motions) and float((plan.masses * mode.motion) @ self._motions[j]) < 0.0
-            kept.append(self._put(j, mode, -1.0 if is_turned else 1.0))
+        for j, found in enumerate(modes):
+            is_turned = j < len(self._motions) and float((plan.masses * found.mode.motion) @ self._motions[j]) < 0.0
+            kept.append(self._put(j, found, -1.0 if is_turned else 1.0))
         f.softness[:], _ = plan.compliances_and_lags(plan.closed_lengths + strokes)
-        f.slopes[:] = [cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
+        levers(plan.tables.linkages, angles, f.slopes)
         first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
         self._motions, f.status[COUNT] = kept, len(modes)
         self._set_loads()
@@ -127,19 +122,14 @@ class DeviationModes:
         turns = f.turns[:count].T @ bends / np.sqrt(f.noise[: len(f.slopes), None])
         f.loads[:] = LOADS / max(float(np.linalg.norm(turns, 2)), 1.0 / (STIFFEST * self._weight))
 
-    def _put(self, j: int, mode: Mode, sign: float) -> Array:
+    def _put(self, j: int, found: PostureMode, sign: float) -> Array:
         """A mode as number j of the filter, turned round if `sign` is -1; gives its motion."""
-        f, plan, state = self.filter, self._plan, self._probe
+        f, mode = self.filter, found.mode
         f.omega[j] = 2.0 * math.pi * mode.frequency
-        f.decay[j] = 2.0 * damping_ratio(plan, mode) * f.omega[j]
-        f.forces[j] = sign * mode.increments[plan.tables.cylinders.z]
+        f.decay[j] = 2.0 * found.damping * f.omega[j]
+        f.forces[j] = sign * mode.increments[self._plan.tables.cylinders.z]
         f.bending[j] = sign * (self._bending @ mode.increments)
-
-        def read() -> Array:
-            return np.concatenate([state.frames.ravel(), taken_apart(plan, first_row(plan, state)).joints])
-
-        frames, f.turns[j] = np.split(sign * along(plan, state, self._work, mode.increments, read), [state.frames.size])
-        f.relative[:, j] = _relative(state.frames, frames.reshape(state.frames.shape))
+        f.turns[j], f.relative[:, j] = sign * found.turns, sign * found.relative
         return np.asarray(sign * mode.motion)
 
 
@@ -165,16 +155,3 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
         last=np.zeros(len(noise)), now=np.zeros(4),
     )  # fmt: skip
-
-
-def _relative(frames: Array, motion: Array) -> Array:
-    """Motion of every frame (f, 5) relative to the one before, in its axes, from their absolute `motion`; shape (f, 3)."""
-    found = np.zeros((len(frames), 3))
-    found[0] = motion[0, [FRAME_X, FRAME_Y, FRAME_ANGLE]]
-    before, turn = frames[:-1], motion[:-1, FRAME_ANGLE]
-    step = frames[1:] - before
-    x = motion[1:, FRAME_X] - motion[:-1, FRAME_X] + turn * step[:, FRAME_Y]
-    y = motion[1:, FRAME_Y] - motion[:-1, FRAME_Y] - turn * step[:, FRAME_X]
-    c, s = before[:, FRAME_COS], before[:, FRAME_SIN]
-    found[1:] = np.column_stack([c * x + s * y, c * y - s * x, motion[1:, FRAME_ANGLE] - turn])
-    return found

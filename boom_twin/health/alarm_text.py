@@ -8,6 +8,8 @@ import numpy as np
 
 from ..scene.schema import Scene
 from ..types import NANO, Alarm, Array, Ranked
+from .baseline import JUDGED
+from .delay_monitor import delay_remedy
 from .inference.fault_catalogue import Form, Parameter, physical
 from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
@@ -122,7 +124,8 @@ class AlarmText:
         else:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
         trend = f", {best.rate:+.2g} {unit}/s" if best.is_growing and unit else ", growing" if best.is_growing else ""
-        return f"{rank.cause} {kind}: {amount}{trend} (probability {rank.probability:.3f})"
+        remedy = delay_remedy(tuple(JUDGED)[each.index]) if each.form is Form.DELAY else ""
+        return f"{rank.cause} {kind}: {amount}{trend} (probability {rank.probability:.3f}){remedy}"
 
     def _advised_move(self, verdict: Verdict, signature: Signature | None) -> str:
         """The move that would best tell the two most probable causes apart; worked out once for every pair."""

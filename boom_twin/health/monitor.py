@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
+from .delay_monitor import DelayMonitor
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
@@ -30,6 +32,8 @@ CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
 """Those whose noise is told: what an IMU reads of vibration is not told from noise."""
+DELAYED = (Stream.IMU, Stream.FORCES)
+"""Those whose lag is told by `DelayMonitor`; that of the angles is among the causes of residuals."""
 
 
 class HealthMonitor:
@@ -61,6 +65,7 @@ class HealthMonitor:
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
+        self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -77,6 +82,8 @@ class HealthMonitor:
         self._ended += self.residuals.close(self._told)
         self._noise2 = {stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED}
         self.residuals.begin()
+        for monitor in self._delays.values():
+            monitor.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
@@ -119,7 +126,11 @@ class HealthMonitor:
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
             alarms += monitor.alarms
-        alarms += self.residuals.alarms
+        lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
+        for alarm in self.residuals.alarms:  # which take vibration for a load: the size is the other's
+            lag = lags.get(alarm.cause)
+            alarms.append(alarm if lag is None else replace(alarm, told=lag.told, ranked=lag.ranked))
+        alarms += lags.values()
         measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
         return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
 
@@ -132,6 +143,7 @@ class HealthMonitor:
             if stream in CHECKED and stream is not Stream.STROKES:
                 expected = raw - left if is_followed else np.full_like(raw, np.nan)
                 news += self._check(stream, block, stamps, raw, expected)
+        news += self._judge_delays(block, readings) if is_followed else []
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
@@ -141,6 +153,16 @@ class HealthMonitor:
             return news
         averaged = self._means(block, predictions, readings)
         return news + self.residuals.take(averaged, self._noise)
+
+    def _judge_delays(self, block: Block, readings: dict[Stream, MeasuredRows]) -> list[Alarm]:
+        """Look for lags; gives the alarms that began, changed or ended."""
+        news: list[Alarm] = []
+        for stream, monitor in self._delays.items():
+            stamps, raw, left = readings[stream]
+            if stream in self._sensors:
+                left = np.where(self._sensors[stream].masked, np.nan, left)
+            news += monitor.take(block.number, np.asarray((stamps - block.number * BLOCK) * NANO), left, raw - left, block.end)
+        return news
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
@@ -167,16 +189,15 @@ class HealthMonitor:
             if stream in self._sensors:
                 mean[self._sensors[stream].masked] = np.nan
             found.append((mean, count))
-        span = int(stamps[-1] - stamps[0]) * NANO
-        joints = predictions.joints
-        rates = (joints[-1] - joints[0]) / span if span > 0.0 else np.zeros_like(joints[0])
+        imu = readings[Stream.IMU]
+        rates = np.concatenate([_rates(stamps, predictions.joints), _rates(imu.stamps, imu.raw - imu.left)])
         return BlockMeans(
             start=block.number * BLOCK,
             left=np.concatenate([mean for mean, _ in found]),
             counts=np.concatenate([count for _, count in found]),
             strokes=predictions.strokes[len(stamps) // 2],
             variances=predictions.variances.mean(axis=0),
-            rates=rates,
+            rates=np.where(np.isfinite(rates), rates, 0.0),
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
             motion=readings[Stream.IMU if len(readings[Stream.IMU].stamps) else Stream.ANGLES],
         )
@@ -196,6 +217,13 @@ class HealthMonitor:
             return np.full(2, np.nan)
         by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + self._tip**2
         return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))
+
+
+def _rates(stamps: NDArray[np.int64], values: Array) -> Array:
+    """Mean rate (channels,) of `values` (k, channels) at `stamps` (ns), per s."""
+    if len(stamps) < 2 or stamps[-1] <= stamps[0]:
+        return np.zeros(values.shape[1])
+    return np.asarray((values[-1] - values[0]) / (int(stamps[-1] - stamps[0]) * NANO))
 
 
 def warm_up() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -54,7 +55,7 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
 
 def one_line(error: BaseException) -> str:
     """The text of an error of rclpy without line breaks and what its C parts append."""
-    return " ".join(str(error).split(", at ./")[0].split()).rstrip(".") or type(error).__name__
+    return " ".join(re.split(r", at \.?/", str(error))[0].split()).rstrip(".") or type(error).__name__
 
 
 WAKE = 0.2

@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 
 from ..errors import UsageError
-from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angle_of_length, cylinder_length, link_angles
+from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angles_of_lengths, cylinder_length, link_angles
 from ..kernels.plane_algebra import turned
 from ..types import Array
 from .schema import Base, Joint, Scene, Section
@@ -109,19 +109,19 @@ def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = N
     UsageError
         If a stroke is not reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
-    angles = np.empty(len(scene.joints))
-    for i, stroke in enumerate(strokes):
-        low, high = np.radians(scene.joints[i].range_deg) + np.array([-MARGIN, MARGIN])
-        row, length = linkage(scene, i), scene.joints[i].cylinder.closed_length + float(stroke)
-        grid = np.linspace(low, high, samples)
-        curve = stroke_curve(scene, i, grid)
-        start = near[i] if near is not None else grid[int(np.nanargmin(np.abs(curve - stroke)))]
-        angles[i] = angle_of_length(row, length, start, low, high)
-        if not math.isfinite(angles[i]):
-            raise UsageError(
-                f"stroke_{i + 1} = {stroke:.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
-                f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a stroke inside."
-            )
+    rows = np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
+    for i in range(len(rows)):
+        rows[i] = linkage(scene, i)
+    ranges = np.radians([joint.range_deg for joint in scene.joints]) + np.array([-MARGIN, MARGIN])
+    lengths = np.array([joint.cylinder.closed_length for joint in scene.joints]) + strokes
+    angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.asarray(near, float)
+    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), samples, angles)
+    for i in np.flatnonzero(~np.isfinite(angles)).tolist():
+        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], samples))
+        raise UsageError(
+            f"stroke_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
+            f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a stroke inside."
+        )
     return angles
 
 

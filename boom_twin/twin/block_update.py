@@ -27,7 +27,7 @@ from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Str
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
 from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 
@@ -95,6 +95,8 @@ class BlockUpdate:
         Of events; ``deflected``, ``not followed`` and ``unmatched`` are counted here.
     shedding : LoadShedding
         Asked what is left out.
+    before : BlockUpdate, optional
+        Of the same scene under another load, whose arrays are taken over.
 
     Attributes
     ----------
@@ -112,13 +114,16 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
+        before: BlockUpdate | None = None,
     ) -> None:
         self._shedding = shedding
         self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
         self._modes, self._judge, self._told_counts = modes, judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         self._widths, compiled = limits.channels, boom.compiled
-        self._found = new_output(2 * CAPACITY, self._joints, len(compiled.row), len(compiled.bending), limits.channels)
+        sizes = self._joints, len(compiled.row), len(compiled.bending), limits.channels
+        self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
+        self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
 
     def begin_health(self) -> None:
@@ -176,7 +181,7 @@ class BlockUpdate:
                 prediction = boom.prediction(run.newest)
                 run.deviations.refresh(prediction, interval, boom.take_filtered(), boom.live, boom.angles)
                 assert run.deviations.noise is not None
-                self._modes.refresh(prediction.strokes, boom.angles, run.deviations.noise)
+                self._modes.refresh(prediction.strokes, boom.angles, boom.live, run.deviations.noise)
             elif reason != LOOK:
                 return reason, row
             else:

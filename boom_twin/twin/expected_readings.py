@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..analysis.modal import StrokeNoise, StrokeSpectrum, stroke_noise
+from ..analysis.modal import StrokeNoise, StrokeSpectrum, stroke_noise_of
 from ..compiler.plan import Plan
 from ..config.settings import Settings
-from ..estimation.look_ahead import copy_state
+from ..estimation.posture_modes import Posture, PostureModes
 from ..estimation.sensor_model import specific_force
 from ..estimation.stroke_filter import corners
-from ..kernels.elements.linkage import cylinder_length
+from ..kernels.elements.linkage import levers
 from ..kernels.jit import inner
 from ..kernels.tables import FRAME_ANGLE, State
 from ..types import NANO, SENSORS, Array, Prediction, Stream
@@ -37,6 +37,8 @@ class Deviations:
     ----------
     plan : Plan
     settings : Settings
+    postures : PostureModes
+        Of the boom that is planned.
     state : TwinState
         Where the deviations are kept.
     epoch : int
@@ -54,7 +56,16 @@ class Deviations:
         As propagated last; None before the first prediction.
     """
 
-    def __init__(self, plan: Plan, settings: Settings, state: TwinState, epoch: int, speeds: Array | None = None) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        settings: Settings,
+        postures: PostureModes,
+        state: TwinState,
+        epoch: int,
+        speeds: Array | None = None,
+    ) -> None:
+        self._postures = postures
         self._plan, self._settings, self._epoch, self._state = plan, settings, epoch, state
         self.noise: StrokeNoise | None = None
         self._interval, self._speeds, self.tip = 0.0, speeds, np.zeros(2)
@@ -121,9 +132,11 @@ class Deviations:
         moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP
         spectrum = self._spectrum(interval, *filtered)
         if self.noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
-            self.noise = self._propagate(live, spectrum)
-            self._at, self._interval = prediction.strokes, interval
-            slopes = [cylinder_length(self._plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)]
+            posture = self._postures.at(prediction.strokes, angles, live)
+            self.noise = self._propagate(posture, spectrum)
+            self._at, self._interval = posture.strokes, interval
+            slopes = np.empty_like(angles)
+            levers(self._plan.tables.linkages, angles, slopes)
             self._state.slopes2[:] = 1.0 / np.square(slopes)
         if self._speeds is not None:
             self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
@@ -140,10 +153,9 @@ class Deviations:
         variance = self._settings.stroke_variance
         return StrokeSpectrum(variance, interval, corners(variance, interval, self._settings.stroke_agility), shares, excess)
 
-    def _propagate(self, live: State, spectrum: StrokeSpectrum) -> StrokeNoise:
-        probe, work = self._plan.state(), self._plan.work()
-        copy_state(live, probe)
-        return stroke_noise(self._plan, probe, work, spectrum)
+    def _propagate(self, posture: Posture, spectrum: StrokeSpectrum) -> StrokeNoise:
+        modes = posture.lowest(len(self._plan.names), float(spectrum.corners[-1]))
+        return stroke_noise_of(self._plan, [(each.mode, each.damping, each.turns) for each in modes], spectrum)
 
     def _shake(self, spectrum: StrokeSpectrum, stamp: int) -> Array:
         """Variances (modes,) that noise with this spectrum since the last call, and the noise before, have collected."""

@@ -168,15 +168,20 @@ class Twin:
         UsageError
             The load cannot be.
         """
-        return loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
+        self._former: BlockUpdate | None = None
+        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
+        if self._state.clock[NEWEST] != NONE:
+            found.modes.postures.prepare(self._state.strokes.copy())  # where the boom will be, or near
+        return found
 
-    def _adopt(self, model: LoadedModel) -> None:
-        """Go on with this model, which is of the present load."""
+    def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
+        """Go on with this model, which is of the present load, after that of `before`."""
         self._boom, self.judge, self._modes, self.steps = model.boom, model.judge, model.modes, model.steps
         self.plan = self._boom.plan
         limits = limits_of(model.scene, self.plan, self.settings, self.steps, self.mounts)
         parts = self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding)
+        self._former = before  # let go of when the next model is made, which may be in a thread of its own
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -198,7 +203,7 @@ class Twin:
             self._begin_anew()
             keep_waiting(self._state, stamp, -NONE)
         if "load" in events:
-            self._adopt(model or self.model(self.settings))
+            self._adopt(model or self.model(self.settings), self._compiled)
         return events
 
     def _begin_anew(self) -> None:
@@ -453,7 +458,7 @@ class Twin:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
-        deviations = Deviations(self.plan, self.settings, self._state, sample.stamp, speeds)
+        deviations = Deviations(self.plan, self.settings, self._modes.postures, self._state, sample.stamp, speeds)
         self._run = Run(self._state, deviations, sample.stamp, speeds is not None)
         self._modes.begin()
         return self._step(self._run, sample, events)

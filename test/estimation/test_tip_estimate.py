@@ -19,6 +19,7 @@ from boom_twin.estimation import deviation_step as stepping
 from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.deviation_filter import DeviationFilter
 from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.estimation.posture_modes import GRID
 from boom_twin.health.baseline import Baseline
 from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
 from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
@@ -43,11 +44,11 @@ class Posed:
     """A boom at rest, and its filter there."""
 
     def __init__(self, scene: Scene, strokes: Array, settings: Settings | None = None) -> None:
-        self.boom = BoomPredictor(scene)
+        self.boom, self.strokes = BoomPredictor(scene), strokes
         self.modes = DeviationModes(scene, self.boom.plan, settings or Settings(), ())
         self.rest(strokes)
         self.modes.begin()
-        self.modes.refresh(strokes, self.boom.angles, NO_NOISE)
+        self.modes.refresh(strokes, self.boom.angles, self.boom.live, NO_NOISE)
         self.follow()
         stepping.start_state(self.modes.filter)
 
@@ -205,7 +206,10 @@ def test_motion_of_the_tip_follows_the_posture(scene: Scene, posture: str) -> No
 
 
 def test_modes_move_the_tip_as_they_do_where_they_were_made(posed: Posed) -> None:
+    """At the nearest strokes of the grid."""
     plan, f = posed.boom.plan, posed.modes.filter
+    posed.rest(np.round(posed.strokes / GRID) * GRID)
+    posed.follow()
     modes = natural_modes(plan, posed.boom.live, posed.boom.compiled.work, 4, 1e-6)
     for j, mode in enumerate(modes):
         motion = mode.motion[plan.tables.tip : plan.tables.tip + 3]

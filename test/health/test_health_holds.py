@@ -181,7 +181,7 @@ def test_a_softer_section_of_a_recorded_session() -> None:
     stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.7})
     found = run(session(27.0), twin=Twin(stiff, baseline=learnt(scene)))
     assert found.causes() == {"section_1.EI"}
-    alarm = found.states()[-1][1]
+    alarm = next(each for _, each in found.states() if each.cause is not None)  # the first; residuals may name it too, later
     assert alarm.channel == "tip" and alarm.kind == "softer" and "puts the tip off by" in alarm.told
     assert abs(alarm.ranked[0].parts[0][1] - 0.43) < 0.1
 

@@ -141,6 +141,23 @@ def test_who_is_at_the_other_end(prompt: Any, bench: Any, motion: dict[str, Any]
     assert prompt.stop() == 0
 
 
+def test_a_second_node_of_the_same_name_is_told(prompt: Any, bench: Any) -> None:
+    """Both answer every stroke on the same topics, and nobody who listens can tell them apart."""
+
+    def told() -> str:
+        status = bench.statuses().get("boom_twin: outputs")
+        return status.message if status is not None and status.level == ERROR else ""
+
+    bench.until(lambda: bench.statuses().get("boom_twin: outputs") is not None)
+    assert not told()
+    other = rclpy.create_node("boom_twin")
+    other.create_publisher(PointStamped, "~/tip/position", 10)
+    bench.until(lambda: told().startswith("1 of them are published by another node too: give each node a namespace"))
+    other.destroy_node()
+    bench.until(lambda: not told())
+    assert prompt.stop() == 0
+
+
 def test_a_publisher_that_cannot_be_heard_is_named(domain: None) -> None:
     topics = load_topics()
     imu = topics.inputs[Stream.IMU]

@@ -49,6 +49,19 @@ def test_transitions_by_service(idle: Any, remote: Any) -> None:
     assert "listening to /rig/strokes, /joint_angles, /tip_imu" in idle.said()
 
 
+def test_a_transition_that_is_not_there_is_refused_and_the_node_lives_on(idle: Any, remote: Any) -> None:
+    """Two who manage it both activate it, or somebody asks for a transition that no state has: rclpy raises then."""
+    for transition in (Transition.TRANSITION_ACTIVATE, 99, 0, Transition.TRANSITION_CLEANUP):
+        assert not remote.change(transition)
+    assert remote.state() == "unconfigured"
+    assert remote.change(Transition.TRANSITION_CONFIGURE) and remote.change(Transition.TRANSITION_ACTIVATE)
+    for _ in range(5):
+        assert not remote.change(Transition.TRANSITION_ACTIVATE)
+    assert remote.state() == "active" and "single-threaded" not in idle.said()
+    assert idle.said().count("transition 3 refused in state active: ") == 1
+    assert remote.change(Transition.TRANSITION_ACTIVE_SHUTDOWN) and idle.end(30.0) == 0
+
+
 def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote: Any) -> None:
     request = DescribeParameters.Request(names=["rho", "look_step"])
     rho, look_step = remote.call(DescribeParameters, "describe_parameters", request).descriptors

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
+from boom_twin.analysis.modal import ModeSeries
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -110,3 +111,25 @@ def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list
     preparation.close()
     preparation.take_in()
     assert twin.requests.settings.payload == -1.0
+
+
+def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not at the sample: those of the posture are kept, and made beside the samples with the model of another load."""
+    found: list[str] = []
+    original = ModeSeries.lowest
+
+    def noted(self: ModeSeries, count: int, highest: float) -> Any:
+        before = len(self._modes)
+        modes = original(self, count, highest)
+        if len(self._modes) > before:
+            found.append(current_thread().name)
+        return modes
+
+    monkeypatch.setattr(ModeSeries, "lowest", noted)
+    twin, rows = Twin(load_scene()), samples(160)
+    preparation = ModelPreparation(twin)
+    driven(twin, preparation, {50: {"payload": 40.0}}, rows[:120])
+    assert twin.settings.payload == 40.0 and found == ["MainThread", "model"]
+    twin.requests.rest()
+    assert twin.update(rows[120]).change is not None
+    assert found == ["MainThread", "model"]

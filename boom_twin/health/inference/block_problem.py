@@ -14,8 +14,8 @@ from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...errors import BoomTwinError
 from ...scene.schema import Scene
-from ...types import NANO, Array, Mount, Stream, sensor_kind
-from ..baseline import judged_channels
+from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
+from ..baseline import JUDGED, judged_channels
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
 from .innovation_filter import ModalStates, modes_of
@@ -208,8 +208,10 @@ class BlockMeans:
         Means of the residuals, NaN where nothing was measured or the sensor is not to be trusted.
     counts : ndarray, shape (channels,)
         Of the values in each mean.
-    strokes, variances, rates : ndarray, shape (n,)
-        As estimated, m; variance of these estimates, m^2; rates of the predicted angles, rad/s.
+    strokes, variances : ndarray, shape (n,)
+        As estimated, m; variance of these estimates, m^2.
+    rates : ndarray, shape (channels,)
+        Of what was predicted, in their units per s; 0 of a stream without readings.
     shaking : float
         Mean square of the predicted tip acceleration, (m/s^2)^2.
     motion : MeasuredRows
@@ -282,7 +284,8 @@ class LinearModel:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
-        self._late = [i for i, each in enumerate(known) if each.form is Form.DELAY]
+        self._late = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DELAY]
+        self._of_stream = np.repeat(np.arange(len(JUDGED)), [len(channels_of(n)[stream]) for stream in JUDGED])
         self.begin()
 
     def begin(self) -> None:
@@ -332,6 +335,6 @@ class LinearModel:
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
         table = np.column_stack([block.left, signature.channels])
-        for column in self._late:
-            table[: len(block.rates), 1 + column] = -block.rates
+        for column, stream in self._late:
+            table[:, 1 + column] = np.where(self._of_stream == stream, -block.rates, 0.0)
         return table

@@ -26,7 +26,7 @@ class Form(Enum):
     STROKE = "stroke"  # adds to one stroke
     SCALE = "scale"  # multiplies one stroke
     PLAY = "play"  # lengthens one cylinder the way it is pulled
-    DELAY = "delay"  # angles are those of an earlier time
+    DELAY = "delay"  # readings of a stream are those of an earlier time
     IMU = "imu"  # adds to one axis of the IMU
 
 
@@ -42,7 +42,7 @@ class Parameter:
         What is then the matter with it, in a word.
     form : Form
     index : int
-        Of the cylinder, joint, section or axis, from 0; 0 where there is only one.
+        Of the cylinder, joint, section, axis or judged stream, from 0; 0 where there is only one.
     unit : str
         Of the parameter; empty for a share.
     healthy : float
@@ -98,6 +98,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, 0.0, 0.1) for i in each]
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
+    found.append(Parameter("tip_imu.delay", "late", Form.DELAY, 1, "s", 2e-3, 0.05, prior=0.5))
     found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
     found += [
         Parameter(f"section_{i + 1}.mass", "changed", Form.SCENE, i, "", 0.02, 0.0)

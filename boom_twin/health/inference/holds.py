@@ -105,6 +105,7 @@ class HoldCollector:
             Stamps (k,) in ns and readings (k, any) of what shows vibration best.
         """
         is_next = bool(self._starts) and start - self._starts[-1] < 3 * block
+        is_next = is_next and motion[1].shape[1] == self._motion[-1][1].shape[1]  # of the same sensor
         is_still = is_next and float(np.abs(strokes - self._strokes[-1]).max()) < PACE
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):

@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from ..jit import inner
+from ..jit import inner, kernel
 from ..plane_algebra import turned
 
 DIRECT, LINK_L, LINK_R = 0, 1, 2
@@ -99,3 +99,28 @@ def angle_of_length(row, length, phi, low, high):
             return phi
     now, slope = cylinder_length(row, phi)
     return phi if abs(length - now) < 1e-11 else math.nan
+
+
+@kernel
+def angles_of_lengths(rows, lengths, near, lows, highs, samples, angles):
+    """Write the angles (n,) of cylinders of these lengths (m), n linkages each, as `angle_of_length` does.
+
+    It is searched next to `near` (n,), or where that is NaN, next to the best of so many `samples` from `lows` to `highs`, rad.
+    """
+    for i in range(angles.shape[0]):
+        start, least = near[i], math.inf
+        if math.isnan(start):
+            start = lows[i]
+            for k in range(samples):
+                phi = lows[i] + k * ((highs[i] - lows[i]) / (samples - 1))
+                length, _ = cylinder_length(rows[i], phi)
+                if abs(length - lengths[i]) < least:
+                    start, least = phi, abs(length - lengths[i])
+        angles[i] = angle_of_length(rows[i], lengths[i], start, lows[i], highs[i])
+
+
+@kernel
+def levers(rows, angles, found):
+    """Write the derivatives (n,) of cylinder lengths by joint `angles`, m/rad, of n linkages."""
+    for i in range(found.shape[0]):
+        _, found[i] = cylinder_length(rows[i], angles[i])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
@@ -118,7 +119,10 @@ class GraphPeers:
             self.publishers[key] = _peers(address, [(end, end.qos_profile, own) for end in ends])
         else:
             ends = self._node.get_subscriptions_info_by_topic(address)
-            self.subscribers[key] = _peers(address, [(end, own, end.qos_profile) for end in ends])
+            found = _peers(address, [(end, own, end.qos_profile) for end in ends])
+            mine = sum(publisher.topic_name == address for publisher in self._node.publishers)
+            others = 0 if key is Output.DIAGNOSTICS else self._node.count_publishers(address) - mine
+            self.subscribers[key] = replace(found, rivals=max(0, others))
 
 
 def _as_discovered(qos: QoSProfile) -> QoSProfile:

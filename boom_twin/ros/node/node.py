@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import traceback
+from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -24,7 +25,7 @@ from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Stream
 from ..log import Log
-from ..runtime import message_class, qos_profile
+from ..runtime import message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
 from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of
@@ -54,6 +55,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
+        self._refused = ""
+        self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
         declare(self)
         self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
@@ -71,6 +74,18 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return bool(self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS)
 
     # -- transitions --------------------------------------------------------------------------------------------------
+
+    def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
+        """A transition by service; one that the present state does not have is refused: rclpy would end the process."""
+        try:
+            return change(request, response)
+        except RuntimeError as error:  # RCLError
+            asked = request.transition.label or request.transition.id
+            told = f"transition {asked} refused in state {self._state_machine.current_state[1]}: {one_line(error)}"
+            if told != self._refused:  # not a line for each of many
+                self._log.warning(told)
+            self._refused, response.success = told, False
+            return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene, compile its model, offer the outputs; FAILURE, with the reason logged, if that cannot be."""

@@ -1,0 +1,121 @@
+"""Monitor a constant lag of a stream's stamps: what is read is that of an earlier time, by as much whatever moves.
+
+Readings that are d late differ from the prediction by -d times its slope. Both are averaged over two seconds (a triangle of
+blocks), which takes vibration out: a natural frequency that is 1 % wrong puts vibration out of phase as a lag does. Spans of
+4 s, each less its mean, give d by least squares, and how it scatters among them gives its deviation: whatever else is wrong
+with the model goes with where the boom is, not with which way it moves, and does not agree about d.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from ..types import Alarm, Array, Ranked, Stream
+
+TRIANGLE = np.convolve(np.ones(10), np.ones(10)) / 100.0  # weights of blocks
+SPAN = 40  # blocks of one estimate
+KEPT = 30  # spans that are looked at, the newest
+FEWEST = 4.0  # spans, by how much they weigh, before anything is told
+FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
+SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
+TINY = 1e-300
+
+
+def delay_cause(stream: Stream) -> str:
+    """How alarms call a lag of this stream."""
+    return f"{stream.value}.delay"
+
+
+def delay_remedy(stream: Stream) -> str:
+    """What to do about a lag of this stream, for the end of a sentence."""
+    return f"; if it stays, add it to `delay` of {stream.value} in the mapping"
+
+
+class DelayMonitor:
+    """Judges one stream.
+
+    Parameters
+    ----------
+    stream : Stream
+
+    Attributes
+    ----------
+    alarm : Alarm or None
+        While it lasts.
+    """
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        self.alarm: Alarm | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
+        self._number = 0
+        self._blocks: deque[tuple[Array, Array]] = deque()
+        self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
+
+    def take(self, number: int, stamps: Array, left: Array, expected: Array, end: int) -> list[Alarm]:
+        """Take the readings of a block; gives an alarm that began, changed or ended.
+
+        Parameters
+        ----------
+        number : int
+            Of the block; one that does not follow the last begins a new span.
+        stamps : ndarray, shape (k,)
+            s.
+        left, expected : ndarray, shape (k, channels)
+            Residuals, NaN of channels that are not to be used, and what was expected.
+        end : int
+            Of the block, ns.
+        """
+        if number != self._number + 1 or len(stamps) < 2 or stamps[-1] <= stamps[0]:
+            self._blocks.clear()
+        self._number = number
+        if len(stamps) < 2 or stamps[-1] <= stamps[0]:
+            return []
+        self._blocks.append((left.mean(axis=0), (expected[-1] - expected[0]) / (stamps[-1] - stamps[0])))
+        if len(self._blocks) < SPAN + len(TRIANGLE) - 1:
+            return []
+        rows, slopes = (self._averaged([block[i] for block in self._blocks]) for i in range(2))
+        for _ in range(SPAN):
+            self._blocks.popleft()
+        found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
+        is_known = np.isfinite(found[0])
+        self._spans.append(tuple(np.where(is_known, each, 0.0) for each in found))  # type: ignore[arg-type]
+        return self._judge(end)
+
+    @staticmethod
+    def _averaged(blocks: list[Array]) -> Array:
+        """Less their mean, shape (SPAN, channels)."""
+        rows = np.array(blocks)
+        smooth = np.column_stack([np.convolve(column, TRIANGLE, "valid") for column in rows.T])
+        return np.asarray(smooth - smooth.mean(axis=0))
+
+    def estimate(self) -> tuple[float, float]:
+        """The lag and its deviation, s; infinite while too little has moved."""
+        shared, squares, power = (np.array(each) for each in zip(*self._spans, strict=True))
+        noise = power.sum(axis=0) + TINY
+        by, weight = (shared / noise).sum(axis=1), (squares / noise).sum(axis=1)
+        if weight.sum() ** 2 < FEWEST * (weight**2).sum() or not weight.sum() > 0.0:
+            return 0.0, math.inf
+        lag = float(by.sum() / weight.sum())
+        return lag, math.hypot(float(np.sqrt(((by - lag * weight) ** 2).sum()) / weight.sum()), FLOOR)
+
+    def _judge(self, end: int) -> list[Alarm]:
+        lag, sigma = self.estimate()
+        if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
+            ended, self.alarm = replace(self.alarm, until=end), None
+            return [ended]
+        if abs(lag) < SURE * sigma:
+            return []
+        cause = delay_cause(self._stream)
+        told = f"{cause} late: {lag:+.3g} +- {sigma:.1g} s" + delay_remedy(self._stream)
+        ranked = (Ranked(cause, 1.0, (("late", lag, sigma, "s"),)),)
+        alarm = self.alarm or Alarm(self._stream.value, "late", end, None, cause, told, ranked)
+        self.alarm = replace(alarm, told=told, ranked=ranked)
+        return [self.alarm]

@@ -1,0 +1,95 @@
+"""Lags of the IMU's and the forces' stamps: told with size and deviation, and by no other name."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream
+from boom_twin.health.delay_monitor import FEWEST, DelayMonitor
+from boom_twin.types import Alarm, Array
+
+from .recorded import run, session
+
+RATE, BLOCK = 20, 0.1  # readings of a block, its length in s
+
+
+def force(times: Array) -> Array:
+    """Of a boom that goes to and fro and vibrates, N."""
+    return np.stack([3e4 * np.sin(0.4 * times), 2e4 * np.cos(0.31 * times)], axis=1) + 500.0 * np.sin(6.6 * times)[:, None]
+
+
+def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **more: float) -> list[Alarm]:
+    """What a monitor tells of readings that are so late (s), with noise and what else is wrong."""
+    rng, news = np.random.default_rng(3), []
+    for number in range(first, first + round(seconds / BLOCK)):
+        times = BLOCK * (number + np.arange(RATE) / RATE)
+        expected = force(times)
+        read = force(times - lag) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 100.0, expected.shape)
+        read[:, 1] += more.get("lost", 0.0) * math.nan if "lost" in more else 0.0
+        news += monitor.take(number, times, read - expected, expected, round(times[-1] * 1e9))
+    return news
+
+
+@pytest.mark.parametrize("lag", [0.02, 0.05, 0.15, -0.05])
+def test_a_lag_is_told_with_its_size(lag: float) -> None:
+    monitor = DelayMonitor(Stream.FORCES)
+    assert judged(monitor, lag, 40.0)
+    value, sigma = monitor.estimate()
+    assert value == pytest.approx(lag, abs=3.0 * sigma) and 0.0 < sigma < 0.006
+    assert monitor.alarm is not None and monitor.alarm.cause == "cylinder_forces.delay"
+    assert "cylinder_forces.delay late: " in monitor.alarm.told and "add it to `delay` of cylinder_forces" in monitor.alarm.told
+    assert monitor.alarm.ranked[0].parts == (("late", value, sigma, "s"),)
+
+
+@pytest.mark.parametrize("wrong", [{}, {"bias": 2e3}, {"scale": 1.05}, {"lost": 1.0}])
+def test_nothing_else_is_a_lag(wrong: dict[str, float]) -> None:
+    """Force pins that read 5 % too much, or so many N, or one that is silent."""
+    monitor = DelayMonitor(Stream.FORCES)
+    assert judged(monitor, 0.0, 60.0, **wrong) == []
+    value, sigma = monitor.estimate()
+    assert abs(value) < 3.0 * sigma < math.inf
+
+
+def test_a_lag_that_is_taken_back_ends() -> None:
+    monitor = DelayMonitor(Stream.IMU)
+    judged(monitor, 0.05, 30.0)
+    assert monitor.alarm is not None
+    assert judged(monitor, 0.0, 240.0, first=300)[-1].until is not None and monitor.alarm is None
+
+
+def test_little_evidence_tells_nothing() -> None:
+    """Few spans; or blocks with one reading each, which have no slope; or gaps all the time."""
+    monitor = DelayMonitor(Stream.IMU)
+    assert judged(monitor, 0.15, 4.0 * (FEWEST - 1.0) + 1.9) == []
+    for number in range(0, 2000, 2):
+        assert monitor.take(number, np.arange(3.0), np.ones((3, 2)), np.ones((3, 2)), 0) == []
+        assert monitor.take(number, np.zeros(1), np.ones((1, 2)), np.ones((1, 2)), 0) == []
+    still = DelayMonitor(Stream.IMU)
+    for number in range(600):
+        assert still.take(number, np.arange(2.0), np.zeros((2, 2)), np.ones((2, 2)), 0) == []
+
+
+def late(seconds: float, lag: float) -> tuple[Sample, ...]:
+    """The bundled session with the IMU's stamps so late (s)."""
+    moved = [
+        Sample(each.stream, each.stamp + round(lag * 1e9), each.values) if each.stream is Stream.IMU else each
+        for each in session(seconds)
+    ]
+    return tuple(sorted(moved, key=lambda each: each.stamp))
+
+
+def test_an_imu_that_begins_later_than_the_boom_stands_still_stops_nothing() -> None:
+    """A hold whose vibration was shown by the angles at first, then by the IMU, made health fail at every sample."""
+    found = run(late(16.0, 0.3))
+    assert found.health and found.twin.counts["unmatched"] == 0
+
+
+@pytest.mark.slow
+def test_a_late_imu_is_named_and_nothing_else() -> None:
+    found = run(late(60.0, 0.05))
+    assert found.causes() == {"tip_imu.delay"}
+    value, sigma = found.twin.judge._delays[Stream.IMU].estimate()
+    assert value == pytest.approx(0.05, abs=max(3.0 * sigma, 0.01))
