@@ -247,3 +247,15 @@ def test_time_of_the_clock_topic_jumps(spawn_node: Callable[..., Any], domain: N
             rig.goes_on()
     finally:
         rig.close()
+
+
+def test_a_clock_topic_that_never_comes_is_told_and_nothing_waits_for_it(spawn_node: Callable[..., Any], domain: None) -> None:
+    made = spawn_node("-p", "use_sim_time:=true", "-r", "__ns:=/still")
+    made.wait_for("active;")
+    rig = Rig("/still")
+    try:
+        rig.goes_on()
+        made.wait_for("use_sim_time is set and no /clock came yet: play with --clock")
+        rig.goes_on()
+    finally:
+        rig.close()

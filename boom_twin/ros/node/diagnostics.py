@@ -260,6 +260,11 @@ class Diagnostics:
     def _tell_clock(self, clock: float) -> None:
         """Log that the strokes are stamped by another clock than the node's."""
         newest = self._watch.newest if self._active else None
+        if newest is not None and clock == 0.0:
+            self._tell(
+                "no clock", "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
+            )
+            return
         if newest is not None and abs(clock - newest * NANO) > self._watch.thresholds.stamp_offset:
             apart = clock - newest * NANO
             self._tell("clock", f"newest stamp is {apart:.1f} s from the node's clock: set use_sim_time or play with --clock")
