@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin
 
 from ...analysis.free_vibration import Vibration, free_vibrations
 from ...types import NANO, Array
@@ -20,12 +19,10 @@ LEAST, LONGEST = 3.0, 10.0  # s; of a longer one every part is a hold
 RATE = 40.0  # Hz to which samples are thinned out
 LAGS = 80  # of these samples, 2 s
 DECAYS = 4.0  # deviations by which a vibration is damped: the line of a pump is not
-SURE, SURE_SHAKEN = 0.004, 0.02  # largest relative deviation of a frequency; of one while a load shakes the boom
+SURE = 0.004  # largest relative deviation of a frequency
 PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
 COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
-SHAKEN_RATE, SHAKEN_LEAST = 13.3, 5.0  # Hz, s, of samples from which frequencies are found that a load shakes
-PASSED = 0.8  # of half of that rate
 HEARD = 4.0  # times the power of noise, below which nothing is told of that
 
 
@@ -42,8 +39,6 @@ class StillReadings(NamedTuple):
         Mean of the residuals, NaN where not measured, and how sure that is by its own scatter (standard deviation).
     vibrations : tuple of Vibration
         That show clearly, by frequency.
-    shaken : tuple of float and ndarray, shape (k,), or None
-        Step (s) and samples in the direction that moves most, below `PASSED` of half the rate, where a load shakes the boom.
     """
 
     start: int
@@ -52,7 +47,6 @@ class StillReadings(NamedTuple):
     left: Array
     unrest: Array
     vibrations: tuple[Vibration, ...]
-    shaken: tuple[float, Array] | None = None
 
 
 class HoldProblem(NamedTuple):
@@ -134,14 +128,13 @@ class HoldCollector:
         is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
-        found = () if is_shaken else tuple(each for each in vibrations if is_clear(each, SURE))
-        shaken = strongest_motion(dt, thin) if is_shaken else None
-        return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found, shaken)
+        found = () if is_shaken else tuple(each for each in vibrations if _is_free(each))
+        return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
 
 
-def is_clear(each: Vibration, sure: float) -> bool:
-    """Whether it is damped, as no line of a pump is, and its frequency's relative deviation is below `sure`."""
-    return each.damping > DECAYS * each.damping_sigma and each.frequency_sigma < sure * each.frequency
+def _is_free(each: Vibration) -> bool:
+    """Whether it decays, as no vibration does that a load keeps up, and its frequency is sure."""
+    return each.damping > DECAYS * each.damping_sigma and each.frequency_sigma < SURE * each.frequency
 
 
 def _is_kept_up(values: Array) -> bool:
@@ -165,17 +158,6 @@ def _is_explained(dt: float, values: Array, vibrations: list[Vibration]) -> bool
     rest = values - basis @ (basis.T @ values)
     noise = (np.diff(rest, 2, axis=0) ** 2).mean(axis=0) / 6.0
     return bool((rest**2).mean(axis=0).sum() < COLOURED * noise.sum())
-
-
-def strongest_motion(dt: float, values: Array) -> tuple[float, Array] | None:
-    """Step and samples of `values` (k, c), thinned out further, in the direction that moves most; None of too few."""
-    step = max(1, round(1.0 / (SHAKEN_RATE * dt)))
-    taps = firwin(8 * step + 1, PASSED, fs=2.0 * step)
-    count = len(values) - len(taps) + 1
-    if count * dt < SHAKEN_LEAST:
-        return None
-    direction = np.linalg.svd(values - values.mean(axis=0), full_matrices=False)[2][0]
-    return step * dt, np.convolve(values @ direction, taps, "valid")[::step]
 
 
 def _mean_at_rest(left: Array, part: int, is_shaken: bool) -> tuple[Array, Array]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...analysis.equilibrium import settle
-from ...analysis.forced_vibration import forced_vibrations
-from ...analysis.free_vibration import Vibration
 from ...analysis.modal import natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
@@ -24,12 +22,11 @@ from ...scene.kinematics import joint_angles_of_strokes
 from ...scene.schema import Scene
 from ...types import Array, Mount
 from .fault_catalogue import Form, Parameter, step_of
-from .holds import PASSED, SURE_SHAKEN, HoldProblem, StillReadings, is_clear
+from .holds import HoldProblem, StillReadings
 
 STROKE_STEP = 1e-5  # m
 TOLERANCE, PASSES, LONGEST = 1e-7, np.int64(12), 0.1  # of a pass, rad
 MODES, WIDTH = 4, 1e-6  # natural frequencies that are compared, and their relative accuracy
-AT_ONCE = 6  # steps of a search a call, 3 ms or so
 NEAR = 0.25  # a measured frequency is that of the nearest mode, if it is no further from it than this share
 
 
@@ -148,10 +145,8 @@ class HoldInWork:
         Its `frequencies` are filled as they come.
     stand : Stand
         Of the nominal boom.
-    model : ndarray, shape (MODES,)
-        Its natural frequencies, Hz.
-    search : generator or None
-        For frequencies while a load shakes the boom; None if there is no more to search.
+    model : ndarray, shape (m,)
+        Its natural frequencies that were measured, Hz.
     made : int
         Of the changed booms.
     """
@@ -159,32 +154,7 @@ class HoldInWork:
     problem: HoldProblem
     stand: Stand
     model: Array
-    search: Generator[None, None, list[Vibration]] | None = None
     made: int = 0
-
-    def take(self, vibrations: Iterable[Vibration]) -> None:
-        """Put in what was measured: of each mode the surest."""
-        sensed: dict[int, tuple[float, float]] = {}
-        for each in vibrations:
-            mode = int(np.argmin(np.abs(self.model - each.frequency)))
-            off, sigma = each.frequency / self.model[mode] - 1.0, each.frequency_sigma / self.model[mode]
-            if abs(off) < NEAR and (mode not in sensed or sigma < sensed[mode][1]):
-                sensed[mode] = off, sigma
-        modes = np.array(sorted(sensed), np.int64)
-        frequencies = np.zeros((len(modes), self.problem.table.shape[1]))
-        frequencies[:, 0] = [sensed[mode][0] for mode in modes.tolist()]
-        sigmas = np.array([sensed[mode][1] for mode in modes.tolist()])
-        self.problem = self.problem._replace(modes=modes, frequencies=frequencies, sigmas=sigmas)
-
-    def look(self) -> None:
-        """A part of the search."""
-        assert self.search is not None
-        try:
-            for _ in range(AT_ONCE):
-                next(self.search)
-        except StopIteration as end:
-            self.search = None
-            self.take(each for each in end.value if is_clear(each, SURE_SHAKEN))
 
 
 def _frequencies(boom: _Boom) -> Array:
@@ -226,16 +196,13 @@ class Signatures:
 
         One a call: a changed boom takes 2 ms, all of them together would keep a sample waiting.
         """
-        if work.search is not None:
-            work.look()
-            return work.search is not None or bool(len(work.problem.modes))
-        if work.made == len(self._changed) or not len(work.problem.modes):
+        if work.made == len(self._changed) or not len(work.model):
             return False
         place, step, boom = self._changed[work.made]
         boom.follow(work.stand)
         if boom.rest(work.problem.strokes) is None:
             raise SolverError("a changed boom finds no rest")
-        work.problem.frequencies[:, 1 + place] = (_frequencies(boom) / work.model - 1.0)[work.problem.modes] / step
+        work.problem.frequencies[:, 1 + place] = (_frequencies(boom)[work.problem.modes] / work.model - 1.0) / step
         work.made += 1
         return work.made < len(self._changed)
 
@@ -244,16 +211,20 @@ class Signatures:
         if there is None:
             return None
         table = np.column_stack([readings.left, there.channels])
-        none, model = np.zeros(0), _frequencies(self.nominal)
-        rows = np.zeros((0, table.shape[1]))
+        model = _frequencies(self.nominal)
+        sensed: dict[int, tuple[float, float]] = {}
+        for each in readings.vibrations:
+            mode = int(np.argmin(np.abs(model - each.frequency)))
+            off, sigma = each.frequency / model[mode] - 1.0, each.frequency_sigma / model[mode]
+            if abs(off) < NEAR and (mode not in sensed or sigma < sensed[mode][1]):
+                sensed[mode] = off, sigma
+        modes = np.array(sorted(sensed), np.int64)
+        frequencies = np.zeros((len(modes), 1 + len(self.known)))
+        frequencies[:, 0] = [sensed[mode][0] for mode in modes.tolist()]
+        sigmas = np.array([sensed[mode][1] for mode in modes.tolist()])
         start, end, strokes = readings.start, readings.end, readings.strokes
-        problem = HoldProblem(start, end, strokes, table, readings.unrest, none.astype(np.int64), rows, none, there.tip)
-        work = HoldInWork(problem, self.nominal.stand(), model)
-        work.take(readings.vibrations)
-        if readings.shaken is not None:
-            dt, samples = readings.shaken
-            work.search = forced_vibrations(dt, samples, model[model < PASSED * 0.5 / dt])
-        return work
+        problem = HoldProblem(start, end, strokes, table, readings.unrest, modes, frequencies, sigmas, there.tip)
+        return HoldInWork(problem, self.nominal.stand(), model[modes])
 
     def at(self, strokes: Array) -> Signature | None:
         """At `strokes` (m), shape (n,); None where there is no equilibrium."""
