@@ -12,11 +12,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from eventually import eventually
 from matplotlib.image import imread
 
 from boom_twin import frequency_response
@@ -105,22 +107,23 @@ def cells(page: Any, selector: str) -> list[list[str]]:
 
 def test_the_first_glance_says_what_is_wrong_in_word_shape_and_reason(page: Any) -> None:
     overall = page.locator("#overall")
-    assert page.locator("#dropped").is_hidden()
-    assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "FAULT"
-    assert overall.locator(".reason").inner_text().startswith("joint_3: joint_3.sensor jumped")
-    assert overall.locator(".sign").inner_text() == "✖" and "joint_3" in overall.locator(".reason").inner_text()
-    expected = {"sensors": "OK", "model": "OK", "residuals": "ERROR", "timing": "OK", "recorder": "OFF"}
-    assert {name: page.locator(f"#group-{name}").get_attribute("data-level") for name in expected} == expected
-    assert page.locator("#group-residuals .detail").inner_text() == "for 10 s"
-    assert re.fullmatch(r"gap s [\d.]+, limit 0.1, for \d+ s", page.locator("#group-sensors .detail").inner_text())
+
+    def the_fault() -> None:
+        assert page.locator("#dropped").is_hidden()
+        assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "FAULT"
+        assert overall.locator(".reason").inner_text().startswith("joint_3: joint_3.sensor jumped")
+        assert overall.locator(".sign").inner_text() == "✖" and "joint_3" in overall.locator(".reason").inner_text()
+        expected = {"sensors": "OK", "model": "OK", "residuals": "ERROR", "timing": "OK", "recorder": "OFF"}
+        assert {name: page.locator(f"#group-{name}").get_attribute("data-level") for name in expected} == expected
+        assert page.locator("#group-residuals .detail").inner_text() == "for 10 s"
+        assert re.fullmatch(r"gap s [\d.]+, limit 0.1, for \d+ s", page.locator("#group-sensors .detail").inner_text())
+
+    eventually(the_fault)
     go(page, 10.0)
-    assert overall.locator(".word").inner_text() == "ALL WELL"
+    wait(page, "document.querySelector('#overall .word').innerText === 'ALL WELL'")
 
 
 def test_the_figures_are_those_of_the_rows(page: Any, feed: Feed) -> None:
-    page.wait_for_timeout(600)
-    shown = {row[0]: [float(cell) for cell in row[1:]] for row in cells(page, "#figures")[1:]}
-    low, high = page.evaluate("twin.view.span")
     names = {
         "accel. forward, m/s²": ("acceleration", 0, 1.0),
         "displ. up, mm": ("displacement", 1, 1e3),
@@ -128,13 +131,19 @@ def test_the_figures_are_those_of_the_rows(page: Any, feed: Feed) -> None:
         "IMU measured z, m/s²": ("force", 1, 1.0),
         "IMU predicted x, m/s²": ("force", 2, 1.0),
     }
-    for name, (table, column, factor) in names.items():
-        times, values = feed.store.tables[table].rows(0, 10**6)
-        chosen = factor * values[(times >= low) & (times < high), column].astype(float)
-        rms, peak = chosen.std(), np.abs(chosen - chosen.mean()).max()
-        expected = [chosen.mean(), rms, peak, np.ptp(chosen), peak / rms]
-        assert shown[name][1:] == pytest.approx(expected[1:], rel=2e-3), name
-        assert shown[name][0] == pytest.approx(expected[0], rel=2e-3, abs=0.1 * rms), name
+
+    def of_the_rows() -> None:
+        shown = {row[0]: [float(cell) for cell in row[1:]] for row in cells(page, "#figures")[1:]}
+        low, high = page.evaluate("twin.view.span")
+        for name, (table, column, factor) in names.items():
+            times, values = feed.store.tables[table].rows(0, 10**6)
+            chosen = factor * values[(times >= low) & (times < high), column].astype(float)
+            rms, peak = chosen.std(), np.abs(chosen - chosen.mean()).max()
+            expected = [chosen.mean(), rms, peak, np.ptp(chosen), peak / rms]
+            assert shown[name][1:] == pytest.approx(expected[1:], rel=2e-3), name
+            assert shown[name][0] == pytest.approx(expected[0], rel=2e-3, abs=0.1 * rms), name
+
+    eventually(of_the_rows)
 
 
 def test_the_exported_table_holds_every_row_that_is_shown(page: Any, feed: Feed) -> None:
@@ -168,15 +177,17 @@ def test_every_chart_shows_its_traces_with_a_read_out(page: Any, name: str) -> N
     assert data == 1
     box = chart.locator(".u-over").bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    values = chart.locator(".u-series:not(.quiet):not(.u-off) .u-value").all_inner_texts()
-    assert all(math.isfinite(float(value)) for value in values) and len(values) >= 3
-    assert float(values[0]) == pytest.approx(sum(page.evaluate("twin.view.span")) / 2, abs=1.0)
+
+    def the_read_out() -> None:
+        values = chart.locator(".u-series:not(.quiet):not(.u-off) .u-value").all_inner_texts()
+        assert all(math.isfinite(float(value)) for value in values) and len(values) >= 3
+        assert float(values[0]) == pytest.approx(sum(page.evaluate("twin.view.span")) / 2, abs=1.0)
+
+    eventually(the_read_out)
 
 
 def test_alarms_of_what_is_shown_are_told_in_words_and_as_bars(page: Any, feed: Feed) -> None:
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "joint_3")
-    words = page.locator("#during").inner_text()
-    assert words.startswith(f"✖ joint_3: {alarm.reason}, since 15.0 s") and "✖ residual joint_3: " in words
     script = """moments => {
         const canvas = document.querySelector("#chart-acceleration canvas");
         const over = document.querySelector("#chart-acceleration .u-over");
@@ -185,10 +196,16 @@ def test_alarms_of_what_is_shown_are_told_in_words_and_as_bars(page: Any, feed: 
         const context = canvas.getContext("2d"), y = scale * (over.offsetTop + 2);
         const pixel = moment => context.getImageData(scale * at(moment), y, 1, 1).data;
         return moments.map(moment => [...pixel(moment)]) }"""
-    before, during = page.evaluate(script, [alarm.begin - 2.0, alarm.begin + 2.0])
-    assert before[:3] != during[:3] and during[0] > 150 > during[2]
+
+    def words_and_bars() -> None:
+        words = page.locator("#during").inner_text()
+        assert words.startswith(f"✖ joint_3: {alarm.reason}, since 15.0 s") and "✖ residual joint_3: " in words
+        before, during = page.evaluate(script, [alarm.begin - 2.0, alarm.begin + 2.0])
+        assert before[:3] != during[:3] and during[0] > 150 > during[2]
+
+    eventually(words_and_bars)
     go(page, 10.0)
-    assert page.locator("#during").inner_text() == ""
+    wait(page, "document.querySelector('#during').innerText === ''")
 
 
 def test_the_tip_has_a_band_of_what_it_may_be_off_by(page: Any, feed: Feed) -> None:
@@ -201,12 +218,16 @@ def test_the_tip_has_a_band_of_what_it_may_be_off_by(page: Any, feed: Feed) -> N
 
 def test_the_estimate_has_its_lines_and_bands_and_the_load_is_told(page: Any) -> None:
     go(page, 12.0)
-    for name, first in (("displacement", 7), ("acceleration", 3)):
-        labels = page.locator(f"#chart-{name} .u-legend .u-label").all_inner_texts()
-        assert [label for label in labels if label.startswith("est.")] == ["est. forward", "est. up"]
-        data = page.evaluate("name => twin.charts(name).plot.data.map(column => column.filter(v => v != null))", name)
-        estimate, high, low = (np.array(data[first + i]) for i in (0, 2, 3))
-        assert len(estimate) > 100 and (high > estimate).all() and (low < estimate).all()
+
+    def the_lines_and_bands() -> None:
+        for name, first in (("displacement", 7), ("acceleration", 3)):
+            labels = page.locator(f"#chart-{name} .u-legend .u-label").all_inner_texts()
+            assert [label for label in labels if label.startswith("est.")] == ["est. forward", "est. up"]
+            data = page.evaluate("name => twin.charts(name).plot.data.map(column => column.filter(v => v != null))", name)
+            estimate, high, low = (np.array(data[first + i]) for i in (0, 2, 3))
+            assert len(estimate) > 100 and (high > estimate).all() and (low < estimate).all()
+
+    eventually(the_lines_and_bands)
     page.keyboard.press("4")
     page.locator("#load", has_text="load at the tip: none above 20 N").wait_for()
     page.keyboard.press("1")
@@ -218,10 +239,11 @@ def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
     page.mouse.down()
     page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 20, steps=5)
     page.mouse.up()
+    wait(page, "twin.view.zoom !== null")
     low, high = page.evaluate("twin.view.span")
     assert high - low == pytest.approx(6.0, abs=0.2)
     page.locator("#all").click()
-    assert page.evaluate("twin.view.zoom") is None
+    wait(page, "twin.view.zoom === null")
 
 
 def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
@@ -236,8 +258,7 @@ def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
 @pytest.mark.parametrize("seconds", ["10", "30", "60", "180", "600"])
 def test_the_span_that_is_shown_can_be_chosen(page: Any, seconds: str) -> None:
     page.locator("#window").select_option(seconds)
-    low, high = page.evaluate("twin.view.span")
-    assert high - low == pytest.approx(float(seconds))
+    wait(page, f"Math.abs(twin.view.span[1] - twin.view.span[0] - {seconds}) < 1e-6")
 
 
 def test_a_finger_opens_tabs_and_chooses_a_span(browser: Any, monitor: Monitor) -> None:
@@ -282,14 +303,19 @@ def test_every_tab_fits_the_screen(browser: Any, monitor: Monitor, size: tuple[i
     page.goto(monitor.url)
     wait(page, "twin.timeline.isRead", 120_000)
     go(page, 10.0)
-    for tab in ("traces", "spectrum", "spectrogram", "shape", "state", "path", "response"):
-        page.locator(f"#tabs button[data-tab='{tab}']").click()
-        page.wait_for_timeout(300)
+
+    def nothing_cut(tab: str) -> None:
         beyond = "filter(e => e.getBoundingClientRect().right > innerWidth + 1).map(e => e.id)"
         assert page.evaluate(f"[...document.querySelectorAll('body *')].{beyond}") == [], tab
         assert page.evaluate("document.querySelector('main').clientHeight / innerHeight") >= SIZES[size], tab
+
+    for tab in ("traces", "spectrum", "spectrogram", "shape", "state", "path", "response"):
+        page.locator(f"#tabs button[data-tab='{tab}']").click()
+        wait(page, f"getComputedStyle(document.getElementById('{tab}')).display !== 'none'")
+        page.wait_for_timeout(300)
+        eventually(partial(nothing_cut, tab))
     page.keyboard.press("1")
-    page.wait_for_timeout(600)
+    wait(page, "document.querySelectorAll('#figures tr').length > 1")
     right = "[...document.querySelectorAll('#figures tr')].slice(0, 2).map(row => getComputedStyle(row.cells[3]).textAlign)"
     assert page.evaluate(right) == ["right", "right"], "heads stand over their numbers"
     context.close()
@@ -298,19 +324,26 @@ def test_every_tab_fits_the_screen(browser: Any, monitor: Monitor, size: tuple[i
 def test_spectrum_and_spectrogram(page: Any) -> None:
     page.keyboard.press("2")
     wait(page, "document.querySelectorAll('#peaks tr').length > 2")
-    rows = cells(page, "#peaks")[1:]
-    natural = sorted(float(row[3]) for row in rows if row[3][0].isdigit())
-    assert len(natural) == 6 and natural[0] == pytest.approx(1.06, abs=0.05)
-    peaks = [row for row in rows if row[0]]
-    assert float(peaks[0][0]) == pytest.approx(natural[0], rel=0.2) and 0.0 < float(peaks[0][1]) < 20.0
-    assert not any(character.isdigit() for row in peaks for cell in row[2:] for character in cell)  # it was moved: of no mode
-    words = page.locator("#peaks caption").inner_text()
-    assert words.startswith("measured by the IMU, last 40 s") and "THE BOOM MOVED" in words
-    assert page.locator("#density canvas").count() == 1
+
+    def the_spectrum() -> None:
+        rows = cells(page, "#peaks")[1:]
+        natural = sorted(float(row[3]) for row in rows if row[3][0].isdigit())
+        assert len(natural) == 6 and natural[0] == pytest.approx(1.06, abs=0.05)
+        peaks = [row for row in rows if row[0]]
+        assert float(peaks[0][0]) == pytest.approx(natural[0], rel=0.2) and 0.0 < float(peaks[0][1]) < 20.0
+        told = [character.isdigit() for row in peaks for cell in row[2:] for character in cell]
+        assert not any(told), "it was moved: of no mode"
+        words = page.locator("#peaks caption").inner_text()
+        assert words.startswith("measured by the IMU, last 40 s") and "THE BOOM MOVED" in words
+        assert page.locator("#density canvas").count() == 1
+
+    def the_spectrogram() -> None:
+        words = page.locator("#waterfall-words").inner_text()
+        assert "dB" in words and "acceleration, measured by the IMU, both directions" in words and is_drawn(page, "#waterfall")
+
+    eventually(the_spectrum)
     page.keyboard.press("3")
-    page.wait_for_timeout(1500)
-    words = page.locator("#waterfall-words").inner_text()
-    assert "dB" in words and "acceleration, measured by the IMU, both directions" in words and is_drawn(page, "#waterfall")
+    eventually(the_spectrogram)
 
 
 def is_drawn(page: Any, canvas: str) -> bool:
@@ -322,27 +355,36 @@ def is_drawn(page: Any, canvas: str) -> bool:
 
 def test_the_shape_states_exaggeration_reach_height_and_forces(page: Any, feed: Feed) -> None:
     page.keyboard.press("4")
-    page.wait_for_timeout(300)
     table = feed.store.tables["shape"]
     row = table.until(FAULT)
     values = dict(zip(table.columns, table.rows(row - 1, row)[1][0].tolist(), strict=True))
     last = max(int(name.split("_")[1]) for name in values if name.startswith("line_"))
+    strongest = max(abs(value) for name, value in values.items() if name.startswith("force_"))
+
+    def drawn(factor: int) -> None:
+        assert f"x{factor};" in page.locator("#exaggeration").inner_text() and is_drawn(page, "#boom")
+
+    def told() -> None:
+        assert page.locator("#reach").inner_text() == f"reach {values[f'line_{last}_x_m']:.3f} m"
+        assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
+        assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
+
     for factor in (1, 10, 50):
         page.locator(f"#factors button[data-factor='{factor}']").click()
-        page.wait_for_timeout(200)
-        assert f"x{factor};" in page.locator("#exaggeration").inner_text() and is_drawn(page, "#boom")
-    assert page.locator("#reach").inner_text() == f"reach {values[f'line_{last}_x_m']:.3f} m"
-    assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
-    strongest = max(abs(value) for name, value in values.items() if name.startswith("force_"))
-    assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
+        eventually(partial(drawn, factor))
+    eventually(told)
 
 
 def test_labels_of_cylinders_lie_over_no_line(page: Any) -> None:
     page.keyboard.press("4")
-    page.wait_for_timeout(500)
     script = "() => { const s = twin.shape; s.draw(); return s.drawn }"
-    drawn = page.evaluate(script)
-    assert len(drawn["boxes"]) >= 4
+    drawn: dict[str, list[Any]] = {}
+
+    def all_boxes() -> None:
+        drawn.update(page.evaluate(script))
+        assert len(drawn["boxes"]) >= 4
+
+    eventually(all_boxes)
     for left, top, right, bottom in drawn["boxes"]:
         for (x0, y0), (x1, y1) in drawn["segments"]:
             along = np.linspace(0.0, 1.0, 500)
@@ -352,50 +394,61 @@ def test_labels_of_cylinders_lie_over_no_line(page: Any) -> None:
 
 def test_the_way_of_the_tip_is_drawn_and_told(page: Any) -> None:
     page.keyboard.press("6")
-    page.wait_for_timeout(500)
-    assert is_drawn(page, "#way")
-    assert re.search(r"now \d\.\d{3} m forward, -?\d\.\d{3} m up", page.locator("#way-words").inner_text())
+
+    def drawn_and_told() -> None:
+        assert is_drawn(page, "#way")
+        assert re.search(r"now \d\.\d{3} m forward, -?\d\.\d{3} m up", page.locator("#way-words").inner_text())
+
+    eventually(drawn_and_told)
 
 
 def test_no_legend_is_cut_and_a_chart_without_data_takes_no_room(page: Any) -> None:
-    for width in (1280, 820):
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(600)
+    def no_legend_cut() -> None:
         for chart in page.locator("#charts .chart:visible").all():
             frame, legend = chart.bounding_box(), chart.locator(".u-legend").bounding_box()
             assert legend["y"] + legend["height"] <= frame["y"] + frame["height"] + 1
-            right = max(
-                cell.bounding_box()["x"] + cell.bounding_box()["width"] for cell in chart.locator(".u-label:visible").all()
-            )
-            assert right <= frame["x"] + frame["width"] + 1
+            labels = [label.bounding_box() for label in chart.locator(".u-label:visible").all()]
+            assert max(label["x"] + label["width"] for label in labels) <= frame["x"] + frame["width"] + 1
+
+    for width in (1280, 820):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(600)
+        eventually(no_legend_cut)
     empty = "const e = document.createElement('div'); e.className = 'chart'; document.getElementById('charts').append(e)"
     assert page.evaluate(f"(() => {{ {empty}; const seen = e.offsetHeight; e.remove(); return seen }})()") == 0
 
 
 def test_every_lamp_and_alarm_is_listed_and_can_be_acknowledged(page: Any, feed: Feed) -> None:
     page.keyboard.press("5")
-    page.wait_for_timeout(1200)
-    lamps = cells(page, "#lamps")
     groups = feed.store.statuses(FAULT).groups(FAULT).values()
-    assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group} - {"health"} | {"joint_3"}
-    judged = next(row for row in cells(page, "#alarms") if row[0] == "joint_3")
-    assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00", "lasts"]
-    wrong = next(row for row in lamps if row[1] == "residual joint_3")
-    assert wrong[2] == "✖ ERROR" and float(wrong[5]) > float(wrong[6]) == 4.0
+
+    def all_listed() -> None:
+        lamps = cells(page, "#lamps")
+        assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group} - {"health"} | {"joint_3"}
+        judged = next(row for row in cells(page, "#alarms") if row[0] == "joint_3")
+        assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00", "lasts"]
+        wrong = next(row for row in lamps if row[1] == "residual joint_3")
+        assert wrong[2] == "✖ ERROR" and float(wrong[5]) > float(wrong[6]) == 4.0
+
+    eventually(all_listed)
     alarms = page.locator("#alarms tr", has_text="residual joint_3")
     alarms.locator("button").click()
     alarms.get_by_text("acknowledged").wait_for()
-    assert page.locator("#answer").inner_text() == "acknowledged: residual joint_3"
+    wait(page, "document.querySelector('#answer').innerText === 'acknowledged: residual joint_3'")
 
 
 def test_the_time_line_shows_alarms_and_gaps_and_jumps_between_them(page: Any, replayed: Path) -> None:
     alarms = json.loads((replayed / "summary.json").read_text())["alarms"]
     gap = next(alarm for alarm in alarms if alarm["kind"] == "gap")
-    titles = page.locator("#marks i").evaluate_all("marks => marks.map(mark => mark.title)")
-    assert any("residual joint_3" in title for title in titles)
-    assert any(title.startswith("cylinder_strokes: gap of 0.6") and f"{gap['from_s']:.2f} s" in title for title in titles)
+
+    def marks() -> None:
+        titles = page.locator("#marks i").evaluate_all("marks => marks.map(mark => mark.title)")
+        assert any("residual joint_3" in title for title in titles)
+        assert any(title.startswith("cylinder_strokes: gap of 0.6") and f"{gap['from_s']:.2f} s" in title for title in titles)
+
+    eventually(marks)
     page.evaluate("twin.timeline.seek(20)")
-    page.wait_for_timeout(1000)
+    wait(page, "Math.abs(twin.timeline.position - 20) < 0.1 && Math.abs(twin.view.newest - 20) < 0.1")
     page.locator("#after").click()
     wait(page, f"Math.abs(twin.timeline.position - {gap['from_s']}) < 0.1")
     page.keyboard.press(",")
@@ -410,7 +463,7 @@ def test_scrubber_speed_and_play(page: Any) -> None:
     wait(page, "twin.timeline.position > 18")
     page.keyboard.press(" ")
     wait(page, "twin.timeline.isHeld")
-    assert page.locator("#play").inner_text() == "Play"
+    wait(page, "document.querySelector('#play').innerText === 'Play'")
     assert re.fullmatch(r"[\d.]+ of 40\.00 s", page.locator("#position").inner_text())
 
 
@@ -424,31 +477,31 @@ def test_dark_and_light_by_key_kept_over_a_reload(page: Any) -> None:
 
     before = themes()
     page.keyboard.press("t")
+    wait(page, f"document.documentElement.dataset.theme !== '{before[0]}'")
     after = themes()
     assert before[0] != after[0] and before[1] != after[1]
     page.reload()
-    assert themes()[0] == after[0]
-    assert page.locator("#theme").inner_text() == ("Light" if after[0] == "dark" else "Dark")
+    wait(page, f"document.documentElement.dataset.theme === '{after[0]}'")
+    wait(page, f"document.querySelector('#theme').innerText === '{'Light' if after[0] == 'dark' else 'Dark'}'")
 
 
 def test_the_response_in_this_posture_with_the_measured_spectrum_over_it(page: Any, feed: Feed) -> None:
     page.keyboard.press("7")
     wait(page, "twin.response.chart && twin.response.chart.plot.data.length === 7")
-    words = page.locator("#response-words").inner_text()
-    assert words.startswith("amplitude of the tip's acceleration") and "measured by the IMU, last 40 s" in words
-    frequencies, *curves, measured = page.evaluate(RESPONSE)
-    response = frequency_response(None, np.array(frequencies), strokes=feed.strokes(FAULT), drive=2).tip_acceleration
-    expected = pytest.approx(1e-3 * np.linalg.norm(response, axis=1), rel=2e-2)
-    end = time.monotonic() + PATIENCE / 1000
-    while np.array(curves[2]) != expected and time.monotonic() < end:  # what is drawn may still be of the posture before
-        page.wait_for_timeout(50)
+
+    def of_this_posture() -> None:
+        words = page.locator("#response-words").inner_text()
+        assert words.startswith("amplitude of the tip's acceleration") and "measured by the IMU, last 40 s" in words
         frequencies, *curves, measured = page.evaluate(RESPONSE)
-    assert np.array(curves[2]) == expected
-    assert len(curves) == 5 and sum(value is not None for value in measured) > 300
-    labels = page.locator("#answers .u-label").all_inner_texts()
-    assert labels[1:3] == ["1 N at the tip, up", "1 mm of cylinder 1"] and "measured by the IMU" in labels[-1]
-    box = page.locator("#answers canvas").bounding_box()
-    assert box["height"] > 300 and box["width"] > 800
+        response = frequency_response(None, np.array(frequencies), strokes=feed.strokes(FAULT), drive=2).tip_acceleration
+        assert np.array(curves[2]) == pytest.approx(1e-3 * np.linalg.norm(response, axis=1), rel=2e-2)
+        assert len(curves) == 5 and sum(value is not None for value in measured) > 300
+        labels = page.locator("#answers .u-label").all_inner_texts()
+        assert labels[1:3] == ["1 N at the tip, up", "1 mm of cylinder 1"] and "measured by the IMU" in labels[-1]
+        box = page.locator("#answers canvas").bounding_box()
+        assert box["height"] > 300 and box["width"] > 800
+
+    eventually(of_this_posture)
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (1180, 820)])
@@ -457,10 +510,14 @@ def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: 
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.keyboard.press(tab)
     page.wait_for_timeout(400)
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    for selector in ("#overall", "#group-recorder", "#tabs", "#theme", "#timeline"):
-        box = page.locator(selector).bounding_box()
-        assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["height"] > 20, selector
+
+    def nothing_cut() -> None:
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        for selector in ("#overall", "#group-recorder", "#tabs", "#theme", "#timeline"):
+            box = page.locator(selector).bounding_box()
+            assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["height"] > 20, selector
+
+    eventually(nothing_cut)
 
 
 def test_everything_comes_from_this_server(page: Any, monitor: Monitor) -> None:
