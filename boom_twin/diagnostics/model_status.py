@@ -54,6 +54,10 @@ class ModelWatch:
             self.failures += 1
             self._fail(report.status)
 
+    def worked(self, duration: float) -> None:
+        """The twin was busy for so many seconds beside its samples."""
+        self._busy += duration
+
     def break_down(self, reason: str) -> None:
         """A message could not be handled."""
         self.broken += 1

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ..config.settings import Thresholds
-from ..types import Report, Residuals, Sample, Stream
+from ..types import Health, Report, Residuals, Sample, Stream
 from .levels import Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
 from .sensor_status import SensorJudge, SensorSpec
@@ -16,6 +16,15 @@ from .source_status import PublishersJudge, Reception, ReceptionJudge
 from .stream_stats import StreamWatch
 from .stress_status import StressWatch
 from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
+
+
+def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
+    """All of a look at once, see `TwinWatch.look`."""
+    while True:
+        try:
+            next(look)
+        except StopIteration as end:
+            return list(end.value)
 
 
 class TwinWatch:
@@ -83,9 +92,14 @@ class TwinWatch:
                 self._stress.took(each.prediction, each.estimate)
             if each.estimate is not None:
                 self._load.took(each.estimate)
-            if each.health is not None:
-                self.health = self.health or HealthWatch()
-                self.health.took(each.health)
+            self.judged(each.health, 0.0)
+
+    def judged(self, health: Health | None, duration: float) -> None:
+        """The twin judged the rig's health in so many seconds; None if there was nothing to tell."""
+        self._model.worked(duration)
+        if health is not None:
+            self.health = self.health or HealthWatch()
+            self.health.took(health)
 
     def broken(self, reason: str) -> None:
         """A message could not be handled at all."""
@@ -114,8 +128,11 @@ class TwinWatch:
         reception: Mapping[str, Reception] | None = None,
         other_booms: Mapping[Stream, str] | None = None,
         left_out: Mapping[str, int] | None = None,
-    ) -> list[Status]:
+    ) -> Generator[None, None, list[Status]]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
+
+        It is worked out in pieces, for a live node to take samples in between: each takes a millisecond or two of those of a
+        second at 1 kHz.
 
         Parameters
         ----------
@@ -135,13 +152,30 @@ class TwinWatch:
             Of inputs whose messages are of another boom: that in words.
         left_out : dict of str to int, optional
             What was left out for lack of time since the node was configured, by what it is.
+
+        Yields
+        ------
+        None
+            After every piece but the last.
+
+        Returns
+        -------
+        list of Status
         """
-        at, others = Evaluation(self.thresholds, self._monotonic(), clock), other_booms or {}
+
+        def now() -> Evaluation:
+            return Evaluation(self.thresholds, self._monotonic(), clock)
+
+        at, others, sensors = now(), other_booms or {}, list[Status]()
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
         found = [self._model.status(counts, is_active, is_fed, at)]
         if not is_active:
             return found
-        sensors = [status for stream in self._streams for status in self._look_at(stream, at)]
+        for stream in self._streams:
+            yield
+            sensors += self._look_at(stream, now())
+        yield
+        at = now()
         found += [self._topic(stream, publishers[stream], at, others.get(stream, "")) for stream in self._streams]
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
@@ -152,9 +186,10 @@ class TwinWatch:
             found.append(self.health.status(at))
         if (load := self._load.status(at)) is not None:
             found.append(load)
+        yield
         if self._stress is not None and (stress := self._stress.status(at)) is not None:
             found.append(stress)
-        return found + sensors + self._look_at_residuals(at)
+        return found + sensors + (yield from self._look_at_residuals(now))
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
@@ -172,14 +207,16 @@ class TwinWatch:
             for judge, figures in zip(self._sensors[stream], watch.look(self.thresholds.gap_warn), strict=True)
         ]
 
-    def _look_at_residuals(self, at: Evaluation) -> list[Status]:
-        """Every channel that ever had a residual."""
+    def _look_at_residuals(self, now: Callable[[], Evaluation]) -> Generator[None, None, list[Status]]:
+        """Every channel that ever had a residual, one stream after the other."""
         taken, self._residuals = self._residuals, []
         for names in dict.fromkeys(each.names for each in taken):
-            those = [each for each in taken if each.names == names]
+            yield
+            at, those = now(), [each for each in taken if each.names == names]
             values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
             for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
+        at = now()
         self._looked = at.now
         explained = "" if self.health is None else self.health.explained
         return [judge.status(self._alarm_of(name), at, explained) for name, judge in self._judges.items()]

@@ -125,10 +125,11 @@ class BlockUpdate:
         self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
+        self._due: Run | None = None  # whose newest slot is still to be judged
 
     def begin_health(self) -> None:
         """What was found up to now is of no concern to the health monitor any more."""
-        self._told = tuple(self._found.counts.tolist())
+        self._told, self._due = tuple(self._found.counts.tolist()), None
         if self._judge is not None:
             self._judge.begin()
 
@@ -150,6 +151,7 @@ class BlockUpdate:
             Why that ended, see `boom_twin.twin.update.DONE`, and how many samples were taken.
         """
         found = self._found
+        self.judge()
         self.make_room()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
             args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
@@ -188,7 +190,8 @@ class BlockUpdate:
                 self._look_around(run, row)
                 row += 1
                 if row == size:
-                    return DONE, row
+                    return DONE, row  # the judgement, if one is due, is for who asked to take
+                self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
         """What a prediction that begins a slot, left the model's validity or is not followed has beside its numbers."""
@@ -207,12 +210,26 @@ class BlockUpdate:
         if self._judge is not None and self._shedding.leaves_out_health():
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
-            self._tell_health(run.newest // SLOT * SLOT)
-            off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
-            health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
-            if health is not None:
-                news.health[row] = health
-            self._modes.mask(self._judge.masked)
+            self._due = run
+
+    def judge(self) -> Health | None:
+        """Judge the rig's health if the newest sample was the first of a slot and that was not done yet; gives the news.
+
+        What that sample caused is complete without it: a live node publishes it first. It comes before the next sample.
+        """
+        run, self._due = self._due, None
+        if run is None or self._judge is None:
+            return None
+        self._tell_health(run.newest // SLOT * SLOT)
+        off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
+        health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
+        self._modes.mask(self._judge.masked)
+        return health
+
+    def _take_judgement(self, row: int) -> None:
+        """Judge, if that is due, and give the news with sample `row`."""
+        if (health := self.judge()) is not None:
+            self._news.health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
         """Give the health monitor what has come since it was told last, but for what came last from `end` (ns) on.
@@ -286,14 +303,15 @@ class BlockUpdate:
 
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
         """What the compiled update found of samples with these stamps (ns)."""
+        self._take_judgement(len(stamps) - 1)
         block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
         if not self._news.events:
             return [block]
         reports = enumerate(block.reports(self._joints))
         return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
-    def report(self, stamp: int, events: list[str]) -> Report:
-        """What the compiled update found of one sample, of which `events` are to be told too."""
+    def report(self, stamp: int, events: list[str], judged: bool = True) -> Report:
+        """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         residuals = []
         for row in range(self._begin[1], known):
@@ -306,5 +324,5 @@ class BlockUpdate:
         prediction = self._boom.prediction(stamp, news.outlines.get(0), found.moments[predicted - 1].copy())
         told = (*events, *news.events.get(0, ()))
         estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
-        passes, health = int(found.passes[predicted - 1]), news.health.get(0)
+        passes, health = int(found.passes[predicted - 1]), self.judge() if judged else None
         return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=health, estimate=estimate)

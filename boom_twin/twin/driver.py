@@ -29,14 +29,14 @@ class Step(NamedTuple):
 
 
 @overload
-def drive(twin: Twin, items: Iterable[Sample]) -> Iterator[Step]: ...
+def drive(twin: Twin, items: Iterable[Sample], judged: bool = True) -> Iterator[Step]: ...
 
 
 @overload
-def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step | None]: ...
+def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = True) -> Iterator[Step | None]: ...
 
 
-def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step | None]:
+def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = True) -> Iterator[Step | None]:
     """Update `twin` with every sample, as it is asked for.
 
     Parameters
@@ -45,6 +45,8 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step 
     items : iterable of Sample, Change or None
         None is a message without a usable value. A change is asked of the twin, and takes effect with the next full stroke
         sample, as it did while the session was recorded.
+    judged : bool
+        See `Twin.update`.
 
     Yields
     ------
@@ -56,7 +58,7 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None]) -> Iterator[Step 
             yield None
         else:
             began = perf_counter()
-            report = twin.update(item)
+            report = twin.update(item, judged)
             yield Step(item, report, perf_counter() - began)
 
 

@@ -17,7 +17,7 @@ from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
 from ..scene.kinematics import stroke_curve
 from ..scene.source import SceneSource, as_scene
-from ..types import LIMIT, NANO, Array, Change, Mount, Report, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, Stream, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
@@ -226,13 +226,16 @@ class Twin:
         if self.judge is not None:
             warm_up()
 
-    def update(self, sample: Sample) -> Report:
+    def update(self, sample: Sample, judged: bool = True) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
 
         Parameters
         ----------
         sample : Sample
             Values of one stream at one stamp, in the scene's order.
+        judged : bool
+            With the judgement of the rig's health, where that is due. Without it the rest comes sooner, and `judge_health`
+            is to be called next.
 
         Returns
         -------
@@ -251,8 +254,12 @@ class Twin:
         self._fill_one(sample.stream, sample.stamp, sample.values)
         reason, _ = self._compiled.advance(self._run, self._one)
         if reason == DONE:
-            return self._compiled.report(sample.stamp, [])
+            return self._compiled.report(sample.stamp, [], judged)
         return self._fail(sample, []) if reason == FAILED else self._look_at(sample)
+
+    def judge_health(self) -> Health | None:
+        """Judge the rig's health, if `update` left that out for its last sample; see `Report.health`."""
+        return self._compiled.judge()
 
     def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
         """Take the samples of a block in turn, as `update` does each of them.

@@ -2,8 +2,8 @@
 
 Run ``python test/bench/live.py`` on an idle machine: real processes and DDS, loopback only; medians of three runs. A
 source sends strokes and angles, stamped with the time of sending; a listener takes everything that is published. The node
-comes first, then the echo, which is rclpy as its tutorials use it: four stamped messages for every stroke sample, one for every
-angle sample, nothing computed; once on rclpy's default executor, once on the events executor.
+comes first, then the echo, which is rclpy as its tutorials use it: the node's topics, so seven stamped messages for every
+stroke sample, one for every other sample, nothing computed; once on rclpy's default executor, once on the events executor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,15 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import AccelStamped, PointStamped, Vector3, Vector3Stamped
+from geometry_msgs.msg import (
+    AccelStamped,
+    AccelWithCovarianceStamped,
+    PointStamped,
+    PoseWithCovarianceStamped,
+    Vector3,
+    Vector3Stamped,
+    WrenchStamped,
+)
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -42,6 +50,9 @@ OUT = {
     "tip/displacement": Vector3Stamped,
     "tip/acceleration": AccelStamped,
     "joint_states": JointState,
+    "estimate/tip/pose": PoseWithCovarianceStamped,
+    "estimate/tip/acceleration": AccelWithCovarianceStamped,
+    "estimate/tip/load": WrenchStamped,
     "residuals": JointState,
 }
 SENSOR = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -58,11 +69,12 @@ class Echo(Node):
         for message in (self._out["joint_states"][1], self._out["residuals"][1]):
             message.name = [f"joint_{i}" for i in range(1, 5)]
             message.position = message.velocity = message.effort = array("d", [0.0] * 4)
-        strokes = ["tip/position", "tip/displacement", "tip/acceleration", "joint_states"]
+        strokes = [name for name in OUT if name != "residuals"]
         self.create_subscription(JointState, "cylinder_strokes", lambda msg: self._answer(msg, strokes), SENSOR)
         self.create_subscription(JointState, "joint_angles", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
+        self.create_subscription(Imu, "tip_imu", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
 
-    def _answer(self, msg: JointState, names: list[str]) -> None:
+    def _answer(self, msg: Any, names: list[str]) -> None:
         for name in names:
             publisher, answer = self._out[name]
             answer.header.stamp = msg.header.stamp
@@ -199,11 +211,11 @@ def run(who: str, rate: float, duration: float, words: list[str], arguments: lis
         finally:
             for process in (answering, listener):
                 process.kill()
-    return judge(told, heard) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
+    return judge(told, heard, 1 + ("imu" in words)) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
 
 
-def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, float]:
-    """Loss and latency of one process."""
+def judge(told: dict[str, Any], heard: dict[str, list[list[int]]], compared: int) -> dict[str, float]:
+    """Loss and latency of one process, with so many streams that are compared with the prediction."""
     answers = heard["tip/position"]
     delays = np.array([delay for _, delay in answers]) * 1e-6
     sent, stamps = told["sent"], [stamp for stamp, _ in answers]
@@ -211,7 +223,7 @@ def judge(told: dict[str, Any], heard: dict[str, list[list[int]]]) -> dict[str, 
         "rate": len(sent) / told["seconds"],
         "lost": len(set(sent) - set(stamps)),
         "twice": len(stamps) - len(set(stamps)),
-        "residuals lost": len(sent) - len(heard["residuals"]),
+        "residuals lost": compared * len(sent) - len(heard["residuals"]),
         "p50": float(np.quantile(delays, 0.5)),
         "p99": float(np.quantile(delays, 0.99)),
     }
@@ -239,9 +251,11 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=60.0, help="s (60)")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--even", action="store_true", help="stamp with the time when a message was due")
+    parser.add_argument("--imu", action="store_true", help="send and compare that too, at the same rate")
     args, rest = parser.parse_known_args()
+    words = ["even"] * args.even + ["imu"] * args.imu
     with isolated():
-        runs = [compared(args.rate, args.duration, ["even"] * args.even, rest) for _ in range(args.runs)]
+        runs = [compared(args.rate, args.duration, words, rest) for _ in range(args.runs)]
     for name in runs[0]:
         values = [each[name] for each in runs]
         print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")

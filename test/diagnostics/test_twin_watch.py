@@ -14,7 +14,7 @@ from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.stress_status import stress_watch
 from boom_twin.diagnostics.topic_status import Peers
-from boom_twin.diagnostics.twin_status import TwinWatch
+from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Estimate, Report, Residuals, Sample, Stream
@@ -42,7 +42,7 @@ class Rig:
             self.now += 0.01
             for stream in streams:
                 self._message(stream)
-        found = self.watch.look({"scene": "s"}, True, self.peers, [Peers("/out", ("/screen",))], self.now + 1e9)
+        found = all_pieces(self.watch.look({"scene": "s"}, True, self.peers, [Peers("/out", ("/screen",))], self.now + 1e9))
         return {status.name: status for status in found}
 
     def _message(self, stream: Stream) -> None:
@@ -134,7 +134,7 @@ def test_silence_is_urgent(rig: Rig) -> None:
     rig.watch.is_urgent()
     rig.now += 2.5
     assert rig.watch.is_urgent() and not rig.watch.is_urgent()
-    found = {status.name: status for status in rig.watch.look({}, True, rig.peers, [], rig.now)}
+    found = {status.name: status for status in all_pieces(rig.watch.look({}, True, rig.peers, [], rig.now))}
     assert found["model"].message == "waiting for strokes"
     assert (found["cylinder_strokes"].level, found["cylinder_strokes"].message) == (Level.STALE, "silent for 2.5 s")
 
@@ -161,9 +161,9 @@ def test_other_ends(rig: Rig) -> None:
 
 
 def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
-    (status,) = rig.watch.look({}, False, {}, [], 0.0)
+    (status,) = all_pieces(rig.watch.look({}, False, {}, [], 0.0))
     assert (status.level, status.message) == (Level.WARN, "not active")
-    (status,) = module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0)
+    (status,) = all_pieces(module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0))
     assert status.message == "not active"
 
 

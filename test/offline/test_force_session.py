@@ -16,7 +16,7 @@ from boom_twin.cli.main import main
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
-from boom_twin.diagnostics.twin_status import TwinWatch
+from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.errors import BagError, UsageError
 from boom_twin.health.baseline import Baseline, load_baseline
 from boom_twin.messages.mapping import load_mapping
@@ -84,7 +84,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     assert values.mean(axis=0) == pytest.approx([0.0, WRONG, 0.0, 0.0], abs=20.0)
     assert values.std(axis=0) == pytest.approx(SIGMA, rel=0.15)
     assert np.all(sigmas >= SIGMA) and np.all(sigmas < 6.0 * SIGMA)
-    looked = watch.look({}, True, {stream: Peers(name) for stream, name in names.items()}, (), now)
+    looked = all_pieces(watch.look({}, True, {stream: Peers(name) for stream, name in names.items()}, (), now))
     statuses = {status.name: status.message for status in looked}
     assert all(statuses[f"sensor {name}"] == "measuring" for name in CHANNELS)
     assert {"cylinder_forces", *(f"residual {name}" for name in CHANNELS)} <= set(statuses)

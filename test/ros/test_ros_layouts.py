@@ -20,7 +20,7 @@ from boom_twin.messages.type_store import new_message
 from boom_twin.messages.view_files import RVIZ, VIEWS
 
 ROOT = Path(boom_twin.__file__).parent
-LAUNCH = sorted((ROOT / "launch").iterdir())
+LAUNCH = sorted((ROOT / "launch").glob("*.py"))
 CONFIG = ROOT / "msg_config"
 TOPICS = {topic.absolute: topic for each in (load_topics().inputs, load_topics().outputs) for topic in each.values()}
 CHANNELS = [f"{kind}_{i}" for kind in ("joint", "cylinder") for i in range(1, 5)] + ["tip_imu_x", "tip_imu_z"]

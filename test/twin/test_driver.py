@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import boom_twin
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin.health.baseline import load_baseline
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.topic_table import Output
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.driver import drive
 from boom_twin.types import Change
@@ -74,3 +77,45 @@ def test_there_is_one_loop() -> None:
         "ros/node/node.py",
     }  # fmt: skip
     assert {name for name, text in texts.items() if re.search(r"twin\.update\(\w", text)} == {"twin/driver.py"}
+
+
+def spoilt_samples(seconds: float) -> Iterator[Sample]:
+    """A boom at rest at 100 Hz whose third encoder stands still from 2 s on: its sensor gets masked."""
+    random, angles = np.random.default_rng(3), statics(None, "arch").joints
+    stuck = angles[2]
+    for k in range(round(seconds * 100)):
+        stamp = 10**18 + 2 * k * RATE
+        yield Sample(Stream.STROKES, stamp, STROKES + random.normal(0.0, 2e-5, 4))
+        read = angles + random.normal(0.0, 1.7e-4, 4)
+        stuck = read[2] if k < 200 else stuck
+        yield Sample(Stream.ANGLES, stamp, np.array([*read[:2], stuck, read[3]]))
+
+
+def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
+    """Every message of the two ways, to the bit; what was told first lacks nothing but the health."""
+    whole, apart, encoder = {}, {}, ReportEncoder(load_scene(), Settings())
+    for step in drive(Twin(load_scene(), baseline=load_baseline()), spoilt_samples(6.0)):
+        for key, data in encoder.fill(step.report):
+            whole.setdefault(key, []).append(data)
+    twin, told = Twin(load_scene(), baseline=load_baseline()), set()
+    for step in drive(twin, spoilt_samples(6.0), judged=False):
+        assert step.report.health is None
+        messages = encoder.fill(step.report)
+        if (health := twin.judge_health()) is not None:
+            assert step.report.prediction is not None
+            messages += encoder.fill(Report(step.sample.stamp, True, health=health))
+            told |= {alarm.cause for alarm in health.alarms}
+        assert twin.judge_health() is None
+        for key, data in messages:
+            apart.setdefault(key, []).append(data)
+    assert told == {"joint_3.sensor"} and len(whole[Output.HEALTH]) >= 5
+    assert apart == whole
+
+
+def test_a_judgement_that_was_not_asked_for_still_guards_the_next_sample() -> None:
+    """What is believed of a sensor never depends on who asks."""
+    judged, neglected = (Twin(load_scene(), baseline=load_baseline()) for _ in range(2))
+    for one, other in zip(drive(judged, spoilt_samples(4.0)), drive(neglected, spoilt_samples(4.0), judged=False), strict=True):
+        if one.report.estimate is not None:
+            assert other.report.estimate is not None
+            assert one.report.estimate.tip.tobytes() == other.report.estimate.tip.tobytes()

@@ -18,7 +18,7 @@ from ...diagnostics.boom_mismatch import OtherBoom
 from ...diagnostics.levels import Status
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
-from ...diagnostics.twin_status import TwinWatch
+from ...diagnostics.twin_status import TwinWatch, all_pieces
 from ...errors import BagError, BoomTwinError
 from ...health.baseline import Baseline
 from ...messages.report_encoder import ReportEncoder
@@ -227,7 +227,7 @@ class _Twin:
             raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
-        found = self._watch.look(self.twin.counts, True, self._peers, (), self._time)
+        found = all_pieces(self._watch.look(self.twin.counts, True, self._peers, (), self._time))
         store, now = self._feed.store, self._feed.now()
         store.set_statuses(now, store.statuses(now).told(now, map(_as_message, found), self._time))
         self._looked = self._time

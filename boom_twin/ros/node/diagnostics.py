@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
@@ -27,7 +27,7 @@ from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
-from ...types import NANO, Report, Sample, Stream
+from ...types import NANO, Health, Report, Sample, Stream
 from ..log import Log
 from ..runtime import qos_profile
 from .receive_queue import ReceiveQueue
@@ -154,6 +154,7 @@ def node_name(endpoint: Any) -> str:
 
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
+PIECE = 0.002  # s from one piece of such a look to the next: samples are taken in between
 
 
 class Diagnostics:
@@ -175,6 +176,9 @@ class Diagnostics:
         self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS], hardware_id)
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._pieces = node.create_timer(PIECE, self._go_on, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._pieces.cancel()
+        self._work: Iterator[None] | None = None
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
@@ -199,10 +203,12 @@ class Diagnostics:
     def start(self) -> None:
         """The node is active: from now on an input that is silent is stale."""
         self._watch.begin()
+        self._drop_work()
         self._active = True
 
     def stop(self) -> None:
         """The node is active no more."""
+        self._drop_work()
         self._active = False
 
     def seen(self, stream: Stream, stamp: int) -> None:
@@ -212,6 +218,10 @@ class Diagnostics:
     def took(self, sample: Sample, report: Report, duration: float) -> None:
         """The twin made `report` of `sample` in so many seconds."""
         self._watch.took(sample, report, duration)
+
+    def judged(self, health: Health | None, duration: float) -> None:
+        """The twin judged the rig's health in so many seconds, or had nothing to tell."""
+        self._watch.judged(health, duration)
 
     def acknowledge(self) -> str:
         """Somebody has seen the alarms of the rig's health; says which of them ended and are let go."""
@@ -226,11 +236,21 @@ class Diagnostics:
         """Look up one topic's other ends; look at everything, if it is due."""
         self._peers.look()
         now = time.monotonic()
-        if now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent()):
+        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent())):
             self._due = now + PERIOD
-            self._look()
+            self._work = self._look()
+            self._pieces.reset()
 
-    def _look(self) -> None:
+    def _go_on(self) -> None:
+        """Do the next piece of the look that was begun."""
+        if self._work is None or next(self._work, self) is self:
+            self._drop_work()
+
+    def _drop_work(self) -> None:
+        self._pieces.cancel()
+        self._work = None
+
+    def _look(self) -> Iterator[None]:
         clock = self._node.get_clock().now().nanoseconds * NANO
         told: dict[str, str | int] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
@@ -239,7 +259,9 @@ class Diagnostics:
         ends = peers.publishers, peers.subscribers.values()
         shed = self._shedding
         left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
-        self._publisher.show(self._watch.look(told, self._active, *ends, clock, received, others, left_out))
+        found = yield from self._watch.look(told, self._active, *ends, clock, received, others, left_out)
+        yield
+        self._publisher.show(found)
         self._tell_oddities()
         self._tell_clock(clock)
 

@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
+from time import perf_counter
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
@@ -23,7 +24,7 @@ from ...messages.topic_table import NODE, Output
 from ...twin.driver import drive
 from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
-from ...types import SENSORS, Stream
+from ...types import SENSORS, Report, Stream
 from ..log import Log
 from ..runtime import message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
@@ -217,10 +218,18 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
         self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
-        for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg)):
+        for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg), judged=False):
             self._diagnostics.took(*step)
             for each in step.report.all:
                 if each.change is not None:
                     self._start_log.tell(each, each.change)
-                for key, encoded in self._encoder.fill(each):
-                    self._outputs[key].publish(encoded)
+                self._publish(each)
+            began = perf_counter()
+            health = self._twin.judge_health()  # a millisecond, for which no prediction waits
+            if health is not None:
+                self._publish(Report(step.sample.stamp, True, health=health))
+            self._diagnostics.judged(health, perf_counter() - began)
+
+    def _publish(self, report: Report) -> None:
+        for key, encoded in self._encoder.fill(report):
+            self._outputs[key].publish(encoded)
