@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
@@ -126,6 +126,8 @@ class BlockUpdate:
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
+        self._update: Callable[..., tuple[int, int]] | None = None
+        self._measure: Callable[..., bool] | None = None
 
     def begin_health(self) -> None:
         """What was found up to now is of no concern to the health monitor any more."""
@@ -141,7 +143,7 @@ class BlockUpdate:
         run : Run or None
             The present one; only measured samples, one a block, are taken without.
         block : SampleBlock
-            At most `CAPACITY` samples.
+            At most `CAPACITY` samples; int64, int64 and float64 arrays without gaps.
         trusted : bool
             Whether its only sample was looked at before.
 
@@ -155,7 +157,10 @@ class BlockUpdate:
         self.make_room()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
             args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            is_taken = measure(self.limits, self._state, self._modes.filter, *args, trusted, found)
+            arguments = self.limits, self._state, self._modes.filter, *args, trusted, found
+            if self._measure is None:
+                self._measure = measure.for_types_of(*arguments)
+            is_taken = self._measure(*arguments)
             reason, row = (DONE, 1) if is_taken else (ODD, 0)
         else:
             reason, row = self._advance_strokes(run, block, trusted)
@@ -177,7 +182,10 @@ class BlockUpdate:
         assert run is not None
         while True:
             twin = *self._boom.compiled, self.limits, self._state, self._modes.filter
-            reason, row = update(*twin, *block, row, is_resumed, trusted, self._found)
+            arguments = *twin, *block, row, is_resumed, trusted, self._found
+            if self._update is None:
+                self._update = update.for_types_of(*arguments)
+            reason, row = self._update(*arguments)
             if is_resumed := reason == REFRESH:
                 interval, boom = run.interval or self._step, self._boom
                 prediction = boom.prediction(run.newest)

@@ -280,6 +280,7 @@ class Twin:
             As `update` does; the samples before have been taken.
         """
         found: list[ReportBlock | Report] = []
+        block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
         row, size, channels = 0, len(block.stamps), self._widths
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:

@@ -10,9 +10,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from boom_twin.compiler.compile import compile_scene
 from boom_twin.estimation.look_ahead import Track
 from boom_twin.kernels.jit import by_reference, kernel, referenced
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.scene import load_scene
 from boom_twin.twin.state import Limits, Ring, TwinState, UpdateOutput
 
 
@@ -102,3 +105,16 @@ def test_a_twin_starts_without_the_slow_parts_of_scipy():
     )
     done = subprocess.run([sys.executable, "-c", program], env=os.environ, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]", done.stdout
+
+
+def test_compiled_code_for_known_types_gives_what_the_kernel_gives() -> None:
+    """It is that of the very types, though the kernel is compiled for others too."""
+
+    plan = compile_scene(load_scene())
+    places = []
+    for put in (place, place.for_types_of(plan.tables, plan.state(), plan.work())):
+        state, work = plan.state(), plan.work()
+        state.z[:] = np.linspace(-0.01, 0.01, len(state.z))
+        put(plan.tables, state, work)
+        places.append(work.position.copy())
+    assert places[0].tobytes() == places[1].tobytes() and np.ptp(places[0]) > 1.0

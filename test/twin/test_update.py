@@ -9,7 +9,7 @@ from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.twin.blocks import ReportBlock, block_of, joined, report_block, samples_in
+from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of, joined, report_block, samples_in
 from boom_twin.types import Report
 
 MS, N = 1_000_000, 4
@@ -103,3 +103,23 @@ def test_a_block_is_taken_in_one_piece_where_nothing_is_odd() -> None:
     (block,) = twin.update_block(block_of(samples[400:], N))
     assert isinstance(block, ReportBlock) and len(block.stamps) == len(samples) - 400
     assert len(block.predictions.outlines) >= 6
+
+
+def test_arrays_of_another_layout_and_kind_are_taken_as_what_they_say() -> None:
+    """The compiled update does not look at types again: a block in columns, and of small numbers, is put right before."""
+    strokes = strokes_of_posture(load_scene(), "arch")
+    stamps = 10**18 + 5_000_000 * np.arange(40)
+    values = strokes + 1e-3 * np.sin(0.1 * np.arange(40))[:, None] * np.ones(4)
+    streams = np.zeros(40, np.int64)
+    rows = [SampleBlock(streams, stamps, values)]
+    others = [SampleBlock(streams.astype(np.int8), np.repeat(stamps, 2)[::2], np.asfortranarray(values))]
+    found = [Twin(load_scene()).update_block(block) for blocks in (rows, others) for block in blocks]
+    tips = [np.concatenate([np.atleast_2d(of_tip(each)) for each in reports]) for reports in found]
+    assert len(tips[0]) == 40 and tips[0].tobytes() == tips[1].tobytes()
+
+
+def of_tip(report: ReportBlock | Report) -> np.ndarray:
+    if isinstance(report, ReportBlock):
+        return report.predictions.tip_acceleration
+    assert report.prediction is not None
+    return report.prediction.tip_acceleration

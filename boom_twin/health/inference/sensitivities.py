@@ -101,6 +101,7 @@ class _Boom:
         self.state: State = self.plan.state()
         self.work: Work = self.plan.work()
         self._still = np.zeros(self.plan.joints)
+        self._advance: Callable[..., tuple[int, int, float]] | None = None
         self._scheme = prepare(REST, 0.0, 0.0, self.work.weights)
         self.reading = Reading(self.plan, Mounting(self.plan, scene.base.inclination, mounts))
 
@@ -111,9 +112,11 @@ class _Boom:
     def rest(self, strokes: Array) -> Array | None:
         """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
         drive = self.plan.closed_lengths + strokes
-        status, _, _ = advance(
-            self.plan.tables, self.state, self.work, self._scheme, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW
-        )
+        boom = self.plan.tables, self.state, self.work, self._scheme
+        arguments = *boom, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW
+        if self._advance is None:
+            self._advance = advance.for_types_of(*arguments)
+        status, _, _ = self._advance(*arguments)
         return self.reading.of(self.state) if status == OK else None
 
     def follow(self, other: Stand) -> None:
