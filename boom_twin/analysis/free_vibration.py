@@ -20,6 +20,8 @@ ORDER = 14
 LOWEST, HIGHEST = 0.2, 15.0
 DAMPED = 0.2
 """Largest damping ratio of what is taken for a mode."""
+DECAYS = 4.0
+"""Deviations by which a vibration has to be damped: the line of a pump is not."""
 LONGEST_STEP = 5.0
 """Deviations of a rate, by which least squares may move it; a longer step is not taken, for it is not linear."""
 
@@ -55,6 +57,11 @@ def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> l
         step, sigmas = _refined(times, x, rates)
         rates = rates + np.where(np.abs(step) < LONGEST_STEP * sigmas.max(axis=1), step, 0.0)
     return [_vibration(rate, sigma) for rate, sigma in zip(rates, sigmas, strict=True)]
+
+
+def is_free(each: Vibration) -> bool:
+    """Whether a vibration decays, as none does that a load keeps up."""
+    return each.damping > DECAYS * each.damping_sigma
 
 
 def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,10 +60,27 @@ class Fit:
         None is smaller than white noise would give: few realisations may happen to pull little.
         """
         spread, prior = max(1.0, self.misfit) ** 2, np.eye(len(self.deviations))
-        white = np.linalg.inv((self.information + more) / spread + prior)
+        white = np.linalg.inv(self._precision(more))
         found = white @ ((self.scatter + more) / spread + prior) @ white
         factors = np.sqrt(np.maximum(1.0, np.diag(white) / np.diag(found)))
         return np.asarray(factors[:, None] * found * factors)
+
+    def _precision(self, more: Array | float = 0.0) -> Array:
+        """Inverse of the covariance (p, p) that white noise would give, with the priors."""
+        return np.asarray((self.information + more) / max(1.0, self.misfit) ** 2 + np.eye(len(self.deviations)))
+
+    def without(self, left_out: Sequence[int]) -> Array:
+        """The deviations (p,) that fit best where those in places `left_out` stay 0.
+
+        What was fitted together cannot be taken apart: a zero that makes up for another's would be wrong without that.
+        """
+        fixed = np.zeros(len(self.deviations), bool)
+        fixed[list(left_out)] = True
+        found, precision = np.where(fixed, 0.0, self.deviations), self._precision()
+        if fixed.any() and not fixed.all():
+            moved = precision[np.ix_(~fixed, fixed)] @ self.deviations[fixed]
+            found[~fixed] += np.linalg.solve(precision[np.ix_(~fixed, ~fixed)], moved)
+        return found
 
 
 def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:

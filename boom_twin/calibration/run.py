@@ -274,8 +274,10 @@ def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], course
 def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[InseparableUnknowns]) -> tuple[Estimate, ...]:
     untold = {name for group in groups for name in group.names}
     reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
+    best = fit.without([i for i, unknown in enumerate(problem.unknowns) if unknown.name in untold])
+    best = np.where([unknown.name in untold for unknown in problem.unknowns], fit.deviations, best)
     found = []
-    for unknown, at, half in zip(problem.unknowns, fit.deviations.tolist(), reach.tolist(), strict=True):
+    for unknown, at, half in zip(problem.unknowns, best.tolist(), reach.tolist(), strict=True):
         values = (unknown.value(at), unknown.value(max(at - half, unknown.least)), unknown.value(at + half))
         found.append(Estimate(unknown, *values, unknown.name not in untold))
     return tuple(found)

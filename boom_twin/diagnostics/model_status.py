@@ -115,10 +115,16 @@ class ModelWatch:
 
 
 class LoadWatch:
-    """The load at the tip that the model does not know, as it was estimated in the last `LOAD_WINDOW`; it is never a fault."""
+    """The load at the tip that the model does not know, as it was estimated in the last `LOAD_WINDOW`; it is never a fault.
+
+    Attributes
+    ----------
+    explanation : str
+        Of residuals that are larger than noise, in words; empty while there was no load at the last look.
+    """
 
     def __init__(self) -> None:
-        self._judge = ComponentJudge("tip load")
+        self._judge, self.explanation = ComponentJudge("tip load"), ""
         self._stamps: deque[int] = deque()
         self._loads: deque[Array] = deque()
 
@@ -139,9 +145,11 @@ class LoadWatch:
         """In words and figures; None as long as nothing but strokes was measured."""
         finder = TipLoadFinder()
         finder.add(np.array(self._stamps, np.int64), np.array(self._loads).reshape(-1, 2))
-        load = finder.load
+        load, self.explanation = finder.load, ""
         if load is None:
             return None
+        if load.is_there:
+            self.explanation = f"a load at the tip moves the boom: {load.text}"
         self._judge.begin(at)
         self._judge.note("rms_N", load.rms)
         if load.pulses is not None:
@@ -183,8 +191,18 @@ class ResidualJudge:
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
-    def status(self, alarm: tuple[Level, str] | None, at: Evaluation, explained: str = "") -> Status:
-        """State of the channel, with its alarm if there is one; `explained` by an alarm, in words, its size is not judged."""
+    def status(self, alarm: tuple[Level, str] | None, at: Evaluation, explained: str = "", is_judged: bool = False) -> Status:
+        """State of the channel, with its alarm if there is one.
+
+        Parameters
+        ----------
+        alarm : tuple of Level and str, optional
+        at : Evaluation
+        explained : str
+            By an alarm or a load, in words; then its size is not judged.
+        is_judged : bool
+            Whether the rig's health is: then it says what is a fault, and the size of a residual is none by itself.
+        """
         thresholds = at.thresholds
         while self._window and self._window[0].time <= at.now - thresholds.residual_window:
             self._window.popleft()
@@ -193,9 +211,11 @@ class ResidualJudge:
         rms = sqrt(sum(sums.squares for sums in self._window) / count) if count else nan
         window = min(thresholds.residual_window, at.now - self._since)
         told = f"{rms:.2f} times as large as noise explains, for {window:.2g} s"
+        told += "; health finds no fault in that" if is_judged and alarm is None else ""
         if alarm is not None:
             judge.fault(*alarm)
-        bounds = Bounds() if explained else Bounds(thresholds.residual_warn, thresholds.residual_error)
+        bounds = Bounds(thresholds.residual_warn, nan if is_judged else thresholds.residual_error)
+        bounds = Bounds() if explained else bounds
         judge.check("rms_normalised", rms, bounds, told)
         judge.note("mean_normalised", sum(sums.total for sums in self._window) / count if count else nan)
         judge.note("largest_normalised", max((sums.largest for sums in self._window), default=nan))

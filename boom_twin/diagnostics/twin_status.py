@@ -218,8 +218,9 @@ class TwinWatch:
                 self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
         at = now()
         self._looked = at.now
-        explained = "" if self.health is None else self.health.explained
-        return [judge.status(self._alarm_of(name), at, explained) for name, judge in self._judges.items()]
+        is_judged = self.health is not None
+        explained = (self.health.explained or self._load.explanation) if self.health is not None else ""
+        return [judge.status(self._alarm_of(name), at, explained, is_judged) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
         """Level and words of the alarm that lasts in a channel."""

@@ -58,6 +58,11 @@ class TipLoad:
     pulses: Pulses | None
 
     @property
+    def is_there(self) -> bool:
+        """Whether it is of any size: `LEAST` or more."""
+        return self.rms >= LEAST or (self.pulses is not None and self.pulses.height >= LEAST)
+
+    @property
     def text(self) -> str:
         """In words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, ``45 N rms, no main frequency`` or ``none above 20 N``."""
         if self.pulses is not None and self.pulses.height >= LEAST:

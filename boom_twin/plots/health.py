@@ -78,7 +78,7 @@ def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
 
 
 def _levels(axes: Axes, stamps: Array, names: tuple[str, ...], levels: Array) -> None:
-    axes.set_title("Level of every channel: 1 is an alarm")
+    axes.set_title("How far every channel deviates: above 1 causes are weighed; what a load at the tip explains is no alarm")
     for i, name in enumerate(names):
         values = np.maximum(levels[:, i], SMALLEST) if len(levels) else np.zeros(0)
         axes.semilogy(stamps, values, color=COLOURS[i % len(COLOURS)], label=name)

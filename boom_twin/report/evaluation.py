@@ -79,7 +79,7 @@ class Evaluator:
         self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
         if self._fatigue is not None:
             self._fatigue.add(own)
-        self._holds.add(own)
+        self._holds.add(own, stretch.estimates.load)
 
     def finish(self, result: Replay, folder: Path) -> Evaluation:
         """What came out of the replay, whose figures are written into `folder`; to be called once."""

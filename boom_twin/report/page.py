@@ -205,7 +205,7 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
         f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "
-        f"within {NEAR:.0%} of a mode and clear of the noise."
+        f"within {NEAR:.0%} of a mode, clear of the noise, and dying away."
     )
     rows = [
         (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))
@@ -214,7 +214,11 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
     ]
     head = ("while still", "mode", "model, Hz", "measured, Hz", "apart, %", "damping, %")
     found = table(head, rows) if rows else paragraph("Nothing was measured: no free vibration, or no standing still.")
-    return [heading("Natural frequencies and damping"), paragraph(told, "note"), image(path, "natural frequencies"), found]
+    shaken = ", ".join(f"{hold.start:.1f} to {hold.stop:.1f} s" for hold in subject.evaluation.still if hold.is_shaken)
+    why = f"Still, but shaken by a load at the tip, so that lines are no natural frequencies: {shaken}."
+    left_out = [paragraph(why, "note")] if shaken else []
+    title = heading("Natural frequencies and damping")
+    return [title, paragraph(told, "note"), image(path, "natural frequencies"), found, *left_out]
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:

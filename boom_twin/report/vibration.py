@@ -7,7 +7,8 @@ from math import inf
 
 import numpy as np
 
-from ..analysis.free_vibration import ORDER, Vibration, free_vibrations
+from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
+from ..estimation.load_spectrum import LEAST as LEAST_LOAD
 from ..monitor.data.present_posture import ModeList
 from ..plots import History
 from ..scene.schema import Scene
@@ -23,7 +24,10 @@ def vibrations(times: Array, values: Array) -> list[Vibration]:
 
 
 def _thinned(times: Array, values: Array) -> tuple[float, Array]:
-    """Step (s) and values (n, c) at even times, low-pass filtered; nothing where there is too little to filter."""
+    """Step (s) and values (n, c) at even times, each the mean of those in a step; nothing where there is too little.
+
+    Means of a decaying vibration are one, with the same frequency and damping; a filter would spoil the ends.
+    """
     columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
         return 1.0, np.zeros((0, 1))
@@ -33,11 +37,8 @@ def _thinned(times: Array, values: Array) -> tuple[float, Array]:
     step = max(1, round(1.0 / (RATE * interval)))
     if len(rows) < 3 * ORDER * step:
         return 1.0, np.zeros((0, 1))
-    if step == 1:
-        return interval, rows
-    from scipy.signal import decimate  # takes longer to import than all else that a replay starts with
-
-    return step * interval, np.asarray(decimate(rows, step, axis=0))
+    whole = len(rows) // step * step
+    return step * interval, rows[:whole].reshape(-1, step, rows.shape[1]).mean(axis=1)
 
 
 PACE = 1e-3
@@ -58,12 +59,16 @@ POINTS = 60
 
 @dataclass(frozen=True, slots=True)
 class HoldInterval:
-    """A stretch (s since the first sample) of standing still; the model's frequencies (Hz), and by mode what was measured."""
+    """A stretch (s since the first sample) of standing still; the model's frequencies (Hz), and by mode what was measured.
+
+    Nothing is where a load shook the boom: a pump's lines are no natural frequencies.
+    """
 
     start: float
     stop: float
     model: list[float]
     measured: dict[int, Vibration]
+    is_shaken: bool
 
 
 class HoldFinder:
@@ -77,15 +82,21 @@ class HoldFinder:
     def __init__(self, scene: Scene) -> None:
         self._modes = ModeList(scene)
         self._found: list[HoldInterval] = []
-        self._strokes = self._motion = _NOTHING  # times and values, from where an interval may have begun
+        self._strokes = self._motion = self._load = _NOTHING  # times and values, from where an interval may have begun
         self._told_to = -inf  # s; end of an interval of `LONGEST`, which may go on
 
-    def add(self, history: History) -> None:
-        """Take the next rows in, all of them; an interval that lasts to their end waits for those that follow."""
+    def add(self, history: History, load: Array) -> None:
+        """Take the next rows in, all of them; an interval that lasts to their end waits for those that follow.
+
+        `load`, shape (rows, 2), is the estimated load at the tip (N), NaN without sensors that tell it.
+        """
         self._strokes = _appended(self._strokes, (history.stamps_s, history.strokes))
+        self._load = _appended(self._load, (history.stamps_s, load))
         self._motion = _appended(self._motion, measured_motion(history))
         waits_from = self._look(is_last=False)
-        self._strokes, self._motion = _from(self._strokes, waits_from), _from(self._motion, waits_from)
+        self._strokes, self._motion, self._load = (
+            _from(rows, waits_from) for rows in (self._strokes, self._motion, self._load)
+        )
 
     def finish(self) -> list[HoldInterval]:
         """All of them; to be called once, after the last `add`."""
@@ -113,8 +124,12 @@ class HoldFinder:
         (times, strokes), (moved, values) = self._strokes, self._motion
         inside, there = _between(times, start, stop), _between(moved, start, stop)
         model = self._modes.at(np.median(strokes[inside], axis=0).tolist())
-        sure = [each for each in vibrations(moved[there], values[there]) if each.frequency_sigma * (stop - start) < SURE]
-        return HoldInterval(start, stop, model, _by_mode(sure, model))
+        load = self._load[1][_between(self._load[0], start, stop)]
+        if float(np.hypot(*load.std(axis=0))) > LEAST_LOAD:
+            return HoldInterval(start, stop, model, {}, True)
+        found = [each for each in vibrations(moved[there], values[there]) if is_free(each)]
+        sure = [each for each in found if each.frequency_sigma * (stop - start) < SURE]
+        return HoldInterval(start, stop, model, _by_mode(sure, model), False)
 
 
 _NOTHING = np.zeros(0), np.zeros((0, 0))

@@ -91,3 +91,16 @@ def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
     assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, "judged by health: alarm of joint_1")}
     assert told[0].values["rms_normalised"] == 6.0
     assert told[-1].level == Level.ERROR and "6.00 times as large as noise explains" in told[-1].message
+
+
+def test_a_residual_that_health_finds_no_fault_in_is_a_warning_at_most() -> None:
+    """What is a fault, health says; a model that is a little off, or a load it does not know, is none."""
+    judge, told = ResidualJudge("cylinder_force_2", 0.0), []
+    load = "a load at the tip moves the boom: pulses of 128 N at 0.430 Hz (+- 0.001)"
+    for second in range(1, 30):
+        judge.take(np.full(100, 6.0), float(second))
+        at = Evaluation(Thresholds(), float(second), 0.0)
+        told.append(judge.status(None, at, load if second < 15 else "", is_judged=True))
+    assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, load)}
+    assert told[-1].level == Level.WARN
+    assert told[-1].message == "6.00 times as large as noise explains, for 10 s; health finds no fault in that"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from boom_twin.report.vibration import SURE, vibrations
+from boom_twin.report.vibration import SURE, HoldFinder, vibrations
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Array
 
 TIMES = np.arange(0.0, 5.0, 0.005)
@@ -67,3 +71,15 @@ def test_too_little_gives_nothing(rows: int) -> None:
 
 def test_a_still_channel_gives_nothing() -> None:
     assert vibrations(TIMES, np.zeros((len(TIMES), 2))) == []
+
+
+@pytest.mark.parametrize("load, is_shaken", [(5.0, False), (60.0, True)])
+def test_where_a_load_shakes_the_boom_no_frequency_is_told(load: float, is_shaken: bool) -> None:
+    """The same decaying swing: under a pump it may be a line of that."""
+    imu = SimpleNamespace(stamps_s=TIMES, measured=measured(3))
+    strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (len(TIMES), 1))
+    finder = HoldFinder(load_scene())
+    history = SimpleNamespace(stamps_s=TIMES, strokes=strokes, imu=imu)
+    finder.add(history, load * np.sin(2.7 * TIMES)[:, None] * np.array([0.0, 1.0]))  # type: ignore[arg-type]
+    (hold,) = finder.finish()
+    assert hold.is_shaken == is_shaken and (0 in hold.measured) == (not is_shaken)

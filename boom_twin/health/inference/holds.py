@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.free_vibration import Vibration, free_vibrations
+from ...analysis.free_vibration import Vibration, free_vibrations, is_free
 from ...types import NANO, Array
 
 PACE = 1e-4  # m of travel from block to block, above which a boom does not stand still
 LEAST, LONGEST = 3.0, 10.0  # s; of a longer one every part is a hold
 RATE = 40.0  # Hz to which samples are thinned out
 LAGS = 80  # of these samples, 2 s
-DECAYS = 4.0  # deviations by which a vibration is damped: the line of a pump is not
 SURE = 0.004  # largest relative deviation of a frequency
 PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
@@ -129,13 +128,9 @@ class HoldCollector:
         is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
-        found = () if is_shaken else tuple(each for each in vibrations if _is_free(each))
+        sure = tuple(each for each in vibrations if is_free(each) and each.frequency_sigma < SURE * each.frequency)
+        found = () if is_shaken else sure
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
-
-
-def _is_free(each: Vibration) -> bool:
-    """Whether it decays, as no vibration does that a load keeps up, and its frequency is sure."""
-    return each.damping > DECAYS * each.damping_sigma and each.frequency_sigma < SURE * each.frequency
 
 
 def _is_kept_up(values: Array) -> bool:
