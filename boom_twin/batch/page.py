@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from html import escape
 from math import isfinite
@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from ..report.html import heading, page, paragraph
 from ..system.atomic_files import write_atomic
-from ..types import SECOND
+from ..types import SECOND, sensor_kind
 from .results import SESSIONS, counts
 from .session_task import OK, Row
 
@@ -27,7 +27,7 @@ document.querySelectorAll('table.sorted th').forEach((head, column) => head.oncl
 });
 </script>
 <style>
-body { max-width: 1400px } svg { width: 100%; height: 130px } .wide { overflow-x: auto }
+body { max-width: 1400px } svg { width: 100%; max-width: 1000px; font: 12px sans-serif; fill: #555 } .wide { overflow-x: auto }
 table.sorted td { white-space: nowrap } table.sorted td:last-child { white-space: normal; min-width: 8em }
 @media (max-width: 1300px) { table.sorted { font-size: 13px } table.sorted th, table.sorted td { padding: .22em .4em } }
 table.sorted th { cursor: pointer } tr.failed td { background: #fff0e6 }
@@ -36,7 +36,10 @@ table.sorted th { cursor: pointer } tr.failed td { background: #fff0e6 }
 _TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """What figures begin with whose course over time is shown."""
 _MOST_TRENDS = 24
-_WIDTH, _HEIGHT, _EDGE = 900.0, 120.0, 14.0
+_WIDTH, _HEIGHT, _EDGE = 1000.0, 150.0, 14.0
+_SCALE, _DATES = 90.0, 24.0
+"""Room for the numbers left of a drawing, and for the times below it."""
+_MINUTE = 60.0  # s; sessions that are nearer are drawn as near as they are
 
 
 def write_page(path: Path, rows: Sequence[Row]) -> None:
@@ -124,11 +127,13 @@ def _trend(name: str, rows: Sequence[Row]) -> str:
         [time for time, _, _ in found],
         _span([value + way * sigma for _, value, sigma in found for way in (-1, 1)]),
     )
-    first, last = _span(times)
+    low = max(low, 0.0) if min(value for _, value, _ in found) >= 0.0 else low
+    first, last = min(times), max(times)
+    last = max(last, first + _MINUTE)
 
     def place(time: float, value: float) -> tuple[float, float]:
-        x = _EDGE + (time - first) / (last - first) * (_WIDTH - 2.0 * _EDGE)
-        return x, _HEIGHT - _EDGE - (value - low) / (high - low) * (_HEIGHT - 2.0 * _EDGE)
+        x = _SCALE + _EDGE + (time - first) / (last - first) * (_WIDTH - _SCALE - 2.0 * _EDGE)
+        return x, _HEIGHT - _DATES - _EDGE - (value - low) / (high - low) * (_HEIGHT - _DATES - 2.0 * _EDGE)
 
     line = " ".join("{:.1f},{:.1f}".format(*place(time, value)) for time, value, _ in found)
     marks = ""
@@ -136,10 +141,31 @@ def _trend(name: str, rows: Sequence[Row]) -> str:
         (x, y), (_, top), (_, bottom) = place(time, value), place(time, value + sigma), place(time, value - sigma)
         marks += f'<path d="M{x:.1f} {top:.1f}V{bottom:.1f}" stroke="#8A8A8A"/>'
         marks += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="#0072B2"/>'
-    label = f"{name}: {found[0][1]:.4g} to {found[-1][1]:.4g}, shown from {low:.4g} to {high:.4g}"
-    drawing = f'<polyline points="{line}" fill="none" stroke="#56B4E9"/>{marks}'
-    size = f'viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" preserveAspectRatio="none"'
+    unit = _unit(name)
+    label = f"{name}{f', {unit}' if unit else ''}: {found[0][1]:.4g} in the first session, {found[-1][1]:.4g} in the last"
+    drawing = f'{_axes(place, (first, last), (low, high))}<polyline points="{line}" fill="none" stroke="#56B4E9"/>{marks}'
+    size = f'viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}"'
     return f'<div class="block">{paragraph(label)}<svg {size} role="img">{drawing}</svg></div>'
+
+
+def _axes(place: Callable[[float, float], tuple[float, float]], times: tuple[float, float], values: tuple[float, float]) -> str:
+    """Lines at the ends and the middle of what is shown, with their numbers; times (s) of the first and the last."""
+    (low, high), marks = values, ""
+    for value in (low, 0.5 * (low + high), high):
+        (left, y), (right, _) = place(times[0], value), place(times[1], value)
+        marks += f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="#DDD"/>'
+        marks += f'<text x="{left - 8.0:.1f}" y="{y + 4.0:.1f}" text-anchor="end">{value:.4g}</text>'
+    for time, anchor in zip(times, ("start", "end"), strict=True):
+        x, _ = place(time, low)
+        told = _time(round(time * SECOND))
+        marks += f'<text x="{x:.1f}" y="{_HEIGHT - 6.0:.1f}" text-anchor="{anchor}">{told}</text>'
+    return marks
+
+
+def _unit(name: str) -> str:
+    """Of a residual: that of its sensor; empty for what is a ratio."""
+    channel = name.removeprefix("residual_rms_")
+    return "" if channel == name else next(iter(sensor_kind(channel).units))
 
 
 def _is_number(row: Row, name: str) -> bool:

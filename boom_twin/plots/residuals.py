@@ -45,7 +45,8 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     sigma = factor * history.residual_sigmas[measured, channel]
     shade_gaps(axes, history.gaps)
     shade_alarms(axes, [alarm for alarm in history.alarms if alarm.channel == name])
-    axes.set_ylabel(f"{name}\n{unit}")
+    narrow = name.replace("cylinder_", "cylinder\n")  # the panel is lower than the name is long
+    axes.set_ylabel(f"{narrow}\n{unit}")
     if not stamps.size:
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
