@@ -258,6 +258,11 @@ class HealthWatch:
         return next((alarm for alarm in self._alarms.lasting if alarm.channel == channel), None)
 
     @property
+    def is_alarmed(self) -> bool:
+        """Whether an alarm lasts."""
+        return bool(self._alarms.lasting)
+
+    @property
     def explained(self) -> str:
         """Where to look for what residuals deviate by: the channels whose alarms were inferred from them; empty without one."""
         channels = dict.fromkeys(alarm.channel for alarm in self._alarms.lasting if alarm.ranked)

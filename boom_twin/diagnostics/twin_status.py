@@ -219,7 +219,9 @@ class TwinWatch:
         at = now()
         self._looked = at.now
         is_judged = self.health is not None
-        explained = (self.health.explained or self._load.explanation) if self.health is not None else ""
+        explained = "" if self.health is None else self.health.explained
+        if self.health is not None and not self.health.is_alarmed:
+            explained = self._load.explanation
         return [judge.status(self._alarm_of(name), at, explained, is_judged) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
