@@ -54,7 +54,7 @@ class DrawnJoint(Part):
 
 
 class BoomTable(Part):
-    """A boom as its drawing shows it; SI units, angles in degrees."""
+    """A boom as its drawing shows it; SI units, ranges and postures in degrees, the base's inclination with its unit."""
 
     description: str = ""
     material: Material = STEEL
@@ -155,7 +155,28 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
     if len(table.joints) != len(table.sections):
         bound = f"there are {len(table.sections)} sections, and every section has one joint"
         found.append(document.fault(("joints",), len(table.joints), bound, "Add or remove joints or sections."))
-    return found
+    return [*found, *_pipes_of_some(document, table), *_angle_without_unit(document)]
+
+
+def _pipes_of_some(document: Document, table: BoomTable) -> list[Fault]:
+    """Where some sections have a pipe, and nothing is said of that of the others: they would have none."""
+    without = [i for i, section in enumerate(table.sections) if section.pipe is None]
+    if "pipe" in table.model_fields_set or not 0 < len(without) < len(table.sections):
+        return []
+    given = ", ".join(f"{section.pipe:g}" for section in table.sections if section.pipe is not None)
+    bound = f"other sections have {given} kg/m, and this one says nothing"
+    remedy = "Give pipe in every section, 0 where there is none, or once for the whole boom."
+    return [document.fault(("sections", i, "pipe"), ABSENT, bound, remedy) for i in without]
+
+
+def _angle_without_unit(document: Document) -> list[Fault]:
+    """An inclination as a bare number: a scene takes it for rad, beside ranges in degrees."""
+    base = document.values.get("base") if isinstance(document.values, dict) else None
+    value = base.get("inclination") if isinstance(base, dict) else None
+    if not isinstance(value, int | float) or value == 0:
+        return []
+    remedy = f"Give its unit: {value:g} deg or {value:g} rad (in a CSV table in the heading: `inclination [deg]`)."
+    return [document.fault(("base", "inclination"), value, "rad or degrees?", remedy)]
 
 
 SLIMMEST = 0.3  # width of a box over its height
@@ -189,7 +210,8 @@ def csv_document(text: str, source: str) -> Document:
     """A CSV text as the values of a table: a header, then a row for every section with its joint.
 
     A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
-    name a unit: ``length [mm]``. Columns of the base and of the whole boom count in the first row.
+    name a unit: ``length [mm]``. Columns of the base and of the whole boom have one value, in the first row or the same in all;
+    a pipe in the first row alone is that of the whole boom.
     """
     document = Document({"sections": [], "joints": [], "base": {}})
     try:
@@ -199,6 +221,7 @@ def csv_document(text: str, source: str) -> Document:
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
     columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
+    _refuse_twins(rows[0], columns, source)
     filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     for i, (line, row) in enumerate(filled):
         document.values["sections"].append({})
@@ -207,11 +230,29 @@ def csv_document(text: str, source: str) -> Document:
             if column is None or (place := _place(column, i)) is None:
                 name, known = rows[0][number], ", ".join(_columns())
                 raise SceneError(source, (Fault("header", name, "no such column", f"Known are {known}.", 1),))
-            if cell.strip() and not (place[0] not in ("sections", "joints") and i > 0):
+            if place[-1] == "pipe" and not any(cell.strip() for _, other in filled[1:] for cell in other[number : number + 1]):
+                place = ("pipe",)  # in the first row alone: of the whole boom
+            is_of_all = place[0] not in ("sections", "joints")
+            if is_of_all and i > 0:
+                first = "".join(filled[0][1][number : number + 1]).strip()
+                if cell.strip() not in ("", first):
+                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {first or 'none'}"
+                    remedy = "It belongs to the whole boom: give it in the first row only, or the same in all."
+                    raise SceneError(source, (Fault(where, cell.strip(), bound, remedy, line),))
+            elif cell.strip():
                 _put(document, place, _value(cell.strip(), column[3]), line)
                 document.cells[place] = f"{_letters(number)}{line}"
     document.values = frozen(document.values)
     return document
+
+
+def _refuse_twins(names: list[str], columns: list[re.Match[str] | None], source: str) -> None:
+    """SceneError where two columns are of the same key: the second would overwrite the first."""
+    seen: dict[tuple[str, str | None], int] = {}
+    for number, column in enumerate(columns):
+        if column is not None and (before := seen.setdefault((column[1], column[2]), number)) != number:
+            bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
+            raise SceneError(source, (Fault("header", names[number].strip(), bound, "Correct one, or remove it.", 1),))
 
 
 def _letters(column: int) -> str:

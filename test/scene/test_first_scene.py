@@ -179,7 +179,7 @@ FURTHER_SLIPS = {
     "bore of another joint": ("bore: 90 mm, rod: 55 mm", "bore: 200 mm, rod: 120 mm", "joints[3].bore"),
     "oil in ml": ("bore: 180 mm, rod: 125 mm", "bore: 180 mm, rod: 125 mm, cap_line: 0.5 ml", "joints[0].cap_line"),
     "open length as stroke": ("rod: 125 mm", "rod: 125 mm, max_stroke: 4.5 m", "joints[0].max_stroke"),
-    "inclination in degrees": ("-2750 mm]}", "-2750 mm], inclination: 3}", "base.inclination"),
+    "inclination in degrees, written rad": ("-2750 mm]}", "-2750 mm], inclination: 3 rad}", "base.inclination"),
     "link in g": ("mL: 35 kg", "mL: 35000 kg", "joints[1].mL"),
 }  # fmt: skip
 """A newcomer's slips in the table: what is there, what was written, and where it is told; all load."""
@@ -233,3 +233,39 @@ def test_the_written_scene_is_the_one_examined(tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
     path.write_text(text, encoding="utf-8")
     assert examine(path) == (scene, [])
+
+
+def test_a_pipe_in_the_first_row_alone_is_that_of_the_whole_boom(tmp_path: Path) -> None:
+    """It was that of the first section, and the others weighed too little without a word."""
+    _, whole, _ = scene_of(tmp_path, CSV, "table.csv")
+    _, first, oddities = scene_of(tmp_path, CSV.replace(",,,,,25,\n", ",,,,,,\n"), "table.csv")
+    assert [section.rho_A for section in first.sections] == [section.rho_A for section in whole.sections] and not oddities
+
+
+def test_a_pipe_of_some_sections_only_is_refused(tmp_path: Path) -> None:
+    three = CSV.replace(",,,,,25,\n", ",,,,,25,\n") + CSV.splitlines()[2].replace(",,,,,25,", ",,,,,,") + "\n"
+    with pytest.raises(SceneError, match=r"sections\[2\]\.pipe is absent: other sections have 25, 25 kg/m"):
+        scene_of(tmp_path, three, "table.csv")
+
+
+@pytest.mark.parametrize(
+    "before, after, told",
+    [
+        ("mL,mR,", "mL,mL,", r"header = 'mL': columns V and W have the same name"),
+        (",,,,,25,\n", ",,,,,25,40\n", r"payload, AC3 = '40': the first row has 60.*in the first row only"),
+        ("pivot_x,pivot_y,", "pivot_x,pivot_y,inclination,", r"inclination.* = 3.0?: rad or degrees\?.*3 deg or 3 rad"),
+    ],
+)
+def test_what_a_table_says_twice_or_without_unit_is_refused(tmp_path: Path, before: str, after: str, told: str) -> None:
+    assert before in CSV
+    text = CSV.replace(before, after, 1)
+    text = text.replace("-2.75,0,0,", "-2.75,0,0,3,").replace(",,,,,25,\n", ",,,,,,25,\n") if "inclination" in after else text
+    with pytest.raises(SceneError) as refused:
+        scene_of(tmp_path, text, "table.csv")
+    assert re.search(told, str(refused.value))
+
+
+def test_an_inclination_with_its_unit_is_taken(tmp_path: Path) -> None:
+    text = CSV.replace("pivot_x,pivot_y,", "pivot_x,pivot_y,inclination [deg],").replace("-2.75,0,0,", "-2.75,0,0,3,")
+    _, scene, _ = scene_of(tmp_path, text.replace(",,,,,25,\n", ",,,,,,25,\n"), "table.csv")
+    assert scene.base.inclination == pytest.approx(math.radians(3.0))
