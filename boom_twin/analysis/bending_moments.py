@@ -7,7 +7,8 @@ what weight spread along a part and forces at its ends do; material damping is l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -29,25 +30,38 @@ SIMPSON = (1 / 6, 4 / 6, 1 / 6)
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A cross-section: of which section (0-based), and how far from its inboard pivot (m)."""
+    """A cross-section: of which section (0-based), and how far from its inboard pivot (m).
+
+    Where parts meet at a split, the moment may jump: one is ``inboard`` of it and one ``outboard``: its `side`, else empty.
+    """
 
     section: int
     place: float
+    side: str = ""
 
     @property
     def name(self) -> str:
         """Section and place in words."""
-        return f"section {self.section + 1} at {self.place:.2f} m"
+        return f"section {self.section + 1} at {self.place:.2f} m" + (f", {self.side} of the split" if self.side else "")
+
+    @property
+    def key(self) -> str:
+        """The same as a part of names of columns: ``section_1_at_0.60`` or ``section_1_at_5.92_outboard``."""
+        return f"section_{self.section + 1}_at_{self.place:.2f}" + (f"_{self.side}" if self.side else "")
 
 
 def stations(scene: Scene) -> tuple[Station, ...]:
     """The stations of all flexible parts, base to tip."""
-    return tuple(
+    found = [
         Station(index, start + at * (stop - start))
         for index in range(len(scene.sections))
         for start, stop in flexible_parts(scene, index)
         for at in PLACES
-    )
+    ]
+    for number, (one, other) in enumerate(pairwise(found)):
+        if one.section == other.section and f"{one.place:.2f}" == f"{other.place:.2f}":
+            found[number], found[number + 1] = replace(one, side="inboard"), replace(other, side="outboard")
+    return tuple(found)
 
 
 def flexibility_by_station(scene: Scene) -> Array:

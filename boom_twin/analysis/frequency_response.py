@@ -24,6 +24,7 @@ from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
+from ..system.summary_display import SummaryDisplay
 from ..types import Array, ComplexArray
 from .bending_moments import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles
@@ -36,8 +37,8 @@ SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents 
 UPWARD = (0.0, 1.0)  # N
 
 
-@dataclass(frozen=True)
-class FrequencyResponse:
+@dataclass(frozen=True, repr=False)
+class FrequencyResponse(SummaryDisplay):
     """Complex amplitudes at k frequencies: a quantity moves by the real part of its amplitude times e^(2 pi i f t).
 
     n sections, m stations.
@@ -65,6 +66,14 @@ class FrequencyResponse:
     moments: ComplexArray
     stations: tuple[Station, ...]
 
+    def summary_rows(self) -> dict[str, str]:
+        """Range of frequencies, and where the tip moves most."""
+        f, size = self.frequencies, np.hypot(*np.abs(self.tip.T))
+        rows = {"frequencies": f"{len(f)}" + (f", {f.min():.4g} to {f.max():.4g} Hz" if len(f) else "")}
+        if len(f):
+            rows["largest tip amplitude"] = f"{size.max():.4g} m at {f[size.argmax()]:.4g} Hz"
+        return rows
+
     @property
     def tip_acceleration(self) -> ComplexArray:
         """Of the tip, m/s^2, shape (k, 2)."""
@@ -77,7 +86,7 @@ class FrequencyResponse:
         found |= {f"joint_{i + 1}_rad": column for i, column in enumerate(self.joints.T)}
         found |= {f"cylinder_force_{i + 1}_N": column for i, column in enumerate(self.cylinder_forces.T)}
         for station, column in zip(self.stations, self.moments.T, strict=True):
-            found[f"moment_section_{station.section + 1}_at_{station.place:.2f}_Nm"] = column
+            found[f"moment_{station.key}_Nm"] = column
         return found
 
 

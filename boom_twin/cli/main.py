@@ -205,6 +205,8 @@ def open_scene(source: str | None) -> Scene:
     from ..scene.load import examine
 
     scene, oddities = examine(source)
+    if source is None:
+        print("scene: default scene, the package's own rig; give SCENE for another", file=sys.stderr)
     tell(oddities, source)
     return scene
 

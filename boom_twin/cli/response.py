@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Flags = NDArray[np.bool_]
 LOW, HIGH, POINTS, RATES, STEPS = 0.05, 30.0, 300, (0.2, 1.2, 201), 1
+FASTEST = 2.0  # Hz, of pumps
 FAR = 0.05  # of the reach: swings beyond are not in proportion to the load
 FAR_WORN = 1e-4  # m, the same on pins with clearance
 
@@ -210,6 +211,9 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..plots.frequency_response import steady_state_picture
 
     if args.pump:
+        if args.pump[0] > FASTEST:
+            remedy = f"{args.pump[0]:g} a minute are {args.pump[0] / 60.0:.3g} Hz, and the rate comes first: --pump 0.35:130."
+            raise UsageError(f"--pump rate = {args.pump[0]:g} Hz: a pump makes at most {FASTEST:g} strokes a second. {remedy}")
         load, told = pump_load(scene, *args.pump), f"pump pulses of {args.pump[1]:g} N at {args.pump[0]:g} Hz"
     else:
         table, wanted = read_csv(Path(args.load), UsageError), ["t_s", "fx_N", "fy_N"]

@@ -42,7 +42,7 @@ class StressWatch:
         judge.begin(at)
         columns = found.moments, found.stresses, found.stress_sigmas
         for station, moment, stress, sigma in zip(places, *columns, strict=True):
-            name = f"section_{station.section + 1}_at_{station.place:.2f}_m"
+            name = f"{station.key}_m"
             judge.note(f"{name}_Nm", float(moment))
             judge.note(f"{name}_MPa", float(stress) / MEGA)
             judge.note(f"{name}_sigma_MPa", float(sigma) / MEGA)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..scene.load import DEFAULT_NAME
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..types import SENSORS, Array, Stream, channels_of
+
+
+NEAR = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
 
 
 class RefusedStrokes:
@@ -15,9 +19,12 @@ class RefusedStrokes:
     Parameters
     ----------
     scene : Scene
+    source : str
+        Where that is from.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, source: str = "") -> None:
+        self._is_default = source == DEFAULT_NAME
         self._names = channels_of(len(scene.joints))[Stream.STROKES]
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self._first: Array | None = None
@@ -40,6 +47,8 @@ class RefusedStrokes:
         said = f" The first refused value: {self._names[i]} = {self._first[i]:.6g} m, its travel is 0 to {self._travel[i]:g} m."
         if self._fits_in_other_order():
             return f"{said} In another order the strokes would fit: look for cylinders whose names or columns are swapped."
+        if self._is_default and self._first[i] < NEAR * self._travel[i]:
+            return f"{said} The session names no scene and was read with the {DEFAULT_NAME}: for another boom give --scene."
         unit = next((unit for unit, factor in self._by_size() if self._fits(factor)), None)
         if unit is None:
             return said

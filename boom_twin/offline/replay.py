@@ -217,7 +217,7 @@ def replay_into(
         errors = None if truth is None else TipErrors(truth)
         taking = None if take is None else _Timed(take)
         recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
-        refused = RefusedStrokes(scene)
+        refused = RefusedStrokes(scene, taken.source)
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
         behind = ReportWriter(writer, session.notes, topics, scene, settings)
         with _unhurried_collector():

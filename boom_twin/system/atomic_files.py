@@ -49,7 +49,10 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
             return
         _replace(path.resolve(), data, sync)
     except OSError as error:
-        reason = f"cannot be written ({error.strerror}). Make room on the disk, or choose another place."
+        remedy = "Make room on the disk, or choose another place."
+        if isinstance(error, FileNotFoundError):
+            remedy = f"Make its folder first: mkdir -p {path.parent}"
+        reason = f"cannot be written ({error.strerror}). {remedy}"
         raise BagError(f"{path}: {reason}") from error
 
 

@@ -274,3 +274,14 @@ def test_refused(given, told):
 def test_frequencies_refused(frequencies):
     with pytest.raises(UsageError, match="at least 0 Hz"):
         frequency_response(load_scene(), np.array(frequencies), posture="arch")
+
+
+def test_every_station_has_a_column_of_its_own_and_the_text_is_short() -> None:
+    """Both sides of a split had one name, and the moment inboard of it was lost."""
+    found = frequency_response(load_scene(), np.array([0.5, 1.0, 2.0]), posture="arch")
+    columns = [name for name in found.channels() if name.startswith("moment_")]
+    assert len(columns) == len(found.stations) == found.moments.shape[1]
+    assert "moment_section_1_at_3.04_inboard_Nm" in columns and "moment_section_1_at_3.04_outboard_Nm" in columns
+    assert (
+        repr(found).startswith("FrequencyResponse(frequencies 3, 0.5 to 2 Hz; largest tip amplitude") and len(repr(found)) < 120
+    )

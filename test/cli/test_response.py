@@ -110,8 +110,8 @@ def test_worn_pins_answer_unless_they_rub(capsys: Capture, tmp_path: Path) -> No
 )
 def test_refused(capsys: Capture, given: list[str], told: str) -> None:
     assert main(["response", *given]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert told in line
+    first, line = capsys.readouterr().err.splitlines()
+    assert told in line and first.startswith("scene: default scene")
 
 
 @pytest.mark.parametrize("given", [[], ["--posture", "arch", "--map", "all"], ["--posture", "arch", "--pump", "fast"]])

@@ -29,3 +29,12 @@ def test_swapped_strokes_are_no_other_unit() -> None:
     said = told(np.array(0.9 * TRAVEL)[::-1])
     assert "In another order the strokes would fit: look for cylinders whose names or columns are swapped" in said
     assert "unit" not in said
+
+
+def test_with_the_default_scene_another_boom_is_likelier_than_inches() -> None:
+    """The session named no scene; a stroke a little beyond the travel was told to be in inches."""
+    near, far = RefusedStrokes(load_scene(), "default scene"), RefusedStrokes(load_scene(), "default scene")
+    for refused, first in ((near, 0.906), (far, 630.0)):
+        refused.take(block_of([Sample(Stream.STROKES, 1, np.array([first, 0.6, 0.2, 0.2]))], 4))
+    assert "for another boom give --scene" in near.told and "unit" not in near.told
+    assert "--scene" not in far.told
