@@ -9,7 +9,6 @@ from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..types import SENSORS, Array, Stream, channels_of
 
-
 NEAR = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
 
 
