@@ -101,7 +101,8 @@ class KernelCache:
 
     It loads without first filling numba's tables of types and of BLAS: that takes 0.25 s, most of it an import of
     scipy.linalg, and only compiling needs them, which fills them itself. Likewise the intermediate code beside the machine code
-    is read only where another kernel that calls this one is compiled: reading it is four fifths of a load.
+    is read only where a function that is no kernel copies this one: reading it is four fifths of a load. The kernels that this
+    one calls are loaded before it.
 
     Parameters
     ----------

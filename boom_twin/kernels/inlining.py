@@ -7,7 +7,7 @@ sweep stood in seven kernels, and compiling these copies was two thirds of all c
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
@@ -39,11 +39,6 @@ class KernelCode(JITCodeLibrary):
             self.calls |= getattr(library, "calls", set())
             super().add_linking_library(library)
 
-    def _optimize_final_module(self) -> None:
-        """Optimise once: numba's pass before is for reference counts, of which kernels have none."""
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
-
 
 class InlinedCode(KernelCode):
     """Intermediate code of a function and of those that it calls, for the kernels that it is copied into."""
@@ -72,7 +67,7 @@ class InlinedCode(KernelCode):
 class KernelCompiler(Compiler):
     """numba's compiler, with `KernelCode` for its result, and the same name for the same function in every process."""
 
-    _owners: dict[tuple[str, str], Callable[..., Any]] = {}
+    _owners: ClassVar[dict[tuple[str, str], Callable[..., Any]]] = {}
 
     def _compile_bytecode(self) -> Any:
         name: FunctionIdentity = self.state.func_id
