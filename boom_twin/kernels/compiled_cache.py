@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any
@@ -100,7 +101,8 @@ class KernelCache:
 
     It loads without first filling numba's tables of types and of BLAS: that takes 0.25 s, most of it an import of
     scipy.linalg, and only compiling needs them, which fills them itself. Likewise the intermediate code beside the machine code
-    is read only where another kernel that calls this one is compiled: reading it is four fifths of a load.
+    is read only where a function that is no kernel copies this one: reading it is four fifths of a load. The kernels that this
+    one calls are loaded before it.
 
     Parameters
     ----------
@@ -139,11 +141,14 @@ class KernelCache:
         data = read_checked(self._path(signature, context.codegen()))
         if data is None:
             return None
-        symbols, parts = pickle.loads(data)
+        symbols, callee, calls, parts = pickle.loads(data)
+        if not all(_is_there(each, context.codegen()._engine) for each in calls):
+            return None
         (name, kind, (machine, intermediate)), *others = pickle.loads(parts)
         context.codegen()._engine._defined_symbols.update(symbols)
         loaded = self._rebuild(context, (name, kind, (machine, _nothing(context.codegen()))), *others)
         _read_when_linked(loaded.library, intermediate)
+        loaded.library.callee = callee
         return loaded
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -151,7 +156,8 @@ class KernelCache:
         if compiled.lifted or compiled.library.has_dynamic_globals:
             return
         with suppress(OSError):
-            kept = pickle.dumps((_symbols(compiled.library), self._dumps(self._reduce(compiled))))
+            library = compiled.library
+            kept = pickle.dumps((_symbols(library), library.callee, library.calls, self._dumps(self._reduce(compiled))))
             write_checked(self._path(signature, compiled.codegen), kept)
 
     def enable(self) -> None:
@@ -169,6 +175,14 @@ def _symbols(library: Any) -> list[str]:
     """Names of what a library defines, which numba else looks for in its intermediate code."""
     module = library._get_module_for_linking()
     return [each.name for group in (module.functions, module.global_variables) for each in group if not each.is_declaration]
+
+
+def _is_there(callee: Any, engine: Any) -> bool:
+    """Whether the machine code of a kernel that is called is there; it is loaded, or compiled, if need be."""
+    kernel = getattr(sys.modules.get(callee.module) or import_module(callee.module), callee.name, None)
+    if kernel is not None:
+        kernel.dispatcher.compile(callee.arguments)
+    return bool(engine.is_symbol_defined(callee.symbol))
 
 
 def _nothing(codegen: Any) -> bytes:

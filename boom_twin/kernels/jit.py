@@ -112,8 +112,10 @@ class Kernel:
         return dispatcher
 
     def _compiler(self) -> dict[str, Any]:
-        """Which compiler, if not numba's own."""
-        return {}
+        """Which compiler instead of numba's own."""
+        from .inlining import KernelCompiler
+
+        return {"pipeline_class": KernelCompiler}
 
     @property
     def _numba_type_(self) -> Any:

@@ -38,8 +38,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     """Step the boom to drive lengths (m) and rates (m/s), both shape (n,), at the instant that `scheme` solves for.
 
     Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Where journals with
-    clearance hit their bushes the step is divided, so that impacts are resolved. Kept in one function, because every kernel
-    that calls this one costs seconds of compiling.
+    clearance hit their bushes the step is divided, so that impacts are resolved.
 
     Parameters
     ----------
