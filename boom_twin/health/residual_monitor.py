@@ -15,18 +15,18 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Alarm, Array, Mount
+from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
 from .alarm_text import AlarmText
-from .baseline import Baseline
+from .baseline import JUDGED, Baseline
 from .detection import Detector
 from .hold_test import HoldTest
 from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
-from .inference.fault_catalogue import parameters
+from .inference.fault_catalogue import Form, parameters
 from .inference.holds import HoldProblem
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
-from .inference.innovation_filter import InnovationFilter
+from .inference.innovation_filter import KEEPS_STEP, InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, MISFIT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
+from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
 from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
@@ -91,6 +91,8 @@ class ResidualMonitor:
         self._linear = LinearModel(scene, settings, mounts, known)
         self._mean, self.covariance = baseline.healthy(known)
         self._errors2, self._noise2, self._detuning = baseline.errors(n) ** 2, baseline.noise(n) ** 2, baseline.detuning
+        late = [each.form is Form.DELAY and tuple(JUDGED)[each.index] is Stream.IMU for each in known]
+        self._out_of_step = np.diag(np.where(late, (baseline.detuning * KEEPS_STEP) ** 2, 0.0))
         self._levels = load_levels(scene)
         self._bank = HypothesisTest(known)
         self._tell = AlarmText(scene, known, self._linear.signatures, baseline.errors(n))
@@ -206,8 +208,12 @@ class ResidualMonitor:
         return errors2
 
     def _suspect(self, start: int) -> None:
-        """Collect evidence from `start` (ns) on."""
-        known = self._regression.mean, self._regression.covariance
+        """Collect evidence from `start` (ns) on.
+
+        A vibration whose frequency is a little wrong runs ahead or behind, always the same way: nearly all that an IMU says of
+        its lag is said by vibration, so a lag may be as large without a fault.
+        """
+        known = self._regression.mean, self._regression.covariance + self._out_of_step
         self._suspicion = Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, self._carried)
         self._blocks = 0
 
@@ -227,7 +233,8 @@ class ResidualMonitor:
             return news
         if suspicion.is_outdated(verdict):
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
-            self._unexplained = (self._unexplained or suspicion.start) if is_odd else None
+            lately = max(suspicion.start, start - RECENT * BLOCK)  # before that it was explained
+            self._unexplained = (self._unexplained or lately) if is_odd else None
             self._carried = carried_on(verdict) if self._alarm is not None else {}
             self._suspect(start + BLOCK)
         elif suspicion.is_settled:

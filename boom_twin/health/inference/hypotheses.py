@@ -38,6 +38,7 @@ from .normal_distribution import log_normal_below
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
 CRUDE = 0.001  # see above
+AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,8 @@ class Verdict:
     excess : float
         Squares that the best explanation leaves over those that noise leaves, at least 1.
     none_excess : float
-        Likewise where there is no fault, with the load at the tip that goes best with that.
+        Likewise where there is no fault, the least of all levels of the load at the tip that go about as well with that as the
+        best does: pulses and gusts are no Gauss-Markov process, rest suits a low level, a steep flank a high one.
     level : int
         Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
     """
@@ -240,7 +242,8 @@ class HypothesisTest:
             for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
         ]
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
-        none_excess = max(1.0, float(healthy.squares[none]) / max(healthy.rows, 1.0))
+        as_well = logs > logs[none] - AS_WELL
+        none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
         return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
 
     def _steady(self, healthy: Evidence) -> Array:
