@@ -31,7 +31,7 @@ from math import log
 import numpy as np
 
 from ...types import Array
-from .fault_catalogue import Parameter, variances
+from .fault_catalogue import Form, Parameter, variances
 from .kalman_update import correct
 from .normal_distribution import log_normal_below
 
@@ -203,6 +203,8 @@ class HypothesisTest:
         self._faulty = variances(known, "faulty")[self._places]
         self._least = np.array([known[i].least for i in self._places])
         self._priors = np.log([known[i].prior for i in self._places])
+        lags = [known[i].form is Form.DELAY for i in self._places]
+        self._growing_priors = np.where(lags, -np.inf, log(GROWING_PRIOR))  # a lag does not grow
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
@@ -268,7 +270,7 @@ class HypothesisTest:
         explained = (vector * found).sum(axis=-1)
         now = np.array([1.0, span])
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + log(GROWING_PRIOR)
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + self._growing_priors
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
     def _sided(self, values: Array, sigmas: Array) -> Array:
