@@ -186,7 +186,8 @@ class ResidualMonitor:
         """Innovations beyond what healthy parameters and known faults explain; the first suspicious one begins a suspicion."""
         self._healthy.tune(problem.modes)
         noise, known = problem.noise(self._noise2), self._regression
-        found = self._healthy.step(problem.table, noise, self._errors_about(problem), problem.shaking, problem.travel)
+        shaking = self._healthy.vibration(problem.shaking)
+        found = self._healthy.step(problem.table, noise, self._errors_about(problem), shaking, problem.travel)
         left, _ = known.take(found.white, self._suspicion is None)
         self.surprise = np.full(len(self._names), np.nan)
         self.surprise[np.isfinite(problem.table[:, 0])] = left

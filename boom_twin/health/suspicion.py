@@ -84,7 +84,8 @@ class Suspicion:
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
-        found = Evidence.of(*self._filter.step(table, noise, crude, problem.shaking, problem.travel))
+        shaking = self._filter.vibration(problem.shaking)
+        found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
         self._evidence += found
         self._calm += found.weighted(weight)
         self._before.append(self._evidence)
@@ -140,5 +141,11 @@ class Suspicion:
 
 
 def carried_on(verdict: Verdict) -> dict[str, float]:
-    """What a suspicion that follows this verdict is to begin with; see `HypothesisTest.explain`."""
+    """What a suspicion that follows this verdict, when it is outdated, is to begin with; see `HypothesisTest.explain`.
+
+    Nothing where the best explanation grew: it grows no more, or otherwise, and which cause went best with that shape says
+    which one makes up best for what is wrong with it.
+    """
+    if verdict.best.is_growing:
+        return {}
     return {cause.name: math.log(max(cause.probability, CARRIED)) for cause in verdict.causes}

@@ -9,7 +9,7 @@ w is white, of the density that
   within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
 
 The shape of a mode is then wrong, too: every channel has a noise of its own, of `SHAPE` detuning times what it reads of that
-vibration. Vibration that nobody predicted, by a load, counts likewise: the filter's own estimate of it, where that is larger.
+vibration. Vibration that nobody predicted, by a load, counts likewise: see `InnovationFilter.vibration`.
 
 And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
 a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
@@ -202,7 +202,7 @@ class InnovationFilter:
         if is_first:
             self._p[:, :size, :size] += _swung(modes, self._level2)
 
-    def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
+    def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.
 
         Parameters
@@ -213,8 +213,8 @@ class InnovationFilter:
             Covariance of the means by sensor and stroke noise.
         errors2 : ndarray, shape (channels,)
             Variance of the model's error in one posture.
-        shaking : float
-            Mean square of the predicted tip acceleration lately, (m/s^2)^2.
+        shaking : float or ndarray, shape (levels,)
+            Mean square of the tip's acceleration by vibration lately, (m/s^2)^2.
         travel : float
             Of the strokes since the block before, m.
 
@@ -229,8 +229,7 @@ class InnovationFilter:
         self._added[:, rest:] = (1.0 - kept * kept) * errors2
         rows = np.flatnonzero(np.isfinite(table[:, 0]))
         count, measured = len(self._level2), len(rows)
-        white, log = np.zeros((count, measured, table.shape[1])), np.zeros(count)
-        shaken = np.maximum(shaking, self._swinging) + self._pushed
+        white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed
         root, gain, state = np.zeros((measured, measured)), np.zeros((measured, len(self._turn))), (self._x, self._p)
         own = shaken[:, None] * self._shaken + self._rough
         change = self._turn, self._least, self._driven, shaken, self._added
@@ -240,6 +239,10 @@ class InnovationFilter:
         felt = self._x[:, : self._size, 0] @ self._shown[-2:, : self._size].T
         np.maximum(self._swinging * math.exp(-self._block / CALM), 0.5 * (felt**2).sum(axis=1), out=self._swinging)
         return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
+
+    def vibration(self, predicted: float) -> Array:
+        """Mean square of the tip's acceleration lately, (m/s^2)^2, shape (levels,): as `predicted`, or as found where more."""
+        return np.maximum(predicted, self._swinging)
 
     def load(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
         """Force at the tip along x and y, shape (..., 2), and its covariance, shape (..., 2, 2); N, after the newest block.
