@@ -45,11 +45,12 @@ ENDED = 8.0  # ln by which a known fault's end may go worse with what is measure
 
 @dataclass(frozen=True)
 class _KnownFault:
-    """A fault that the twin goes on with: its alarm, its parameter and that one's value."""
+    """A fault that the twin goes on with: its alarm, its parameter, that one's value and how unsure it is (deviation)."""
 
     alarm: Alarm
     place: int
     value: float
+    sigma: float = 0.0
 
 
 class ResidualMonitor:
@@ -167,14 +168,29 @@ class ResidualMonitor:
             self._suspicion.take_hold(hold, self._frequency_error)
         if self._alarm is not None or self._tip_load.alarm is not None:
             return []
-        found = self._hold_test.take(hold, self._mean_about_known(), self.covariance)
+        about = self._mean_about_known(), self._covariance_about_known()
+        found = self._hold_test.take(hold, *about)
+        for each in self._known.values():
+            if self._hold_test.change(each.place, -each.value, *about) > max(HELD, found.verdict.strength - ENDED):
+                return self._end_known(each, hold.end)
         if self._hold_alarm is None and found.verdict.strength < HELD:
             return []
         if found.verdict.strength < LET_GO:
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
-        self._hold_alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
-        return [self._hold_alarm]
+        self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
+            self._go_on_with_held(found.verdict)
+        return [alarm]
+
+    def _go_on_with_held(self, verdict: Verdict) -> None:
+        """The fault that holds have named becomes known, as sure as its size is: blocks would tell it once more."""
+        assert self._hold_alarm is not None
+        best = verdict.best
+        sigma = best.sigma * verdict.excess**0.5
+        self._known[verdict.causes[0].name] = _KnownFault(self._hold_alarm, best.place, best.value, sigma)
+        self._hold_alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
+        self._start_about_known()
 
     def _end_hold_alarm(self, stamp: int) -> list[Alarm]:
         """End the alarm by holds, if there is one."""
@@ -338,7 +354,7 @@ class ResidualMonitor:
 
     def _start_about_known(self) -> None:
         """Parameters are healthy but for the faults that are known."""
-        self._regression = Regression(self._mean_about_known(), self.covariance)
+        self._regression = Regression(self._mean_about_known(), self._covariance_about_known())
         self._hold_test.restart()
         self._watch_anew()
 
@@ -348,6 +364,13 @@ class ResidualMonitor:
         for each in self._known.values():
             mean[each.place] += each.value
         return mean
+
+    def _covariance_about_known(self) -> Array:
+        """Of the parameters, with what the sizes of known faults are unsure by."""
+        covariance = self.covariance.copy()
+        for each in self._known.values():
+            covariance[each.place, each.place] += each.sigma**2
+        return covariance
 
     def forget(self) -> None:
         """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""
