@@ -16,7 +16,7 @@ from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
-from .alarm_text import AlarmText
+from .alarm_text import LIMIT_OF, AlarmText
 from .baseline import JUDGED, Baseline
 from .detection import Detector
 from .hold_test import HoldTest
@@ -35,6 +35,7 @@ LEAST_SPAN, SWINGS = 3.0, 4.5  # s that evidence has to take for an alarm if it 
 UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is an alarm
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
+LIMITS_PERIOD = 60  # blocks of a suspicion between two looks at what could be told, a multiple of the next
 PERIOD = 3  # blocks between two looks at a suspicion
 SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
@@ -117,6 +118,7 @@ class ResidualMonitor:
         self._tip_load.begin()
         self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
+        self._limits: dict[str, float] = {}
         self._watch_anew()
 
     def _watch_anew(self) -> None:
@@ -131,6 +133,17 @@ class ResidualMonitor:
         """Those that last: of faults that are known, and what is being looked into."""
         open_ones = [each for each in (self._alarm, self._tip_load.alarm, self._hold_alarm) if each is not None]
         return (*(each.alarm for each in self._known.values()), *open_ones)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """From how much softer on, a share of its stiffness, each cylinder could be told under the load of late; empty without."""
+        return self._limits
+
+    def _limits_of(self, suspicion: Suspicion, level: int) -> dict[str, float]:
+        """See `limits`; by the evidence of an open suspicion."""
+        least = suspicion.least_told(level, SURE)
+        softer = [(each.cause, least[i]) for i, each in enumerate(self._bank.known) if each.cause.endswith(".k")]
+        return {LIMIT_OF + cause: float(value / (1.0 + value)) for cause, value in softer if math.isfinite(value)}
 
     @property
     def levels(self) -> Array:
@@ -245,6 +258,8 @@ class ResidualMonitor:
             return self._tip_load.end(start)
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
+        if self._blocks % LIMITS_PERIOD == 0 and self._alarm is None:
+            self._limits = self._limits_of(suspicion, verdict.level) if verdict.level else {}
         news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
         if self._suspicion is not suspicion:
             return news

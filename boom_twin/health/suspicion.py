@@ -111,6 +111,14 @@ class Suspicion:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
         return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
 
+    def least_told(self, level: int, strength: float) -> Array:
+        """Least sizes of steady faults, shape (parameters,), that this evidence would tell under a load of that level.
+
+        By the posterior's own covariance: `strength` is ln of how much more probable than none such a fault has to be.
+        """
+        healthy = self._evidence.given(self.mean, self.covariance)
+        return self._bank.least_told(healthy.matrix[level].diagonal()[: len(self.mean)], strength)
+
     def load(self, level: int) -> tuple[float, float]:
         """Magnitude of the force at the tip, and its deviation, N, if there is no fault but a load of this level."""
         forces, covariances = self._filter.load(self.mean, self.covariance)

@@ -248,6 +248,17 @@ class HypothesisTest:
         none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
         return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
 
+    def least_told(self, information: Array, strength: float) -> Array:
+        """Sizes (parameters,) of steady faults whose expected log factor is `strength`, by their information (parameters,).
+
+        Infinite of parameters that are never faulty, or of which nothing is known.
+        """
+        found, known = np.full(len(self.known), np.inf), information[self._places]
+        spread = self._faulty / (1.0 + self._faulty * np.maximum(known, 1e-300))
+        wanted = 2.0 * strength + np.log1p(self._faulty * known)
+        found[self._places] = np.sqrt(wanted / spread) / np.maximum(known, 1e-300)
+        return found
+
     def _steady(self, healthy: Evidence) -> Array:
         """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (levels, 6, places)."""
         matrix, vector = healthy.matrix.diagonal(axis1=-2, axis2=-1)[..., self._places], healthy.vector[..., self._places]
