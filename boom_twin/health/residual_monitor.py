@@ -136,7 +136,7 @@ class ResidualMonitor:
 
     @property
     def limits(self) -> dict[str, float]:
-        """From how much softer on, a share of its stiffness, each cylinder could be told under the load of late; empty without."""
+        """From which loss of stiffness (share) on each cylinder could be told under the load of late; empty without one."""
         return self._limits
 
     def _limits_of(self, suspicion: Suspicion, level: int) -> dict[str, float]:

@@ -2,10 +2,10 @@
 
     python test/bench/health/bound.py --baseline out/health/baseline_1.json
 
-For the holds of the first sessions of `sections.py` (no noise is drawn): Fisher information of a section's compliance in means
-of the residuals and natural frequencies, all healthy parameters free within the baseline's covariance, the model's error of each
-channel and frequency as the baseline has it. Printed: the least standard deviation of the size, in percent of compliance; with a
-perfect model of each posture (errors of the model a tenth) beside it, and with the fifth frequency, which nothing excites today.
+For the holds of the first sessions of `sections.py` (no noise is drawn): Fisher information of a section's compliance in
+means of the residuals and natural frequencies, all healthy parameters free within the baseline's covariance, the model's error
+of each channel and frequency as the baseline has it. Printed: the least standard deviation of the size, in percent of
+compliance; beside it with errors of the model a tenth, and with the fifth frequency, which nothing excites today.
 A fault is told (ln B of 12) from about 5.3 of these deviations on: 30 % softer are 43 % of compliance.
 """
 
