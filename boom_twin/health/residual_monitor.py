@@ -164,6 +164,8 @@ class ResidualMonitor:
             self._on_block(problem)
         news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
+        if self._limits and self._load_lately(block.start) == 0.0:
+            self._limits = {}
         if self._suspicion is None or problem.start < self._suspicion.start:
             return news
         self._suspicion.take(problem)
