@@ -421,6 +421,7 @@ class Health:
         Standard deviation of the predicted tip's x and y, m: strokes' noise, and what model and sensors may be off by.
     noise : dict
         How many times the stated noise most sensors of a stream have, at least 1; ``noise_over_`` and the name of its setting.
+        While a load shakes the tip, from which loss of stiffness (share) on each could be told: ``told_from_``, its cause.
     """
 
     stamp: int

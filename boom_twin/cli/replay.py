@@ -128,6 +128,7 @@ def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionSce
 
 def as_text(summary: dict[str, Any]) -> list[str]:
     """A short table."""
+    from ..health.alarm_text import limits_as_text
     from ..health.sensor_monitor import noise_as_text
     from ..offline.replay import alarm_as_text
 
@@ -154,6 +155,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
     lines += [f"noise              {told}" for told in noise_as_text(summary)]
+    lines += [f"judgement          {told}" for told in limits_as_text(summary)]
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +23,17 @@ NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probab
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
 DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
+LIMIT_OF = "told_from_"  # and a cause: how the figures of `ResidualMonitor.limits` are called
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
+
+
+def limits_as_text(figures: Mapping[str, Any]) -> list[str]:
+    """A sentence where a load limits what can be told, by figures as in `Health.noise`; none without a load."""
+    found = {name.removeprefix(LIMIT_OF): share for name, share in figures.items() if name.startswith(LIMIT_OF)}
+    if not found:
+        return []
+    shares = ", ".join(f"{cause} from {100.0 * share:.0f} %" for cause, share in found.items())
+    return [f"limited by a load that shakes the tip: softer cylinders can be told where the loss is large: {shares} on"]
 
 
 class AlarmText:

@@ -82,18 +82,30 @@ class HoldTest:
         assert best is not None
         return best
 
+    def change(self, place: int, by: float, mean: Array, covariance: Array) -> float:
+        """ln of how much more probable it is that a parameter has changed by exactly `by`, from any hold on, than not."""
+        white, log, numbers = self._whitened()
+        found = [self._evidence(white, numbers >= first, log, mean, covariance) for first in range(len(self._holds))]
+        return max(float(by * each.vector[0, place] - 0.5 * by**2 * each.matrix[0, place, place]) for each in found)
+
     def _explained(
         self, white: tuple[Array, Array, Array], since: NDArray[np.bool_], log: float, mean: Array, covariance: Array
     ) -> Verdict:
         """All faults that are there in the rows `since` (k,)."""
+        none = np.zeros(0), np.zeros((0, 0))
+        return self._bank.explain(self._evidence(white, since, log, mean, covariance), *none, 1.0, {})
+
+    def _evidence(
+        self, white: tuple[Array, Array, Array], since: NDArray[np.bool_], log: float, mean: Array, covariance: Array
+    ) -> Evidence:
+        """What all rows say of faults that are there in the rows `since` (k,), healthy deviations integrated out."""
         (root, left, signature), count = white, len(mean)
         faulty = np.linalg.solve(root, np.where(since[:, None], root @ signature, 0.0))
         rows = np.column_stack([left, signature, faulty])[None]
         healthy = Evidence.of(rows, np.array([log])).given(mean, covariance)
         matrix, vector = np.zeros((1, 2 * count, 2 * count)), np.zeros((1, 2 * count))
         matrix[:, :count, :count], vector[:, :count] = healthy.matrix[:, count:, count:], healthy.vector[:, count:]
-        none = np.zeros(0), np.zeros((0, 0))
-        return self._bank.explain(Evidence(matrix, vector, healthy.squares, healthy.rows, healthy.log), *none, 1.0, {})
+        return Evidence(matrix, vector, healthy.squares, healthy.rows, healthy.log)
 
     def _whitened(self) -> tuple[tuple[Array, Array, Array], float, Array]:
         """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row."""

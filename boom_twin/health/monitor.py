@@ -132,7 +132,9 @@ class HealthMonitor:
             alarms.append(alarm if lag is None else replace(alarm, told=lag.told, ranked=lag.ranked))
         alarms += lags.values()
         measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
-        return Health(self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured)
+        return Health(
+            self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured | self.residuals.limits
+        )
 
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []

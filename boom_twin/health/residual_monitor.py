@@ -15,18 +15,18 @@ import numpy as np
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Alarm, Array, Mount
-from .alarm_text import AlarmText
-from .baseline import Baseline
+from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
+from .alarm_text import LIMIT_OF, AlarmText
+from .baseline import JUDGED, Baseline
 from .detection import Detector
 from .hold_test import HoldTest
 from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
-from .inference.fault_catalogue import parameters
+from .inference.fault_catalogue import Form, parameters
 from .inference.holds import HoldProblem
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
-from .inference.innovation_filter import InnovationFilter
+from .inference.innovation_filter import KEEPS_STEP, InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, MISFIT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
+from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
 from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
@@ -35,6 +35,7 @@ LEAST_SPAN, SWINGS = 3.0, 4.5  # s that evidence has to take for an alarm if it 
 UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is an alarm
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
+LIMITS_PERIOD = 60  # blocks of a suspicion between two looks at what could be told, a multiple of the next
 PERIOD = 3  # blocks between two looks at a suspicion
 SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
@@ -45,11 +46,12 @@ ENDED = 8.0  # ln by which a known fault's end may go worse with what is measure
 
 @dataclass(frozen=True)
 class _KnownFault:
-    """A fault that the twin goes on with: its alarm, its parameter and that one's value."""
+    """A fault that the twin goes on with: its alarm, its parameter, that one's value and how unsure it is (deviation)."""
 
     alarm: Alarm
     place: int
     value: float
+    sigma: float = 0.0
 
 
 class ResidualMonitor:
@@ -91,6 +93,8 @@ class ResidualMonitor:
         self._linear = LinearModel(scene, settings, mounts, known)
         self._mean, self.covariance = baseline.healthy(known)
         self._errors2, self._noise2, self._detuning = baseline.errors(n) ** 2, baseline.noise(n) ** 2, baseline.detuning
+        late = [each.form is Form.DELAY and tuple(JUDGED)[each.index] is Stream.IMU for each in known]
+        self._out_of_step = np.diag(np.where(late, (baseline.detuning * KEEPS_STEP) ** 2, 0.0))
         self._levels = load_levels(scene)
         self._bank = HypothesisTest(known)
         self._tell = AlarmText(scene, known, self._linear.signatures, baseline.errors(n))
@@ -114,6 +118,7 @@ class ResidualMonitor:
         self._tip_load.begin()
         self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
+        self._limits: dict[str, float] = {}
         self._watch_anew()
 
     def _watch_anew(self) -> None:
@@ -128,6 +133,17 @@ class ResidualMonitor:
         """Those that last: of faults that are known, and what is being looked into."""
         open_ones = [each for each in (self._alarm, self._tip_load.alarm, self._hold_alarm) if each is not None]
         return (*(each.alarm for each in self._known.values()), *open_ones)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """From which loss of stiffness (share) on each cylinder could be told under the load of late; empty without one."""
+        return self._limits
+
+    def _limits_of(self, suspicion: Suspicion, level: int) -> dict[str, float]:
+        """See `limits`; by the evidence of an open suspicion."""
+        least = suspicion.least_told(level, SURE)
+        softer = [(each.cause, least[i]) for i, each in enumerate(self._bank.known) if each.cause.endswith(".k")]
+        return {LIMIT_OF + cause: float(value / (1.0 + value)) for cause, value in softer if math.isfinite(value)}
 
     @property
     def levels(self) -> Array:
@@ -148,6 +164,8 @@ class ResidualMonitor:
             self._on_block(problem)
         news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
+        if self._limits and self._load_lately(block.start) == 0.0:
+            self._limits = {}
         if self._suspicion is None or problem.start < self._suspicion.start:
             return news
         self._suspicion.take(problem)
@@ -165,14 +183,29 @@ class ResidualMonitor:
             self._suspicion.take_hold(hold, self._frequency_error)
         if self._alarm is not None or self._tip_load.alarm is not None:
             return []
-        found = self._hold_test.take(hold, self._mean_about_known(), self.covariance)
+        about = self._mean_about_known(), self._covariance_about_known()
+        found = self._hold_test.take(hold, *about)
+        for each in self._known.values():
+            if self._hold_test.change(each.place, -each.value, *about) > max(HELD, found.verdict.strength - ENDED):
+                return self._end_known(each, hold.end)
         if self._hold_alarm is None and found.verdict.strength < HELD:
             return []
         if found.verdict.strength < LET_GO:
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
-        self._hold_alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
-        return [self._hold_alarm]
+        self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
+            self._go_on_with_held(found.verdict)
+        return [alarm]
+
+    def _go_on_with_held(self, verdict: Verdict) -> None:
+        """The fault that holds have named becomes known, as sure as its size is: blocks would tell it once more."""
+        assert self._hold_alarm is not None
+        best = verdict.best
+        sigma = best.sigma * verdict.excess**0.5
+        self._known[verdict.causes[0].name] = _KnownFault(self._hold_alarm, best.place, best.value, sigma)
+        self._hold_alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
+        self._start_about_known()
 
     def _end_hold_alarm(self, stamp: int) -> list[Alarm]:
         """End the alarm by holds, if there is one."""
@@ -184,7 +217,8 @@ class ResidualMonitor:
         """Innovations beyond what healthy parameters and known faults explain; the first suspicious one begins a suspicion."""
         self._healthy.tune(problem.modes)
         noise, known = problem.noise(self._noise2), self._regression
-        found = self._healthy.step(problem.table, noise, self._errors_about(problem), problem.shaking, problem.travel)
+        shaking = self._healthy.vibration(problem.shaking)
+        found = self._healthy.step(problem.table, noise, self._errors_about(problem), shaking, problem.travel)
         left, _ = known.take(found.white, self._suspicion is None)
         self.surprise = np.full(len(self._names), np.nan)
         self.surprise[np.isfinite(problem.table[:, 0])] = left
@@ -206,8 +240,12 @@ class ResidualMonitor:
         return errors2
 
     def _suspect(self, start: int) -> None:
-        """Collect evidence from `start` (ns) on."""
-        known = self._regression.mean, self._regression.covariance
+        """Collect evidence from `start` (ns) on.
+
+        A vibration whose frequency is a little wrong runs ahead or behind, always the same way: nearly all that an IMU says of
+        its lag is said by vibration, so a lag may be as large without a fault.
+        """
+        known = self._regression.mean, self._regression.covariance + self._out_of_step
         self._suspicion = Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, self._carried)
         self._blocks = 0
 
@@ -222,12 +260,15 @@ class ResidualMonitor:
             return self._tip_load.end(start)
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
+        if self._blocks % LIMITS_PERIOD == 0 and self._alarm is None:
+            self._limits = self._limits_of(suspicion, verdict.level) if verdict.level else {}
         news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
         if self._suspicion is not suspicion:
             return news
         if suspicion.is_outdated(verdict):
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
-            self._unexplained = (self._unexplained or suspicion.start) if is_odd else None
+            lately = max(suspicion.start, start - RECENT * BLOCK)  # before that it was explained
+            self._unexplained = (self._unexplained or lately) if is_odd else None
             self._carried = carried_on(verdict) if self._alarm is not None else {}
             self._suspect(start + BLOCK)
         elif suspicion.is_settled:
@@ -330,7 +371,7 @@ class ResidualMonitor:
 
     def _start_about_known(self) -> None:
         """Parameters are healthy but for the faults that are known."""
-        self._regression = Regression(self._mean_about_known(), self.covariance)
+        self._regression = Regression(self._mean_about_known(), self._covariance_about_known())
         self._hold_test.restart()
         self._watch_anew()
 
@@ -340,6 +381,13 @@ class ResidualMonitor:
         for each in self._known.values():
             mean[each.place] += each.value
         return mean
+
+    def _covariance_about_known(self) -> Array:
+        """Of the parameters, with what the sizes of known faults are unsure by."""
+        covariance = self.covariance.copy()
+        for each in self._known.values():
+            covariance[each.place, each.place] += each.sigma**2
+        return covariance
 
     def forget(self) -> None:
         """Drop a suspicion that is not yet an alarm: a sensor has turned out to be faulty, and may have caused it."""

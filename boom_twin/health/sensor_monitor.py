@@ -60,6 +60,7 @@ REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to r
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
+ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
@@ -166,7 +167,7 @@ class SensorCheck:
         spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
         if largest > SPIKE * self._sigma:
             steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
-            noise = np.sqrt(np.fmax(self._power, self._sigma**2))
+            noise = np.sqrt(np.fmax(np.fmax(self._power, self._sigma**2), _usual_bend2(left)))
             spikes, jumped = self._spikes(steps, noise), self._jumps(times, all_raw, left, steps, noise)
         findings = SensorFindings(
             stuck=self._stuck(float(stamps[-1])),
@@ -229,6 +230,17 @@ class SensorCheck:
 def bends2(values: Array) -> Array:
     """Squares of second differences of neighbours, shape (k - 2, ..); their mean is the variance of white noise."""
     return np.asarray((values[2:] - 2.0 * values[1:-1] + values[:-2]) ** 2 / 6.0)
+
+
+def _usual_bend2(left: Array) -> Array:
+    """Variance (channels,) of the noise of readings (k, channels) by the median of their second differences.
+
+    It does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is.
+    """
+    sorted2 = np.sort(bends2(left), axis=0)  # NaN last
+    known = np.isfinite(sorted2).sum(axis=0)
+    middle = np.take_along_axis(sorted2, np.maximum((known - 1) // 2, 0)[None], axis=0)[0]
+    return np.asarray(np.where(known >= ENOUGH, middle / MEDIAN2, 0.0))
 
 
 def _newest(stamps: Array, raw: Array, before: Array) -> Array:

@@ -84,7 +84,8 @@ class Suspicion:
         table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
-        found = Evidence.of(*self._filter.step(table, noise, crude, problem.shaking, problem.travel))
+        shaking = self._filter.vibration(problem.shaking)
+        found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
         self._evidence += found
         self._calm += found.weighted(weight)
         self._before.append(self._evidence)
@@ -109,6 +110,14 @@ class Suspicion:
     def explain_calmly(self) -> Verdict:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
         return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
+
+    def least_told(self, level: int, strength: float) -> Array:
+        """Least sizes of steady faults, shape (parameters,), that this evidence would tell under a load of that level.
+
+        By the posterior's own covariance: `strength` is ln of how much more probable than none such a fault has to be.
+        """
+        healthy = self._evidence.given(self.mean, self.covariance)
+        return self._bank.least_told(healthy.matrix[level].diagonal()[: len(self.mean)], strength)
 
     def load(self, level: int) -> tuple[float, float]:
         """Magnitude of the force at the tip, and its deviation, N, if there is no fault but a load of this level."""
@@ -140,5 +149,11 @@ class Suspicion:
 
 
 def carried_on(verdict: Verdict) -> dict[str, float]:
-    """What a suspicion that follows this verdict is to begin with; see `HypothesisTest.explain`."""
+    """What a suspicion that follows this verdict, when it is outdated, is to begin with; see `HypothesisTest.explain`.
+
+    Nothing where the best explanation grew: it grows no more, or otherwise, and which cause went best with that shape says
+    which one makes up best for what is wrong with it.
+    """
+    if verdict.best.is_growing:
+        return {}
     return {cause.name: math.log(max(cause.probability, CARRIED)) for cause in verdict.causes}

@@ -12,6 +12,7 @@ import numpy as np
 from .. import __version__
 from ..analysis.bending_stress import BOX
 from ..analysis.free_vibration import Vibration
+from ..health.alarm_text import limits_as_text
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
@@ -106,6 +107,7 @@ def _head(subject: Subject) -> list[str]:
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
         *(("noise", told) for told in noise_as_text(summary)),
+        *(("judgement", told) for told in limits_as_text(summary)),
     ]
     scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
     return [

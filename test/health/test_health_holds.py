@@ -142,6 +142,19 @@ def test_a_softer_section_is_told_with_its_size_and_the_hold_it_began_in() -> No
     assert last.tip == pytest.approx(0.05 * last.verdict.best.value)
 
 
+def test_the_end_of_a_known_fault_is_found_in_holds_and_only_its_end() -> None:
+    """Judged about a section that is 0.43 more compliant; from the fourth hold on it is whole again, or it is not."""
+
+    def ends(seed: int, ended: bool) -> float:
+        test = HoldTest(HypothesisTest(KNOWN), ERRORS**2, FREQUENCY_ERROR)
+        for hold in drawn(np.random.default_rng(seed), -0.43 if ended else 0.0, onset=3):
+            test.take(hold, MEAN, COVARIANCE)
+        return test.change(0, -0.43, MEAN, COVARIANCE)
+
+    assert min(ends(seed, True) for seed in range(5)) > 12.0
+    assert max(ends(seed, False) for seed in range(5)) < -12.0
+
+
 def test_healthy_holds_are_no_fault() -> None:
     rng = np.random.default_rng(4)
     strengths = [max(each.verdict.strength for each in judged(drawn(rng, 0.0))) for _ in range(60)]
@@ -184,6 +197,15 @@ def test_a_softer_section_of_a_recorded_session() -> None:
     alarm = next(each for _, each in found.states() if each.cause is not None)  # the first; residuals may name it too, later
     assert alarm.channel == "tip" and alarm.kind == "softer" and "puts the tip off by" in alarm.told
     assert abs(alarm.ranked[0].parts[0][1] - 0.43) < 0.1
+
+
+def test_a_section_that_holds_have_named_is_known_and_one_alarm() -> None:
+    """The session moves on for half a minute after the name: judged about it, neither blocks nor holds raise a second one."""
+    scene = load_scene()
+    stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.7})
+    found = run(session(60.0), twin=Twin(stiff, baseline=learnt(scene)))
+    assert [told[1:] for told in found.told()] == [("tip", "softer", "section_1.EI")]
+    assert found.health[-1].alarms[0].until is None, "it lasts"
 
 
 def test_the_same_session_of_the_right_boom_gives_no_alarm() -> None:

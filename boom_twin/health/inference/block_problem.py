@@ -18,7 +18,7 @@ from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
-from .innovation_filter import ModalStates, modes_of
+from .innovation_filter import CALM, ModalStates, modes_of
 from .sensitivities import HoldInWork, Signature, Signatures
 
 BLOCK = 100_000_000  # ns
@@ -192,7 +192,6 @@ def _means_of_some(left: Array, sigma: float) -> tuple[Array, Array]:
 
 
 STEP = 0.01  # m of stroke after which signatures are made anew
-CALM = 2.0  # s, over which the shaking of the tip is remembered
 SMOOTHED = 0.5  # of the variance of a stroke's estimate, what is left of it in the mean of a block
 
 

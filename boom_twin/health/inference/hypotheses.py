@@ -31,13 +31,14 @@ from math import log
 import numpy as np
 
 from ...types import Array
-from .fault_catalogue import Parameter, variances
+from .fault_catalogue import Form, Parameter, variances
 from .kalman_update import correct
 from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
 CRUDE = 0.001  # see above
+AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,8 @@ class Verdict:
     excess : float
         Squares that the best explanation leaves over those that noise leaves, at least 1.
     none_excess : float
-        Likewise where there is no fault, with the load at the tip that goes best with that.
+        Likewise where there is no fault, the least of all levels of the load at the tip that go about as well with that as the
+        best does: pulses and gusts are no Gauss-Markov process, rest suits a low level, a steep flank a high one.
     level : int
         Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
     """
@@ -201,6 +203,8 @@ class HypothesisTest:
         self._faulty = variances(known, "faulty")[self._places]
         self._least = np.array([known[i].least for i in self._places])
         self._priors = np.log([known[i].prior for i in self._places])
+        lags = [known[i].form is Form.DELAY for i in self._places]
+        self._growing_priors = np.where(lags, -np.inf, log(GROWING_PRIOR))  # a lag does not grow
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
@@ -240,8 +244,20 @@ class HypothesisTest:
             for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
         ]
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
-        none_excess = max(1.0, float(healthy.squares[none]) / max(healthy.rows, 1.0))
+        as_well = logs > logs[none] - AS_WELL
+        none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
         return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
+
+    def least_told(self, information: Array, strength: float) -> Array:
+        """Sizes (parameters,) of steady faults whose expected log factor is `strength`, by their information (parameters,).
+
+        Infinite of parameters that are never faulty, or of which nothing is known.
+        """
+        found, known = np.full(len(self.known), np.inf), information[self._places]
+        spread = self._faulty / (1.0 + self._faulty * np.maximum(known, 1e-300))
+        wanted = 2.0 * strength + np.log1p(self._faulty * known)
+        found[self._places] = np.sqrt(wanted / spread) / np.maximum(known, 1e-300)
+        return found
 
     def _steady(self, healthy: Evidence) -> Array:
         """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (levels, 6, places)."""
@@ -265,7 +281,7 @@ class HypothesisTest:
         explained = (vector * found).sum(axis=-1)
         now = np.array([1.0, span])
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + log(GROWING_PRIOR)
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + self._growing_priors
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
     def _sided(self, values: Array, sigmas: Array) -> Array:

@@ -9,7 +9,7 @@ w is white, of the density that
   within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
 
 The shape of a mode is then wrong, too: every channel has a noise of its own, of `SHAPE` detuning times what it reads of that
-vibration.
+vibration. Vibration that nobody predicted, by a load, counts likewise: see `InnovationFilter.vibration`.
 
 And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
 a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
@@ -49,6 +49,7 @@ REST = 1e-3  # m/s of travel that time stands for while the boom rests
 LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
 MEAN = 1.0  # see above
+CALM = 2.0  # s, over which vibration that was found is remembered
 LOAD = 4  # states of the load: x and y about the mean, and the mean's
 BOTH = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])  # what of these is the whole load
 
@@ -168,6 +169,7 @@ class InnovationFilter:
         self._p[:, :LOAD, :LOAD] = _diagonal(self._stationary)
         self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
+        self._swinging = np.zeros(count)  # mean square of the tip's acceleration by vibration that was found
         self._posture: ModalStates | None = None
 
     def tune(self, modes: ModalStates) -> None:
@@ -200,7 +202,7 @@ class InnovationFilter:
         if is_first:
             self._p[:, :size, :size] += _swung(modes, self._level2)
 
-    def step(self, table: Array, noise: Array, errors2: Array, shaking: float, travel: float) -> Innovations:
+    def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.
 
         Parameters
@@ -211,8 +213,8 @@ class InnovationFilter:
             Covariance of the means by sensor and stroke noise.
         errors2 : ndarray, shape (channels,)
             Variance of the model's error in one posture.
-        shaking : float
-            Mean square of the predicted tip acceleration lately, (m/s^2)^2.
+        shaking : float or ndarray, shape (levels,)
+            Mean square of the tip's acceleration by vibration lately, (m/s^2)^2.
         travel : float
             Of the strokes since the block before, m.
 
@@ -234,7 +236,13 @@ class InnovationFilter:
         filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
         if np.isnan(log).any():
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
+        felt = self._x[:, : self._size, 0] @ self._shown[-2:, : self._size].T
+        np.maximum(self._swinging * math.exp(-self._block / CALM), 0.5 * (felt**2).sum(axis=1), out=self._swinging)
         return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
+
+    def vibration(self, predicted: float) -> Array:
+        """Mean square of the tip's acceleration lately, (m/s^2)^2, shape (levels,): as `predicted`, or as found where more."""
+        return np.maximum(predicted, self._swinging)
 
     def load(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
         """Force at the tip along x and y, shape (..., 2), and its covariance, shape (..., 2, 2); N, after the newest block.
