@@ -27,6 +27,7 @@ STROKE = "stroke_{}_m"
 IMU = ("imu_x_m_s2", "imu_z_m_s2")
 LARGEST = 2**26
 """Bytes of a file that are read: it is held as a whole."""
+FEWEST, SLOWEST = 20, 1.0  # rows; s from row to row, at least, by which times are in another unit: 1 kHz in ms
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 """Channel of every stream."""
 
@@ -148,6 +149,12 @@ def _stamps(table: CsvTable) -> list[int]:
     if found[-1] >= 2**31 * SECOND:
         raise BagError(
             f"{table.path}: {TIME} is beyond {2**31} s, so not in seconds. Divide it: stamps in ms or ns are no seconds."
+        )
+    step = float(np.median(np.diff(found))) / SECOND if len(found) >= FEWEST else 0.0
+    if step >= SLOWEST:
+        raise BagError(
+            f"{table.path}: {TIME} goes on by {step:g} s from row to row, and a twin needs several rows a second. If these are "
+            f"ms, divide them by 1000: {TIME} is in seconds."
         )
     shift = max(0, SECOND - found[0])
     return [stamp + shift for stamp in found]

@@ -138,6 +138,7 @@ CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"
         (CSV.replace("\n0.1,", "\n1700000000000,"), "not in seconds"),
         (CSV.replace(",", ";"), "no column t_s, stroke_1_m"),
         (CSV.replace("\n0.1,", "\nnan,"), "line 3: t_s = 'nan' is not a time"),
+        ("t_s,stroke_1_m\n" + "".join(f"{5 * k},0.1\n" for k in range(30)), "goes on by 5 s from row to row"),
     ],
 )
 def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path, text: str, words: str) -> None:
