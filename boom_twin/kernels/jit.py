@@ -23,8 +23,8 @@ Fields = TypeVar("Fields")
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 DOCUMENTED = frozenset({"nogil", "error_model"})
-COMPILING = "compiling the model, about half a minute; done once for this version and kept in %s"
-NOT_KEPT = "compiling the model, about half a minute each time, because compiled code is not kept: %s"
+COMPILING = "compiling the model, about a minute; done once for this version and kept in %s"
+NOT_KEPT = "compiling the model, about a minute each time, because compiled code is not kept: %s"
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
 
