@@ -131,7 +131,7 @@ def test_replay_report_and_page(scene, bag, tmp_path, monkeypatch):
     monkeypatch.setattr(Axes, "set_ylabel", lambda self, text: labels.append(text) or set_ylabel(self, text))
     recording = replay(bag, scene, tmp_path / "again", health=False).recording
     residual_picture(tmp_path / "residuals.png", "session", history_of(recording, scene), "")
-    assert "cylinder_force_2\nN" in labels and "joint_1\nmrad" in labels
+    assert "cylinder\nforce_2\nN" in labels and "joint_1\nmrad" in labels
     feed = bag_feed(bag, scene, Settings())
     while feed.is_reading:
         feed.poll()
