@@ -14,6 +14,7 @@ from .main import add_json, add_scene, open_scene, print_result
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
     from ..offline.replay import ProgressBar
+    from ..scene import Scene
     from ..types import Array
 
 
@@ -36,10 +37,24 @@ class Quantity(NamedTuple):
 
 def run(args: Namespace) -> int:
     """Compute, print and write."""
+    from ..system.result_folder import ENVELOPE, result_folder
+
+    scene = open_scene(args.scene)
+    if args.out is None:
+        values, lines = _examined(scene, None)
+    else:
+        with result_folder(args.out, ENVELOPE, [Path(args.scene)] if args.scene else []) as building:
+            values, lines = _examined(scene, building.folder)
+        lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
+    print_result(args.json, values, lines)
+    return 0
+
+
+def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[str]]:
+    """What ``--json`` prints and what people read; files of it in `folder`."""
     from ..analysis.envelope import envelope
     from ..offline.progress import progress_of
 
-    scene = open_scene(args.scene)
     bars: list[ProgressBar] = []
 
     def progress(done: int, total: int) -> None:
@@ -50,11 +65,10 @@ def run(args: Namespace) -> int:
     found = envelope(scene, progress)
     bars[0].close()
     quantities = quantities_of(found)
-    values, lines = _summary(found, quantities), _report(found, quantities)
-    if args.out is not None:
-        lines += _write(args, found, quantities, values, scene)
-    print_result(args.json, values, lines)
-    return 0
+    values = _summary(found, quantities)
+    if folder is not None:
+        _write(folder, found, quantities, values, scene)
+    return values, _report(found, quantities)
 
 
 def quantities_of(found: Envelope) -> list[Quantity]:
@@ -101,17 +115,14 @@ def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
     return lines
 
 
-def _write(args: Namespace, found: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Any) -> list[str]:
+def _write(folder: Path, found: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
     from ..plots.envelope import envelope_picture
-    from ..system.result_folder import ENVELOPE, result_folder
     from .main import plain_values
 
-    with result_folder(args.out, ENVELOPE, [Path(args.scene)] if args.scene else []) as building:
-        (building.folder / "envelope.csv").write_text(_csv(found, quantities), encoding="utf-8")
-        (building.folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")
-        bars = [(f"{q.words}, {q.unit}", q.factor * q.values) for q in quantities[1:]]
-        envelope_picture(building.folder / "envelope.png", scene, found, bars)
-    return ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
+    (folder / "envelope.csv").write_text(_csv(found, quantities), encoding="utf-8")
+    (folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")
+    bars = [(f"{q.words}, {q.unit}", q.factor * q.values) for q in quantities[1:]]
+    envelope_picture(folder / "envelope.png", scene, found, bars)
 
 
 def _csv(found: Envelope, quantities: list[Quantity]) -> str:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     Balances = tuple[EnergyBalance, MomentumBalance]
 
 FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
+FASTEST = 0.5  # m/s; cylinders of booms go at less than 0.3
+SPARSE = 1.0  # s from row to row
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -71,6 +73,8 @@ def run(args: Namespace) -> int:
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes = read_drive(Path(args.drive), len(scene.joints))
+    for oddity in odd_in_drive(times, strokes):
+        print(f"boom_twin simulate: warning: {args.drive}: {oddity}", file=sys.stderr)
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
     if args.samples is not None:
         return _sample(args, scene, times, strokes, angles)
@@ -233,6 +237,26 @@ def read_drive(path: Path, n: int) -> tuple[Array, Array]:
     strokes = [f"stroke_{i + 1}_m" for i in range(n)]
     table.require(["t_s", *strokes])
     return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in strokes])
+
+
+def odd_in_drive(times: Array, strokes: Array) -> list[str]:
+    """What is odd in a drive, and likely meant otherwise: times in ms, strokes that jump; with the place and the remedy."""
+    steps, found = np.diff(times), []
+    if not len(steps) or not (steps > 0.0).all():
+        return []  # `simulate` refuses it
+    if (usual := float(np.median(steps))) >= SPARSE:
+        found.append(
+            f"t_s goes on by {usual:g} s from row to row, {times[-1] - times[0]:g} s in all, and strokes go smoothly between. "
+            "If these are ms, divide them by 1000: t_s is in seconds."
+        )
+    speeds = np.abs(np.diff(strokes, axis=0)) / steps[:, None]
+    row, i = np.unravel_index(np.argmax(speeds), speeds.shape)
+    if speeds[row, i] > FASTEST:
+        found.append(
+            f"line {row + 3}: stroke_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
+            f"{speeds[row, i]:.3g} m/s; cylinders of booms go at less than 0.3 m/s. Check the value and the times."
+        )
+    return found
 
 
 def _angles_near(scene: Scene, posture: str, first: Array) -> Array:

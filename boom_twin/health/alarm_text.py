@@ -24,6 +24,7 @@ LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how man
 DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wander
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 LIMIT_OF = "told_from_"  # and a cause: how the figures of `ResidualMonitor.limits` are called
+SI = {"k": "N/m", "EI": "N m^2", "mass": "kg"}  # of parameters of a scene that are judged by their share
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
 
@@ -132,7 +133,8 @@ class AlarmText:
         if each.form is Form.SCENE and not unit:
             now, own = physical(each, self._scene, value), physical(each, self._scene, 0.0)
             spread = abs(physical(each, self._scene, value + sigma) - now)
-            amount = f"{now:.3g} +- {spread:.1g}, {100 * (now / own - 1):+.0f} % of the scene's"
+            si = SI[each.cause.rpartition(".")[2]]
+            amount = f"{now:.3g} +- {spread:.1g} {si}, {100 * (now / own - 1):+.0f} % of the scene's"
         else:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
         trend = f", {best.rate:+.2g} {unit}/s" if best.is_growing and unit else ", growing" if best.is_growing else ""

@@ -14,6 +14,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor
+from .imu_mount import ImuMount
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
@@ -66,6 +67,7 @@ class HealthMonitor:
         self._ranges = sensor_ranges(scene, mounts)
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
+        self._mount = ImuMount()
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -84,6 +86,7 @@ class HealthMonitor:
         self.residuals.begin()
         for monitor in self._delays.values():
             monitor.begin()
+        self._mount.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
@@ -96,9 +99,13 @@ class HealthMonitor:
     @property
     def masked(self) -> NDArray[np.bool_]:
         """Of all measured channels in the order of the streams, those whose sensor is known to fail."""
-        streams = [stream for stream in self._channels if stream is not Stream.STROKES]
-        none = {stream: np.zeros(len(self._channels[stream]), bool) for stream in streams}
-        return np.concatenate([self._sensors[each].masked if each in self._sensors else none[each] for each in streams])
+        return np.concatenate([self._masked(stream) for stream in self._channels if stream is not Stream.STROKES])
+
+    def _masked(self, stream: Stream) -> NDArray[np.bool_]:
+        """The same of one stream."""
+        if stream in self._sensors:
+            return self._sensors[stream].masked
+        return np.full(len(self._channels[stream]), stream is Stream.IMU and self._mount.alarm is not None)
 
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
@@ -126,6 +133,7 @@ class HealthMonitor:
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
             alarms += monitor.alarms
+        alarms += [self._mount.alarm] if self._mount.alarm is not None else []
         lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
         for alarm in self.residuals.alarms:  # which take vibration for a load: the size is the other's
             lag = lags.get(alarm.cause)
@@ -145,7 +153,9 @@ class HealthMonitor:
             if stream in CHECKED and stream is not Stream.STROKES:
                 expected = raw - left if is_followed else np.full_like(raw, np.nan)
                 news += self._check(stream, block, stamps, raw, expected)
-        news += self._judge_delays(block, readings) if is_followed else []
+        if is_followed:
+            news += self._judge_mount(block, readings[Stream.IMU])
+            news += self._judge_delays(block, readings)
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
@@ -156,19 +166,26 @@ class HealthMonitor:
         averaged = self._means(block, predictions, readings)
         return news + self.residuals.take(averaged, self._noise)
 
+    def _judge_mount(self, block: Block, imu: MeasuredRows) -> list[Alarm]:
+        """Look whether the IMU reads gravity; gives the alarms that began or ended."""
+        news = self._mount.take(imu.raw, imu.left, BLOCK * NANO, block.number * BLOCK, block.end)
+        if news and self._mount.alarm is not None:  # what was suspected by its readings, or is being collected, is void
+            news += self.residuals.close(block.end)
+            self.residuals.begin()
+        return news
+
     def _judge_delays(self, block: Block, readings: dict[Stream, MeasuredRows]) -> list[Alarm]:
         """Look for lags; gives the alarms that began, changed or ended."""
         news: list[Alarm] = []
         for stream, monitor in self._delays.items():
             stamps, raw, left = readings[stream]
-            if stream in self._sensors:
-                left = np.where(self._sensors[stream].masked, np.nan, left)
+            left = np.where(self._masked(stream), np.nan, left)
             news += monitor.take(block.number, np.asarray((stamps - block.number * BLOCK) * NANO), left, raw - left, block.end)
         return news
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
-        power = bends2(raw if stream not in CHECKED else raw[:, ~self._sensors[stream].masked])
+        power = bends2(raw[:, ~self._masked(stream)])
         return bool(power.sum(axis=0).max(initial=0.0) > SHAKEN * self._settings.variance(SENSORS[stream]) * len(power))
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
@@ -188,8 +205,7 @@ class HealthMonitor:
             stated, left = self._settings.variance(SENSORS[stream]), readings[stream].left
             mean, count = means(left, stated**0.5)
             count = count * stated / self._measured_noise(stream, left, stated)
-            if stream in self._sensors:
-                mean[self._sensors[stream].masked] = np.nan
+            mean[self._masked(stream)] = np.nan
             found.append((mean, count))
         imu = readings[Stream.IMU]
         rates = np.concatenate([_rates(stamps, predictions.joints), _rates(imu.stamps, imu.raw - imu.left)])

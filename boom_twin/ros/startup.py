@@ -36,7 +36,12 @@ class InterruptedWorkError(KeyboardInterrupt):
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    sys.unraisablehook = _nothing  # a finaliser of what was being made just now would tell of what it lacks
     raise InterruptedWorkError
+
+
+def _nothing(unraisable: object) -> None:
+    """Tell nothing."""
 
 
 class StopSignal:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -12,6 +12,9 @@ from .checks.findings import unknown_key, value_fault
 from .format import Format
 from .units import converted, unit_of
 from .yaml_reader import Document, Place
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 Root = TypeVar("Root", bound=BaseModel)
 EMPTY: tuple[Any, ...] = (None, {}, ())
@@ -46,9 +49,14 @@ def validated(document: Document, form: Format[Root]) -> Validated[Root]:
     try:
         return Validated(form.root.model_validate(known, strict=True), known, frozenset(), tuple(faults))
     except ValidationError as error:
-        details = error.errors(include_url=False)
+        details = [each for each in error.errors(include_url=False) if not _counts_faulty(each)]
     faults += [value_fault(document, form, detail, detail["loc"]) for detail in details]
     return Validated(None, known, frozenset(detail["loc"] for detail in details), tuple(faults))
+
+
+def _counts_faulty(detail: ErrorDetails) -> bool:
+    """Whether a list is called too short because its entries are faulty, which is told of each."""
+    return detail["type"] == "too_short" and detail["loc"] in (("sections",), ("joints",)) and len(detail["input"]) > 0
 
 
 def _known(document: Document, form: Format[Any], block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:

@@ -111,11 +111,13 @@ TABLE = Format(
 
 PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
 """What a column of one of two numbers ends with, as in C_x, beam_end, range_deg_low."""
+TABLES = (".csv", ".tsv", ".txt")
+"""Names of files with a row for every section end so; the cells lie apart by commas, semicolons or tabs."""
 _HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(]\s*(.+?)\s*[\])])?")
 
 
 def read_table(path: Path) -> tuple[BoomTable, Document]:
-    """The table in a file (.csv, else YAML), and the document with the lines of its values.
+    """The table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
 
     Raises
     ------
@@ -123,7 +125,7 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
         With every fault that was found: place, value, bound, remedy.
     """
     text = read_text(path)
-    document = csv_document(text, str(path)) if path.suffix.lower() == ".csv" else parse(text, str(path))
+    document = csv_document(text, str(path)) if path.suffix.lower() in TABLES else parse(text, str(path))
     return checked_table(document, str(path)), document
 
 
@@ -215,7 +217,8 @@ def csv_document(text: str, source: str) -> Document:
     """
     document = Document({"sections": [], "joints": [], "base": {}})
     try:
-        rows = list(csv.reader(text.splitlines(), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+        header = text.partition("\n")[0]
+        rows = list(csv.reader(text.splitlines(), delimiter=next((mark for mark in ";\t" if mark in header), ",")))
     except csv.Error as error:
         raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
     if len(rows) < 2:

@@ -91,7 +91,7 @@ def read_text(path: Path) -> str:
         return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
-            raise _refusal(str(path), "this is not a text file in UTF-8", "Give a scene file in YAML.") from None
+            raise _refusal(str(path), *_not_utf8(data, error)) from None
         reason = getattr(error, "strerror", None) or str(error)
         remedy = "Give the path of a scene file; `boom_twin scene` prints one to start from."
         raise _refusal(str(path), reason, remedy) from None
@@ -114,6 +114,19 @@ def parse(text: str, source: str) -> Document:
         raise _refusal(source, "the file is empty", "Start from the one that `boom_twin scene` prints.")
     document.values = _Reader(document, constructor).value(root, ())
     return document
+
+
+def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
+    """What a file is instead of UTF-8 text, and what to do."""
+    if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")):  # zip, as .xlsx and .ods; .xls
+        return "this is not a text file but a spreadsheet's own or an archive", "Save a spreadsheet as `CSV UTF-8`."
+    if b"\0" in data:
+        return "this is not a text file in UTF-8", "Give a scene or a table in YAML, or a table in CSV."
+    line = data.count(b"\n", 0, error.start) + 1
+    return (
+        f"line {line} has a character that is not UTF-8, byte {data[error.start]:#x}",
+        "Save the file with the encoding UTF-8.",
+    )
 
 
 def _refusal(source: str, bound: str, remedy: str) -> SceneError:

@@ -129,3 +129,39 @@ def test_a_faulty_table_is_refused_with_its_lines(capsys: pytest.CaptureFixture[
     assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
     err = capsys.readouterr().err
     assert "base.cylinder_pin is absent" in err and "sections" in err and not Path("boom.yaml").exists()
+
+
+COLUMNS = {
+    "length": 8.3, "beam_start": 1.32, "beam_end": 7.8, "height": 0.56, "width": 0.42, "wall": 0.008, "rod_pin_x": 1.32,
+    "rod_pin_y": -0.264, "kind": "A", "range_deg_low": -5, "range_deg_high": 85, "bore": 0.18, "rod": 0.125, "pivot_x": 0,
+    "pivot_y": 0, "cylinder_pin_x": 0.99, "cylinder_pin_y": -2.75,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "mark"), [("table.csv", ","), ("table.csv", ";"), ("table.csv", "\t"), ("table.tsv", "\t")])
+def test_a_table_as_spreadsheets_write_it(name: str, mark: str) -> None:
+    rows = mark.join(COLUMNS), mark.join(map(str, COLUMNS.values()))
+    Path(name).write_text("\n".join(rows), encoding="utf-8-sig")
+    assert main(["init", "--table", name, "--out", "boom.yaml"]) == 0
+    assert load_scene("boom.yaml").sections[0].length == 8.3
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"PK\x03\x04\x14\x00\xff\xfe", "a spreadsheet's own or an archive. Save a spreadsheet as `CSV UTF-8`."),
+        ("length\nGroßer\n".encode("latin-1"), "line 2 has a character that is not UTF-8, byte 0xdf. Save the file with"),
+        (b"\xff\xfel\x00e\x00", "this is not a text file in UTF-8"),
+    ],
+)
+def test_a_file_of_another_kind_is_refused_by_what_it_is(content: bytes, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("table.csv").write_bytes(content)
+    assert main(["init", "--table", "table.csv", "--out", "boom.yaml"]) == 1
+    assert told in capsys.readouterr().err
+
+
+def test_a_list_with_faulty_entries_is_not_called_empty(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("table.csv").write_text("length,height\n8.3,0.56\n", encoding="utf-8")
+    assert main(["init", "--table", "table.csv", "--out", "boom.yaml"]) == 1
+    err = capsys.readouterr().err
+    assert "sections[0].wall is absent" in err and "at least one entry" not in err

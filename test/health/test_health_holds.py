@@ -234,5 +234,5 @@ def test_which_section_is_told_only_where_it_is_known() -> None:
     assert (either.kind, either.cause) == ("softer", None)
     assert "which one is not told yet: section_1.EI or section_2.EI" in either.told and "22 mm" in either.told
     one = tell.of_holds(either, verdict_of(second=0.97, first=0.03), 0.022)
-    assert (one.kind, one.cause) == ("softer", "section_2.EI") and "-29 % of the scene's" in one.told
+    assert (one.kind, one.cause) == ("softer", "section_2.EI") and " N m^2, -29 % of the scene's" in one.told
     assert tell.of_holds(one, verdict_of(first=0.6, second=0.4), 0.022) is one, "a name stays"

@@ -95,9 +95,9 @@ def test_two_sources(active: Any, bench: Any, remote: Any, send: Callable[..., N
     assert active.stop() == 0
 
 
-@pytest.mark.parametrize("rate", ["5000", pytest.param("20000", marks=pytest.mark.slow)])
-def test_a_flood(active: Any, bench: Any, remote: Any, send: Callable[..., None], rate: str) -> None:
-    send([rate, "6"])
+def test_a_flood(active: Any, bench: Any, remote: Any, send: Callable[..., None]) -> None:
+    """As fast as a source can send; a free machine keeps up with 5 kHz."""
+    send(["20000", "6"])
     predicted = len(bench.answers)
     delays = asked(active, bench, remote)
     assert sorted(delays)[len(delays) // 2] < PROMPT and sorted(delays)[-2] < 2 * PROMPT  # one may wait for a busy machine

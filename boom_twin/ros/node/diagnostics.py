@@ -155,6 +155,7 @@ def node_name(endpoint: Any) -> str:
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
 PIECE = 0.002  # s from one piece of such a look to the next: samples are taken in between
+SLOWEST = 0.02  # s from one piece to the next, at most, on the average: of a flood, timers wait behind its messages
 
 
 class Diagnostics:
@@ -179,6 +180,7 @@ class Diagnostics:
         self._pieces = node.create_timer(PIECE, self._go_on, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._pieces.cancel()
         self._work: Iterator[None] | None = None
+        self._newest_piece = 0.0
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
@@ -238,13 +240,16 @@ class Diagnostics:
         now = time.monotonic()
         if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent())):
             self._due = now + PERIOD
-            self._work = self._look()
+            self._work, self._newest_piece = self._look(), now
             self._pieces.reset()
 
     def _go_on(self) -> None:
-        """Do the next piece of the look that was begun."""
-        if self._work is None or next(self._work, self) is self:
-            self._drop_work()
+        """Do the next piece of the look that was begun, and as many more as should have been done since the last one."""
+        began, self._newest_piece = self._newest_piece, time.monotonic()
+        for _ in range(1 + int((self._newest_piece - began) / SLOWEST)):
+            if self._work is None or next(self._work, self) is self:
+                self._drop_work()
+                return
 
     def _drop_work(self) -> None:
         self._pieces.cancel()
