@@ -65,8 +65,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/health/sessions"))
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     parser.add_argument("--count", type=int, default=1000, help="sessions beside those that baselines are learnt from")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     args = parser.parse_args()
-    todo = [*learning(), *(scenario(number) for number in range(args.count))]
+    todo = [*learning(), *(scenario(number) for number in range(args.first, args.first + args.count))]
     with Pool(args.jobs, os.nice, (NICE,), AT_ONCE) as pool:
         for done, failure in enumerate(pool.imap(partial(make, folder=args.out), todo), 1):
             print(failure or f"{done} of {len(todo)}", file=sys.stderr, flush=True)
