@@ -7,6 +7,7 @@ import { escapeHtml } from "./html_table.js";
 import uPlot from "/page/uplot.js";
 import { decimate, statistics } from "./decimation.js";
 
+const POWERS = Array.from({ length: 40 }, (_, i) => 2 ** (i - 3));  // of the ticks of normalised residuals, which are shown from -4 to 4 at least
 const BAND = 2; // deviations that are shaded
 const SLOT = 2; // px from lowest to highest of which one line is drawn
 const BAR = 4; // px, of an alarm's mark
@@ -107,7 +108,7 @@ export class Traces {
     const options = kind.estimate && this.hasEstimate ? withEstimate(plainOptions) : plainOptions;
     return new Chart(document.getElementById(`chart-${kind.name}`), {
       title: kind.title,
-      axes: [kind === this.lowest ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, {}],
+      axes: [kind === this.lowest ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, kind.isResidual ? { space: 14, incrs: POWERS } : { space: 20 }],
       ...options,
       scales: kind.isResidual ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },
