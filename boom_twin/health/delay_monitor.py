@@ -59,7 +59,7 @@ class DelayMonitor:
         self._blocks: deque[tuple[Array, Array]] = deque()
         self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
 
-    def take(self, number: int, stamps: Array, left: Array, expected: Array, end: int) -> list[Alarm]:
+    def take(self, number: int, stamps: Array, left: Array, expected: Array, end: int, is_doubted: bool = False) -> list[Alarm]:
         """Take the readings of a block; gives an alarm that began, changed or ended.
 
         Parameters
@@ -72,6 +72,8 @@ class DelayMonitor:
             Residuals, NaN of channels that are not to be used, and what was expected.
         end : int
             Of the block, ns.
+        is_doubted : bool
+            Another fault puts vibration out of step: no alarm begins.
         """
         if number != self._number + 1 or len(stamps) < 2 or stamps[-1] <= stamps[0]:
             self._blocks.clear()
@@ -87,7 +89,7 @@ class DelayMonitor:
         found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
         is_known = np.isfinite(found[0])
         self._spans.append(tuple(np.where(is_known, each, 0.0) for each in found))  # type: ignore[arg-type]
-        return self._judge(end)
+        return self._judge(end, is_doubted)
 
     @staticmethod
     def _averaged(blocks: list[Array]) -> Array:
@@ -106,12 +108,12 @@ class DelayMonitor:
         lag = float(by.sum() / weight.sum())
         return lag, math.hypot(float(np.sqrt(((by - lag * weight) ** 2).sum()) / weight.sum()), FLOOR)
 
-    def _judge(self, end: int) -> list[Alarm]:
+    def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
         lag, sigma = self.estimate()
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
-        if abs(lag) < SURE * sigma:
+        if abs(lag) < SURE * sigma or (self.alarm is None and is_doubted):
             return []
         cause = delay_cause(self._stream)
         told = f"{cause} late: {lag:+.3g} +- {sigma:.1g} s" + delay_remedy(self._stream)

@@ -9,6 +9,7 @@ the holds on; those before tell what this rig is like while all is well.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,11 +63,14 @@ class HoldTest:
 
     def __init__(self, bank: HypothesisTest, errors2: Array, frequency_error: float) -> None:
         self._bank, self._errors2, self._frequency_error = bank, errors2, frequency_error
-        self.restart()
+        self.restart(())
 
-    def restart(self) -> None:
-        """Forget all holds."""
+    def restart(self, known: Sequence[tuple[int, float]]) -> None:
+        """Forget all holds; from now on these faults are known, by places of their parameters and standard deviations of what
+        their signatures leave, in the parameters' units: what they say of large faults is crude, and no further fault.
+        """
         self._holds: list[HoldProblem] = []
+        self._known = tuple(known)
 
     def take(self, hold: HoldProblem, mean: Array, covariance: Array) -> HoldVerdict:
         """A further hold; gives what all say of parameters that are healthy about a mean (parameters,)."""
@@ -111,6 +115,8 @@ class HoldTest:
         """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row."""
         parts = [rows_of(hold, self._errors2, self._frequency_error) for hold in self._holds]
         table, own, error2 = (np.concatenate(column) for column in zip(*parts, strict=True))
+        for place, left in self._known:
+            error2 += (left * table[:, 1 + place]) ** 2
         channels = len(self._errors2)
         what = np.concatenate([np.concatenate([np.arange(channels), channels + hold.modes]) for hold in self._holds])
         numbers = np.repeat(np.arange(len(self._holds)), [len(part[0]) for part in parts])

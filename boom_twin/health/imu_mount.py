@@ -50,7 +50,7 @@ class ImuMount:
 
     def begin(self) -> None:
         """The boom starts from rest; an alarm lasts until it is refuted."""
-        self._read, self._expected = np.zeros(2), np.zeros(2)
+        self._read, self._expected, self._squares = np.zeros(2), np.zeros(2), 0.0
         self._weight = 0.0
 
     def take(self, raw: Array, left: Array, span: float, start: int, end: int) -> list[Alarm]:
@@ -71,12 +71,14 @@ class ImuMount:
         read, share = raw[known].mean(axis=0), min(1.0, span / WINDOW)
         self._read += share * (read - self._read)
         self._expected += share * (read - left[known].mean(axis=0) - self._expected)
+        self._squares += share * (float((left[known] ** 2).sum(axis=1).mean()) - self._squares)
         self._weight += share * (1.0 - self._weight)
         return self._judge(start, end)
 
     def _judge(self, start: int, end: int) -> list[Alarm]:
         off = math.dist(self._read, self._expected)  # of sums that begin at 0: less than the means' at first
-        if self.alarm is None and off > FAR:
+        swing = math.sqrt(max(0.0, self._squares * self._weight - off**2))  # of vibration out of step: it stays in the means
+        if self.alarm is None and off > max(FAR, swing):
             return [self._begun(start)]
         if self.alarm is not None and off < GONE * self._weight and not self._is_reason_open():
             ended, self.alarm = replace(self.alarm, until=end), None

@@ -13,7 +13,7 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
-from .delay_monitor import DelayMonitor
+from .delay_monitor import DelayMonitor, delay_cause
 from .imu_mount import ImuMount
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .inference.hypotheses import Regression
@@ -180,7 +180,10 @@ class HealthMonitor:
         for stream, monitor in self._delays.items():
             stamps, raw, left = readings[stream]
             left = np.where(self._masked(stream), np.nan, left)
-            news += monitor.take(block.number, np.asarray((stamps - block.number * BLOCK) * NANO), left, raw - left, block.end)
+            cause = delay_cause(stream)
+            is_doubted = any(cause not in (each.cause, *(rank.cause for rank in each.ranked)) for each in self.residuals.alarms)
+            times = np.asarray((stamps - block.number * BLOCK) * NANO)
+            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted)
         return news
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:

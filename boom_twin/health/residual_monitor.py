@@ -347,7 +347,7 @@ class ResidualMonitor:
         """End the alarm that is being looked into, if there is one."""
         ended = self._tip_load.end(start) + ([] if self._alarm is None else [replace(self._alarm, until=start)])
         if self._alarm is not None:
-            self._hold_test.restart()
+            self._restart_holds()
         self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
         self._detector.reset()
         return ended
@@ -372,8 +372,12 @@ class ResidualMonitor:
     def _start_about_known(self) -> None:
         """Parameters are healthy but for the faults that are known."""
         self._regression = Regression(self._mean_about_known(), self._covariance_about_known())
-        self._hold_test.restart()
+        self._restart_holds()
         self._watch_anew()
+
+    def _restart_holds(self) -> None:
+        """Collect holds anew, with the faults that are known."""
+        self._hold_test.restart([(each.place, CRUDE * each.value) for each in self._known.values()])
 
     def _mean_about_known(self) -> Array:
         """Of the parameters, with the faults that are known."""

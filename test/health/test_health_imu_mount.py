@@ -52,12 +52,12 @@ def test_gravity_taken_out_and_a_large_bias() -> None:
 
 
 def test_a_working_imu_tells_nothing() -> None:
-    """Not by noise, by a bias, nor by vibration by 4 m/s^2 that the model does not have."""
+    """Not by noise, by a bias, nor by vibration by 10 m/s^2 that the model does not have."""
     assert told(ImuMount(), EXPECTED + 0.9 * FAR / np.sqrt(2.0), EXPECTED) == []
     mount = ImuMount()
     for k in range(200):
         times = BLOCK * (k + np.arange(20) / 20.0)
-        left = np.outer(np.sin(2.0 * np.pi * 0.5 * times), [2.4, -3.2])
+        left = np.outer(np.minimum(1.0, 0.2 * times) * np.sin(2.0 * np.pi * 0.5 * times), [6.0, -8.0])
         assert mount.take(EXPECTED + left, left, BLOCK, k, k + 1) == []
     nothing = np.full((20, 2), np.nan)
     assert mount.take(nothing, nothing, BLOCK, 0, 1) == [] == mount.take(np.zeros((0, 2)), np.zeros((0, 2)), BLOCK, 0, 1)
