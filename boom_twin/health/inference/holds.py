@@ -161,7 +161,7 @@ def _mean_at_rest(left: Array, part: int, is_shaken: bool, joints: int) -> tuple
     """Mean (channels,) of means of blocks (k, channels), and its deviation by the scatter of parts of so many blocks.
 
     Where a load shakes the boom, its mean may be as large as its level: the deviation is the scatter itself. Three parts that
-    happen to agree are no sign of rest: the other channels of the sensor, of which `joints` are angles, count as `POOLED` parts.
+    happen to agree are no sign of rest: the other channels of a sensor, `joints` are angles, count as `POOLED` parts.
     """
     weights = np.where(np.isfinite(left), np.sin(np.pi * (np.arange(len(left)) + 0.5) / len(left))[:, None] ** 2, 0.0)
     total = weights.sum(axis=0)
