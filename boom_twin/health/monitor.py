@@ -181,7 +181,10 @@ class HealthMonitor:
             stamps, raw, left = readings[stream]
             left = np.where(self._masked(stream), np.nan, left)
             cause = delay_cause(stream)
-            is_doubted = any(cause not in (each.cause, *(rank.cause for rank in each.ranked)) for each in self.residuals.alarms)
+            others = (
+                each for each in self.residuals.alarms if cause not in (each.cause, *(rank.cause for rank in each.ranked))
+            )
+            is_doubted = self.residuals.is_shaken(block.end) or any(True for _ in others)
             times = np.asarray((stamps - block.number * BLOCK) * NANO)
             news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted)
         return news

@@ -134,6 +134,10 @@ class ResidualMonitor:
         open_ones = [each for each in (self._alarm, self._tip_load.alarm, self._hold_alarm) if each is not None]
         return (*(each.alarm for each in self._known.values()), *open_ones)
 
+    def is_shaken(self, stamp: int) -> bool:
+        """Whether a load shakes the boom at `stamp` (ns), or has lately."""
+        return self._load_lately(stamp) > 0.0
+
     @property
     def limits(self) -> dict[str, float]:
         """From which loss of stiffness (share) on each cylinder could be told under the load of late; empty without one."""
@@ -361,7 +365,7 @@ class ResidualMonitor:
             return
         before = self._known.get(cause or "")
         if before is None:
-            self._known[cause or ""] = _KnownFault(self._alarm, best.place, best.value)
+            self._known[cause or ""] = _KnownFault(self._alarm, best.place, best.value, best.sigma)
         elif before.place == best.place:
             self._known[cause or ""] = replace(before, value=before.value + best.value)
         else:

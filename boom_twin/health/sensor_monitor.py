@@ -133,6 +133,7 @@ class SensorCheck:
         self._heard = np.full(count, np.nan)
         self._power, self._missing = np.full(count, np.nan), np.zeros(count)
         self._usual2 = self._lasting2 = self._sigma**2
+        self._first = math.inf
 
     @property
     def noise(self) -> float:
@@ -169,10 +170,12 @@ class SensorCheck:
             steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
             noise = np.sqrt(np.fmax(np.fmax(self._power, self._sigma**2), _usual_bend2(left)))
             spikes, jumped = self._spikes(steps, noise), self._jumps(times, all_raw, left, steps, noise)
+        self._first = min(self._first, float(stamps[0]))
+        is_known = now - self._first > NOISY_WINDOW  # how noisy the sensors are
         findings = SensorFindings(
             stuck=self._stuck(float(stamps[-1])),
-            noisy=self._power > NOISY**2 * self._usual2,
-            spikes=spikes,
+            noisy=is_known & (self._power > NOISY**2 * self._usual2),
+            spikes=spikes & is_known,
             jumped=jumped,
             silent=(now - self._heard > SILENT_FOR) | (self._missing > MISSING),
             outside=outside > 0.5 * len(raw),

@@ -15,7 +15,7 @@ from ...analysis.free_vibration import Vibration, free_vibrations, is_free
 from ...types import NANO, Array
 
 PACE = 1e-4  # m of travel from block to block, above which a boom does not stand still
-POOLED = 2.0  # degrees of freedom that the scatter of the other channels of a sensor counts for
+WHITE = 1.0  # see `_mean_at_rest`
 LEAST, LONGEST = 3.0, 10.0  # s; of a longer one every part is a hold
 RATE = 40.0  # Hz to which samples are thinned out
 LAGS = 80  # of these samples, 2 s
@@ -128,7 +128,7 @@ class HoldCollector:
         vibrations = free_vibrations(dt, thin, LAGS)
         is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
-        left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken, len(strokes))
+        left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
         sure = tuple(each for each in vibrations if is_free(each) and each.frequency_sigma < SURE * each.frequency)
         found = () if is_shaken else sure
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
@@ -157,11 +157,12 @@ def _is_explained(dt: float, values: Array, vibrations: list[Vibration]) -> bool
     return bool((rest**2).mean(axis=0).sum() < COLOURED * noise.sum())
 
 
-def _mean_at_rest(left: Array, part: int, is_shaken: bool, joints: int) -> tuple[Array, Array]:
+def _mean_at_rest(left: Array, part: int, is_shaken: bool) -> tuple[Array, Array]:
     """Mean (channels,) of means of blocks (k, channels), and its deviation by the scatter of parts of so many blocks.
 
     Where a load shakes the boom, its mean may be as large as its level: the deviation is the scatter itself. Three parts that
-    happen to agree are no sign of rest: the other channels of a sensor, `joints` are angles, count as `POOLED` parts.
+    happen to agree are no sign of rest: the scatter that blocks would leave in a part if they were independent counts as
+    `WHITE` parts more.
     """
     weights = np.where(np.isfinite(left), np.sin(np.pi * (np.arange(len(left)) + 0.5) / len(left))[:, None] ** 2, 0.0)
     total = weights.sum(axis=0)
@@ -169,14 +170,17 @@ def _mean_at_rest(left: Array, part: int, is_shaken: bool, joints: int) -> tuple
     mean[total < 0.25 * len(left)] = np.nan  # half of the weight of all of them
     count = len(left) // part
     parts = left[: count * part].reshape(count, part, -1).mean(axis=1)
-    known = np.isfinite(parts)
-    middle = np.where(known, parts, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    squares, free = (np.where(known, parts - middle, 0.0) ** 2).sum(axis=0), np.maximum(known.sum(axis=0) - 1, 0)
-    scatter = np.zeros(len(mean))
-    for own in (slice(0, joints), slice(joints, None)):
-        usual = squares[own].sum() / max(1, free[own].sum())
-        scatter[own] = (squares[own] + POOLED * usual) / (free[own] + POOLED)
-    return mean, np.sqrt(scatter if is_shaken else scatter / np.maximum(known.sum(axis=0), 1))
+    (squares, free), (white, blocks) = _squares(parts), _squares(left)
+    scatter = (squares + WHITE / part * white / np.maximum(blocks, 1)) / (free + WHITE)
+    return mean, np.sqrt(scatter if is_shaken else scatter / (free + 1))
+
+
+def _squares(values: Array) -> tuple[Array, Array]:
+    """Sum (channels,) of squares of values (k, channels) about their mean, and how many but one are known."""
+    known = np.isfinite(values)
+    count = np.maximum(known.sum(axis=0), 1)
+    middle = np.where(known, values, 0.0).sum(axis=0) / count
+    return (np.where(known, values - middle, 0.0) ** 2).sum(axis=0), count - 1
 
 
 def _thinned(stamps: NDArray[np.int64], values: Array) -> tuple[float, Array]:

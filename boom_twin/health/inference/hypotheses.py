@@ -203,8 +203,8 @@ class HypothesisTest:
         self._faulty = variances(known, "faulty")[self._places]
         self._least = np.array([known[i].least for i in self._places])
         self._priors = np.log([known[i].prior for i in self._places])
-        lags = [known[i].form is Form.DELAY for i in self._places]
-        self._growing_priors = np.where(lags, -np.inf, log(GROWING_PRIOR))  # a lag does not grow
+        lasting = [known[i].form in (Form.DELAY, Form.SCALE) for i in self._places]  # lags and scales do not grow
+        self._growing_priors = np.where(lasting, -np.inf, log(GROWING_PRIOR))
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
