@@ -345,12 +345,15 @@ class Change:
     zeros : dict of str to float
         What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2, ``cylinder_force_1``
         N); 0 if not named.
+    is_new : bool
+        Whether the twin itself began with it: nothing that was measured before is known to it.
     """
 
     stamp: int
     from_rest: bool
     settings: dict[str, float]
     zeros: dict[str, float]
+    is_new: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..config.settings import Settings, checked, load_settings
 from ..config.yaml_text import plain
 from ..errors import BagError, Fault, SceneError, UsageError
 from ..health.baseline import Baseline, baseline_from, load_baseline
@@ -13,10 +14,11 @@ from ..messages.topic_table import Topics
 from ..scene.load import DEFAULT_NAME, default_text, examine_text
 from ..scene.schema import Scene
 from ..scene.yaml_reader import read_text
-from .session_sheet import KeptText, kept, sha256
+from .session_sheet import KeptText, kept, kept_parameters, sha256
 
 DEFAULT_BASELINE = "default baseline"
 DEFAULT_MAPPING = "default mapping"
+DEFAULT_PARAMETERS = "default parameters"
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,41 @@ def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
         except (UsageError, ValueError) as error:
             raise BagError(f"{own.source}: {error} Give the baseline by --baseline.") from None
     return SessionBaseline(load_baseline(given), str(given or DEFAULT_BASELINE))
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSettings:
+    """Numbers of the twin, and where they were taken from."""
+
+    settings: Settings
+    source: str
+
+    @property
+    def others(self) -> dict[str, float]:
+        """Those that are not the package's own."""
+        usual = Settings().model_dump()
+        return {name: value for name, value in self.settings.model_dump().items() if value != usual[name]}
+
+
+def settings_of(session: Path, given: Path | None = None) -> SessionSettings:
+    """The numbers of a session's twin: of the parameter file `given`; else of the node that ran beside the recording; else the
+    package's own.
+
+    Raises
+    ------
+    UsageError
+        The file given cannot be used.
+    BagError
+        What the session keeps cannot be used.
+    """
+    if given is not None:
+        return SessionSettings(load_settings(given), str(given))
+    values, source = kept_parameters(session)
+    own = {name: value for name, value in values.items() if name in Settings.model_fields}  # others are of the node alone
+    try:
+        return SessionSettings(checked(Settings, own, source), source if own else DEFAULT_PARAMETERS)
+    except UsageError as error:
+        raise BagError(f"{error} Give the parameters by --params.") from None
 
 
 def mapping_of(session: Path, given: Path | None = None, joints: int | None = None, namespace: str = "") -> Mapped:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
@@ -120,15 +121,46 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
         ``session.yaml`` cannot be read, or holds something else there.
     """
     path, remedy = sheet_path(session), f"Move it away, or give the {key} by {option}."
+    text = _value(path, key, remedy)
+    if not isinstance(text, str | None):
+        raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
+    return KeptText(text, f"{path}, {key}") if text else None
+
+
+def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
+    """The parameters of the twin that ran beside a recording, and their place in words; none where none ran.
+
+    Raises
+    ------
+    BagError
+        ``session.yaml`` cannot be read, or holds something else there.
+    """
+    path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
+    values = _value(path, "twin", remedy)
+    if not isinstance(values, dict | None):
+        raise BagError(f"{path}, twin: not a block of names and values, as `boom_twin record` writes it. {remedy}")
+    return values or {}, f"{path}, twin"
+
+
+def missed_messages(session: Path) -> dict[str, int]:
+    """By topic, how many messages never reached the recorder of a session, as it counted at its end; those above 0."""
+    try:
+        counts = _value(sheet_path(session), "counts", "")
+    except BagError:
+        return {}  # whoever needs the sheet's scene or mapping is told
+    rows = [row for row in counts if isinstance(row, dict)] if isinstance(counts, list | tuple) else []
+    found = {str(row.get("topic")): row.get("missed") for row in rows}
+    return {topic: missed for topic, missed in found.items() if isinstance(missed, int) and missed > 0}
+
+
+def _value(path: Path, key: str, remedy: str) -> Any:
+    """What a ``session.yaml`` has under `key`; None where there is none."""
     if not holds_file(path):
         return None
     document = read_plain(path, BagError, remedy, received=True)
     if not isinstance(document, dict | None):
         raise BagError(f"{path}: a list or a value, not what `boom_twin record` writes. {remedy}")
-    text = (document or {}).get(key)
-    if not isinstance(text, str | None):
-        raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
-    return KeptText(text, f"{path}, {key}") if text else None
+    return (document or {}).get(key)
 
 
 def kept_origin(session: Path) -> dict[str, str]:

@@ -107,9 +107,8 @@ def row_of(task: SessionTask) -> Row:
         As `boom_twin.offline.replay.replay`.
     """
     from ..bag.reader import files_sha256
-    from ..bag.session_model import scene_of
+    from ..bag.session_model import scene_of, settings_of
     from ..bag.time_window import TimeWindow
-    from ..config.settings import load_settings
     from ..offline.history import draw
     from ..offline.replay import replay_into
     from ..report.evaluation import Evaluator
@@ -121,7 +120,7 @@ def row_of(task: SessionTask) -> Row:
         None if each is None else Path(each) for each in (task.session, task.params, task.mapping, task.baseline)
     )
     assert session is not None
-    scene, settings = scene_of(session, task.scene), load_settings(params)
+    scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
     window = TimeWindow(task.start, task.duration)
     evaluator = Evaluator(scene.scene, settings, baseline)
     with result_folder(Path(task.out), REPLAY, [session]) as building:

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from .arguments import add_window, window_of
-from .main import add_json, add_params, add_session_scene, open_session_scene, print_result
+from .main import add_json, add_params, add_session_scene, open_session_scene, open_session_settings, print_result
 
 if TYPE_CHECKING:
     from ..report.compare import ComparedSession, ComparisonRow
@@ -53,7 +53,6 @@ def run(args: Namespace) -> int:
 
 
 def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) -> ComparedSession:
-    from ..config.settings import load_settings
     from ..offline.replay import replay_into
     from ..report.compare import side_of
     from ..report.evaluation import Evaluator
@@ -62,7 +61,7 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
 
     def replayed(session: Path) -> Path:
         print(f"replaying {session} ..", file=sys.stderr)
-        scene, settings = open_session_scene(session, args.scene), load_settings(args.params)
+        scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
         inner = building.inner(name)
         evaluator = Evaluator(scene.scene, settings, args.baseline)
         result = replay_into(inner, session, scene, settings, baseline=args.baseline, window=window, take=evaluator.add)

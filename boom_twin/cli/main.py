@@ -32,6 +32,7 @@ use_one_blas_thread()
 if TYPE_CHECKING:
     from ..bag.reader import Session
     from ..bag.session_model import SessionScene
+    from ..config.settings import Settings
     from ..scene import Scene
 
 
@@ -221,6 +222,17 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
     return found
 
 
+def open_session_settings(session: str | Path, params: Path | None) -> Settings:
+    """The numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; those that are not usual go to stderr."""
+    from ..bag.session_model import settings_of
+
+    found = settings_of(Path(session), params)
+    if found.others:
+        told = ", ".join(f"{name} {value:g}" for name, value in found.others.items())
+        print(f"parameters: {found.source}: {told}", file=sys.stderr)
+    return found.settings
+
+
 def tell(oddities: Iterable[Fault], source: str | None) -> None:
     """Print warnings on stderr, with the file that they are about."""
     for oddity in oddities:
@@ -228,9 +240,16 @@ def tell(oddities: Iterable[Fault], source: str | None) -> None:
 
 
 def warn_incomplete(session: Session) -> None:
-    """Say on stderr if a session is not whole."""
+    """Say on stderr if a session is not whole, or what its recorder did not get."""
+    from ..bag.session_sheet import missed_messages
+
     if session.incomplete:
         print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
+    if missed := missed_messages(session.path):
+        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items())
+        print(
+            f"warning: {session.path}: never reached the recorder: {told}; a node that got them told otherwise", file=sys.stderr
+        )
 
 
 def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:

@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
 from .arguments import add_window, window_of
-from .main import add_ros_args, add_session_scene, open_scene, open_session_scene, ros_arguments, warn_incomplete
+from .main import (
+    add_ros_args,
+    add_session_scene,
+    open_scene,
+    open_session_scene,
+    open_session_settings,
+    ros_arguments,
+    warn_incomplete,
+)
 
 if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
@@ -101,17 +109,15 @@ def _lower_priority() -> None:
 def _sessions(args: Namespace) -> SessionList:
     """The sessions of ``--bag``, the first one open."""
     from ..bag.reader import scan
-    from ..config.settings import load_settings
     from ..monitor.data.bag_feed import bag_feed
     from ..monitor.data.session_list import SessionList, sessions_in
 
-    settings, window = load_settings(args.params), window_of(args)
+    window = window_of(args)
 
     def open_feed(path: Path) -> Feed:
         warn_incomplete(scan(path))
-        return bag_feed(
-            path, open_session_scene(path, args.scene), settings, args.mapping, args.baseline, window, args.namespace
-        )
+        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params)
+        return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
 
     print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
     return SessionList(sessions_in(args.bag), open_feed)

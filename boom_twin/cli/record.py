@@ -86,7 +86,7 @@ def run(args: Namespace) -> int:
 
         def on_twin(told: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _with_twin_values(sheet, told, known.frame)
+            more = _with_twin_values(sheet, told, known.frame, str(args.mapping or ""))
             try:
                 more.write(args.out)
                 sheet = more
@@ -129,7 +129,7 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str) -> SessionSheet:
+def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
     """With what the running twin tells of itself; what was given instead stays, and the difference is told.
 
     The prefix that it puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
@@ -140,6 +140,12 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str) 
     changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
     if prefix := told.get("parameters", {}).get("frame_prefix"):
         changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
+    own_mapping = told.get("parameters", {}).get("mapping")
+    if own_mapping and own_mapping != given_mapping:
+        _say(
+            f"warning: the running twin has the mapping {own_mapping}, and session.yaml holds "
+            f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
+        )
     for name in TEXTS:
         if name in told:
             given, own = getattr(sheet, name), told[name]

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..offline.progress import progress_of
 from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import add_json, add_namespace, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import (
+    add_json,
+    add_namespace,
+    add_params,
+    add_session_scene,
+    open_session_scene,
+    open_session_settings,
+    print_json,
+    warn_incomplete,
+)
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -53,7 +62,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and say what came out."""
-    from ..config.settings import load_settings
     from ..offline.replay import replay_into
     from ..offline.sample_table import SampleTable, check_kind, table_file
     from ..report.evaluation import Evaluator
@@ -64,7 +72,7 @@ def run(args: Namespace) -> int:
         raise UsageError(f"--fatigue {args.fatigue:g}: goes into the report. Give --report too.")
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
-    settings = load_settings(args.params)
+    settings = open_session_settings(args.bag, args.params)
     check_kind(args.table)
     window = window_of(args)
     if window.start:

@@ -105,6 +105,7 @@ Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
 Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
+Step = Annotated[float, Field(ge=1e-5, allow_inf_nan=False)]
 Agility = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
 
 
@@ -124,8 +125,8 @@ class Settings(BaseModel):
         default=0.0, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
     )
     stroke_agility: Agility = Field(default=1.0, description="more follows strokes sooner, lets more noise through")
-    step: Positive = Field(default=0.005, description="longest step of the remembered boom, s; halved by its error")
-    look_step: Positive = Field(default=0.026, description="longest step of the look ahead to now, s; halved by its error")
+    step: Step = Field(default=0.005, description="longest step of the remembered boom, s; halved by its error")
+    look_step: Step = Field(default=0.026, description="longest step of the look ahead to now, s; halved by its error")
     step_tip_error: Positive = Field(default=2.0e-4, description="error of the tip that steps may make, rms, m")
     step_acceleration_error: Positive = Field(default=0.15, description="likewise of the tip's acceleration, m/s^2")
     rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")

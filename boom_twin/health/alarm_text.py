@@ -18,6 +18,7 @@ from .inference.sensitivities import Signature, Signatures
 
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
 REFUTED = 1e-3  # probability of the cause that was named, below which another may be
+GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
 FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
 NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
 LISTED, MOST = 0.02, 5  # least probability of a cause that is told, and how many are
@@ -55,6 +56,7 @@ class AlarmText:
         self._advised: tuple[str, str] | None = None
         self._advice = ""
         self._leading: tuple[str, int] = "", 0
+        self._steepest: dict[int, float] = {}
 
     def alarm(
         self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool, signature: Signature | None
@@ -101,7 +103,9 @@ class AlarmText:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
         best = verdict.causes[0]
         is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
-        leads = best.probability >= (GROWING if is_growing else NAMED) and verdict.excess <= FITS
+        is_drift = is_growing and self._known[verdict.best.place].form in DRIFTING  # a neighbour's offset may look like that
+        is_steady = self._grows_still(alarm, verdict, span) or not is_drift
+        leads = best.probability >= (GROWING if is_growing else NAMED) and verdict.excess <= FITS and is_steady
         shares = {cause.name: cause.probability for cause in verdict.causes}
         is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
         if not leads or is_held or (is_growing and (span < GROWING_AFTER or not is_calm)):
@@ -110,6 +114,16 @@ class AlarmText:
         if not alarm.told or self._leading[0] != best.name:
             self._leading = best.name, stamp
         return (stamp - self._leading[1]) * NANO >= NAMED_AFTER
+
+    def _grows_still(self, alarm: Alarm, verdict: Verdict, span: float) -> bool:
+        """Whether growth is as fast as it was: of what grew and then stayed, the slope over all its evidence becomes less."""
+        if not alarm.told:
+            self._steepest = {}
+        if span > GROWTH_AFTER:
+            for part in (part for cause in verdict.causes for part in cause.parts if part.is_growing):
+                surely = abs(part.rate) - 2.0 * part.sigma / span
+                self._steepest[part.place] = max(surely, self._steepest.get(part.place, 0.0))
+        return abs(verdict.best.rate) >= STEADY * self._steepest.get(verdict.best.place, 0.0)
 
     def _ranked(self, cause: Cause, excess: float) -> Ranked:
         """With each of its faults in the shape that is more probable."""

@@ -60,12 +60,12 @@ def _status(alarm: Alarm) -> Any:
     return status
 
 
-FROM_REST = "from_rest"
+FROM_REST, NEW = "from_rest", 2.0
 
 
 def encode_changes(change: Change, frame: str = FRAME) -> bytes:
     """The message of a change, in CDR."""
-    values = {FROM_REST: float(change.from_rest), **change.settings, **change.zeros}
+    values = {FROM_REST: NEW if change.is_new else float(change.from_rest), **change.settings, **change.zeros}
     msg = new_message(TYPES[Output.CHANGES])
     fill_header(msg.header, change.stamp, frame)
     msg.name, msg.position = list(values), np.array(list(values.values()), dtype=float)
@@ -81,13 +81,14 @@ def decode_changes(msg: Any) -> Change:
         It has names or values that a change cannot have.
     """
     values = dict(zip(msg.name, map(float, msg.position), strict=False))
-    from_rest = bool(values.pop(FROM_REST, 0.0))
+    from_rest = values.pop(FROM_REST, 0.0)
     settings = {name: values.pop(name) for name in Settings.live_names() if name in values}
     try:
         Settings().tuned(settings)
     except UsageError as error:
         raise BagError(f"a message of changes cannot be used: {error}") from None
-    return Change(stamp_of(msg), from_rest, settings, {name: value for name, value in values.items() if value != 0.0})
+    zeros = {name: value for name, value in values.items() if value != 0.0}
+    return Change(stamp_of(msg), bool(from_rest), settings, zeros, from_rest == NEW)
 
 
 class PredictedOutput(NamedTuple):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..bag.joint_names import refuse_other_names
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of
+from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of, settings_of
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
@@ -150,7 +150,7 @@ def replay(
     out : path
         New, empty, or an earlier result of a replay, which is replaced once the new one is whole.
     settings : Settings, optional
-        Sensors' noise and tuning; the package's own by default.
+        Sensors' noise and tuning; by default those of the node that ran beside the recording, else the package's own.
     progress : callable, optional
         Is given the number of messages, and gives the `ProgressBar` that is told how many were taken.
     mapping : path, optional
@@ -206,7 +206,7 @@ def replay_into(
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
     with _processes(building) as (reader, writer):
-        session, out, settings = scan(Path(bag)), building.folder, settings or Settings()
+        session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
         taken = scene_for(session.path, scene)
         scene, joints = taken.scene, len(taken.scene.joints)
         mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)

@@ -66,7 +66,7 @@ def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array
     total = np.concatenate([[0.0], np.cumsum(values)])
     first = np.searchsorted(stamps, stamps - 0.5 * over)
     last = np.searchsorted(stamps, stamps + 0.5 * over, side="right")
-    return np.asarray((total[last] - total[first]) / (last - first))
+    return np.asarray((total[last] - total[first]) / np.maximum(last - first, 1))
 
 
 def _distribution(axes: Axes, found: ResidualDistribution) -> None:

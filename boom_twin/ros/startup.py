@@ -14,17 +14,21 @@ from types import FrameType
 from ..errors import UsageError
 
 
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""What asks a process to end; SIGHUP comes when its terminal is closed, and is ignored where ``nohup`` has it so."""
+
+
 def on_stop_signal(act: Callable[[], None]) -> None:
-    """From now on the first SIGINT or SIGTERM calls `act`, and further ones do nothing."""
-    known = (signal.SIGINT, signal.SIGTERM)
+    """From now on the first of `STOPS` calls `act`, and further ones do nothing."""
 
     def stop(number: int, frame: FrameType | None) -> None:
-        for each in known:
+        for each in STOPS:
             signal.signal(each, signal.SIG_IGN)
         act()
 
-    for each in known:
-        signal.signal(each, stop)
+    for each in STOPS:
+        if each is not signal.SIGHUP or signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, stop)
 
 
 class InterruptedWorkError(KeyboardInterrupt):
@@ -45,7 +49,7 @@ def _nothing(unraisable: object) -> None:
 
 
 class StopSignal:
-    """A stop by SIGINT or SIGTERM: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
+    """A stop by one of `STOPS`: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
 
     An exception in the midst of a callback is reported by rclpy as a fault of the callback. Python handles a signal between two
     of its instructions, and compiling has some that take seconds: a thread, which runs meanwhile, ends a process that goes on.
@@ -76,7 +80,7 @@ class StopSignal:
         signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
 
     def _end(self, reading: int) -> None:
-        while os.read(reading, 1)[0] not in (signal.SIGINT, signal.SIGTERM):
+        while os.read(reading, 1)[0] not in STOPS:
             pass
         time.sleep(self.LAST)
         os.write(sys.stderr.fileno(), b"stopped in the midst of its work\n")

@@ -135,6 +135,8 @@ class Requests:
         As they will be.
     from_rest : bool
         Whether a start from rest is asked for.
+    is_new : bool
+        Whether a twin is asked for that knows nothing of the samples before.
     due : bool
         Whether anything waits.
     model : LoadedModel or None
@@ -144,7 +146,7 @@ class Requests:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.zeros: dict[str, float] = {}
-        self.from_rest = self.due = False
+        self.from_rest = self.is_new = self.due = False
         self.model: LoadedModel | None = None
 
     def tune(self, live: Mapping[str, float], model: LoadedModel | None = None) -> None:
@@ -168,9 +170,9 @@ class Requests:
     def repeat(self, change: Change) -> None:
         """All that was done to another twin with the sample of that stamp; UsageError as for `tune`."""
         self.tune(change.settings)
-        self.zeros, self.from_rest, self.due = change.zeros, change.from_rest, True
+        self.zeros, self.from_rest, self.is_new, self.due = change.zeros, change.from_rest, change.is_new, True
 
     def take(self) -> bool:
         """Nothing waits any more; tells whether a start from rest was asked for."""
-        from_rest, self.from_rest, self.due, self.model = self.from_rest, False, False, None
+        from_rest, self.from_rest, self.is_new, self.due, self.model = self.from_rest, False, False, False, None
         return from_rest

@@ -94,16 +94,21 @@ class Twin:
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
         self._widths = [len(names) for names in self._channels.values()]
-        self._state = new_state(len(scene.joints), np.array(self._widths))
+        self._edge = SampleCheck(self._channels)
+        self.requests = Requests(self.settings)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nothing of any sample: state, model, estimate, health, zeros."""
+        self._state = new_state(len(self.scene.joints), np.array(self._widths))
         self._state.clock[NEWEST] = NONE
         self._adopt(self.model(self.settings))
-        self._edge = SampleCheck(self._channels)
         self._run: Run | None = None
+        self._is_new = True
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._lines = self._new_lines()
-        self.requests, self._zeros, self._recent = (
-            Requests(self.settings),
+        self._zeros, self._recent = (
             SensorZeros(self._state, self._channels),
             ResidualBuffer(self._state.recent, self._channels),
         )
@@ -120,6 +125,14 @@ class Twin:
         self._speeds = None
         self._lines = self._new_lines()
         self._state.waiting.bounds[:] = 0
+
+    def renew(self) -> None:
+        """Know nothing of any sample, as a new twin does; load, limits and zeros stay."""
+        if self._is_new:
+            self.reset()
+            return
+        self._begin()
+        self.requests.zero({})  # what they are holds with the first strokes
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
@@ -187,8 +200,11 @@ class Twin:
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
-        model = asked.model
+        model, is_new = asked.model, asked.is_new and self._run is not None
         from_rest, self.settings = asked.take(), asked.settings
+        if is_new:
+            self._begin()
+            before = self.settings
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
@@ -200,7 +216,9 @@ class Twin:
             from_rest |= self._zeros.put(stamp, asked.zeros)
         if (from_rest or "load" in events) and self._run is not None:
             events += [] if events else ["reset"]
+            speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
             self._begin_anew()
+            self._speeds = speeds
             keep_waiting(self._state, stamp, -NONE)
         if "load" in events:
             self._adopt(model or self.model(self.settings), self._compiled)
@@ -456,7 +474,9 @@ class Twin:
         else:
             return self._refuse(sample, "waiting", *events)
         if told or (from_rest and report.accepted):
-            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values))
+            is_new = from_rest and self._is_new
+            self._is_new &= not (is_new and report.accepted)
+            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
         return report
 
     def _start(self, sample: Sample, events: list[str]) -> Report:

@@ -111,7 +111,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         """Start from the next full stroke sample, and listen."""
         assert self._twin is not None
         self._preparation.finish()
-        self._twin.reset()
+        self._twin.renew()
         self._diagnostics.start()
         gc.collect()
         gc.freeze()  # what lives from here on as long as the node is not searched again
