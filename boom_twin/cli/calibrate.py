@@ -14,7 +14,15 @@ from .. import __version__
 from ..errors import UsageError
 from ..offline.progress import TenthLines
 from .arguments import add_window, window_of
-from .main import add_json, add_params, add_session_scene, open_session_scene, print_json, warn_incomplete
+from .main import (
+    add_json,
+    add_params,
+    add_session_scene,
+    open_session_scene,
+    open_session_settings,
+    print_json,
+    warn_incomplete,
+)
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -56,13 +64,12 @@ def run(args: Namespace) -> int:
 
 def _learn(args: Namespace) -> int:
     from ..calibration.baseline import baseline_of, write_baseline
-    from ..config.settings import load_settings
     from ..system.atomic_files import check_target
 
     check_target(args.baseline, _sources(args))
     if args.baseline.exists() and not args.force:
         raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
-    scene, settings = _scene(args), load_settings(args.params)
+    scene, settings = _scene(args), open_session_settings(args.bags[0], args.params)
     with _bar() as progress:
         learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress, window_of(args))
     write_baseline(learnt, args.baseline, _credit(args), args.force)
@@ -100,11 +107,10 @@ def _credit(args: Namespace) -> str:
 def _calibrate(args: Namespace) -> int:
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
     from ..calibration.run import Choice, calibrate
-    from ..config.settings import load_settings
 
     refuse_overwriting(args.out, _sources(args), args.force)
     scene = _scene(args)
-    settings = load_settings(args.params)
+    settings = open_session_settings(args.bags[0], args.params)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()

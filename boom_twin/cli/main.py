@@ -174,8 +174,10 @@ def add_session_scene(parser: ArgumentParser) -> None:
 
 
 def add_params(parser: ArgumentParser) -> None:
-    """``--params``, for `boom_twin.config.settings.load_settings`."""
-    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file; by default the package's twin.yaml")
+    """``--params``, see `open_session_settings`."""
+    parser.add_argument(
+        "--params", metavar="FILE", type=Path, help="ROS parameter file (as recorded, else the package's twin.yaml)"
+    )
 
 
 def add_json(parser: ArgumentParser) -> None:
@@ -246,10 +248,8 @@ def warn_incomplete(session: Session) -> None:
     if session.incomplete:
         print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
     if missed := missed_messages(session.path):
-        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items())
-        print(
-            f"warning: {session.path}: never reached the recorder: {told}; a node that got them told otherwise", file=sys.stderr
-        )
+        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + "; a node that got them told otherwise"
+        print(f"warning: {session.path}: never reached the recorder: {told}", file=sys.stderr)
 
 
 def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:

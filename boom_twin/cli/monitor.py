@@ -48,7 +48,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
     )
     add_session_scene(parser)
-    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (twin.yaml)")
+    parser.add_argument(
+        "--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (as recorded, else the package's)"
+    )
     usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")

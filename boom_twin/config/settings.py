@@ -105,7 +105,7 @@ Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
 Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
-Step = Annotated[float, Field(ge=1e-5, allow_inf_nan=False)]
+Step = Annotated[float, Field(ge=1e-5, le=1.0, allow_inf_nan=False)]
 Agility = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
 
 

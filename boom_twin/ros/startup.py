@@ -13,7 +13,6 @@ from types import FrameType
 
 from ..errors import UsageError
 
-
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What asks a process to end; SIGHUP comes when its terminal is closed, and is ignored where ``nohup`` has it so."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,8 @@ def change(stamp: int, **live: float) -> Change:
 
 def test_there_and_back() -> None:
     there = Change(12 * SECOND + 5, True, Settings(payload=40.0, gap=0.3).live, {"joint_2": 0.01, "tip_imu_x": -0.2})
-    assert decode_changes(jazzy().deserialize_cdr(encode_changes(there), TYPE)) == there
+    for each in (there, replace(there, is_new=True), replace(there, from_rest=False)):
+        assert decode_changes(jazzy().deserialize_cdr(encode_changes(each), TYPE)) == each
 
 
 @pytest.mark.parametrize(("name", "value"), [("gap", -1.0), ("payload", np.nan), ("gap", np.inf)])

@@ -93,6 +93,18 @@ def test_noisy(times):
     assert found["noise", 1] <= 1.0 and {channel for _, channel in found} == {1}
 
 
+def test_motion_at_a_slow_rate_is_no_noise():
+    """Twenty times a second a cylinder that sets off bends its readings by more than their noise."""
+    rng, sigma = np.random.default_rng(7), 2e-5
+    check = SensorCheck(sigma, 5e-6, LOW, HIGH, 0.5)
+    for block in range(200):
+        stamps = 0.1 * block + np.array([0.0, 0.05])
+        moving = np.cumsum(np.where((stamps > 4.0) & (stamps < 6.0), 0.05, 0.0)) * 0.05
+        readings = np.column_stack([0.3 + 0.02 * np.sin(2.0 * stamps) + moving, *([np.full(2, 0.3)] * 3)])
+        found = check.look(stamps, readings + rng.normal(0.0, sigma, (2, 4)), np.zeros((2, 4)), stamps[-1] + 0.05)
+        assert not found.noisy.any() and not found.spikes.any()
+
+
 def test_a_little_more_noise_is_not_noisy():
     quiet = started(4)
     assert quiet.found(200, change=lambda times, raw: raw + quiet.rng.normal(0.0, SIGMA, raw.shape)) == {}

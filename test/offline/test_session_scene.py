@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,10 +12,11 @@ import pytest
 from offline.booms_apart import as_document, scene_text, session
 
 from boom_twin import load_scene, replay
-from boom_twin.bag.session_model import baseline_of, scene_of
+from boom_twin.bag.reader import scan
+from boom_twin.bag.session_model import baseline_of, scene_of, settings_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, kept, sha256
 from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
+from boom_twin.cli.main import main, open_session_settings, warn_incomplete
 from boom_twin.config.settings import Settings
 from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
 from boom_twin.errors import BagError
@@ -253,6 +255,32 @@ def test_the_baseline_is_that_of_the_recording(four, tmp_path):
     SessionSheet("0", baseline="angle_error: -1\n").write(tmp_path)
     with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
         baseline_of(tmp_path)
+
+
+def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys):
+    """A replay with others was another one, without a word."""
+    assert settings_of(BUNDLED).settings == Settings()
+    SessionSheet("0", twin={"imu_sigma": 0.2, "payload": 30.0, "scene": "", "autostart": True}).write(tmp_path)
+    found = settings_of(tmp_path)
+    assert (found.settings, found.source) == (Settings(imu_sigma=0.2, payload=30.0), f"{tmp_path / FILE_NAME}, twin")
+    assert open_session_settings(tmp_path, None) == found.settings
+    assert f"parameters: {tmp_path / FILE_NAME}, twin: imu_sigma 0.2, payload 30" in capsys.readouterr().err
+    given = tmp_path / "given.yaml"
+    given.write_text("/**:\n  ros__parameters:\n    imu_sigma: 0.1\n", encoding="utf-8")
+    assert settings_of(tmp_path, given).settings == Settings(imu_sigma=0.1)
+    for wrong in ({"imu_sigma": -1.0}, {"step": 1e-12}, {"gap": "a while"}):
+        SessionSheet("0", twin=wrong).write(tmp_path)
+        with pytest.raises(BagError, match=rf"session\.yaml, twin: {next(iter(wrong))} .*--params"):
+            settings_of(tmp_path)
+
+
+def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):
+    session = tmp_path / "session"
+    shutil.copytree(four, session)
+    counts = [{"topic": "/cylinder_strokes", "received": 8, "written": 8, "missed": 3}, {"topic": "/tip_imu", "missed": None}]
+    SessionSheet("0").write(session, counts)
+    warn_incomplete(scan(session))
+    assert "never reached the recorder: 3 of /cylinder_strokes;" in capsys.readouterr().err
 
 
 def test_the_bundled_session_keeps_the_default_scene():

@@ -68,7 +68,7 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     assert (rho.floating_point_range[0].from_value, rho.floating_point_range[0].to_value) == (0.0, 1.0)
     words = "fixed while the node is configured"
     assert rho.description == Settings.model_fields["rho"].description
-    assert look_step.additional_constraints == f"look_step > 0.0; {words}"
+    assert (look_step.floating_point_range[0].from_value, look_step.additional_constraints) == (1e-5, words)
     for name, value in [
         ("rho", 1.5),
         ("rho", 1.0),
@@ -128,7 +128,13 @@ def test_a_bad_argument_ends_the_node_with_its_name(spawn_node: Callable[..., An
 
 
 ACTIVE, PREPARING = "active;", "preparing the model"
-MOMENTS = [("", signal.SIGINT), (PREPARING, signal.SIGTERM), (ACTIVE, signal.SIGINT), (ACTIVE, signal.SIGTERM)]
+MOMENTS = [
+    ("", signal.SIGINT),
+    (PREPARING, signal.SIGTERM),
+    (ACTIVE, signal.SIGINT),
+    (ACTIVE, signal.SIGTERM),
+    (ACTIVE, signal.SIGHUP),
+]
 RARER = [("", signal.SIGTERM), (PREPARING, signal.SIGINT)]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,31 @@ def test_drive_is_update_by_update() -> None:
             assert report.prediction.tip_acceleration.tobytes() == step.report.prediction.tip_acceleration.tobytes()
         assert (report.prediction is None) == (step.report.prediction is None)
     assert residuals == 30
+
+
+def bits(reports: list[Report]) -> list[bytes]:
+    """What is predicted and estimated."""
+    found = [each for report in reports for each in (report.prediction, report.estimate) if each is not None]
+    return [each.tip_acceleration.tobytes() if hasattr(each, "tip_acceleration") else each.tip.tobytes() for each in found]
+
+
+def test_a_twin_that_began_anew_is_repeated_by_one_that_does() -> None:
+    """A node that was started again, or activated again, knew nothing of before; its zeros it has from the change alone."""
+    again, anew = (replace(CHANGE, settings=Settings().live, is_new=is_new) for is_new in (False, True))
+    samples, known = [item for item in items() if isinstance(item, Sample)], load_baseline()
+    kept, reports = (
+        [step.report for step in drive(Twin(load_scene(), baseline=known), [*samples[:40], change, *samples[40:]]) if step]
+        for change in (again, anew)
+    )
+    other = Twin(load_scene(), baseline=known)
+    other.requests.zero(CHANGE.zeros)
+    fresh = [other.update(sample) for sample in samples[40:]]
+    assert len(bits(fresh)) > 15 and bits(reports[40:]) == bits(fresh)
+    assert [report.change.is_new for report in reports if report.change] == [True, True]
+    assert [report.change.is_new for report in kept if report.change] == [True, False]
+    other.renew()
+    later = [other.update(sample) for sample in samples[40:]]
+    assert bits(later) == bits(fresh) and later[0].change is not None and later[0].change.is_new
 
 
 def test_no_item_is_asked_for_before_the_last_report_was_taken() -> None:
