@@ -141,7 +141,7 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
     if prefix := told.get("parameters", {}).get("frame_prefix"):
         changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
     own_mapping = told.get("parameters", {}).get("mapping")
-    if own_mapping and own_mapping != given_mapping:
+    if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
         _say(
             f"warning: the running twin has the mapping {own_mapping}, and session.yaml holds "
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"

@@ -113,6 +113,7 @@ def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
     assert "baseline" not in sheet  # the package's own
     assert sheet["twin"] == {
         "scene": str(recorded.parent / "scene.yaml"),
+        "mapping": "",
         "frame_prefix": "",
         **Settings().model_dump(),
     }

@@ -28,7 +28,7 @@ from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
 from .subscriptions import RequestedTopic, subscription_of
 
-NAMES = ("scene", "frame_prefix", *Settings.model_fields)
+NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
 
 
 class RemoteValue:
