@@ -138,7 +138,14 @@ MOMENTS = [
 RARER = [("", signal.SIGTERM), (PREPARING, signal.SIGINT)]
 
 
-@pytest.mark.parametrize(("moment", "number"), [*MOMENTS, *(pytest.param(*rare, marks=pytest.mark.slow) for rare in RARER)])
+@pytest.mark.parametrize(
+    ("moment", "number"),
+    [
+        *MOMENTS,
+        pytest.param(ACTIVE, signal.SIGHUP, marks=CLOSED),
+        *(pytest.param(*rare, marks=pytest.mark.slow) for rare in RARER),
+    ],
+)
 def test_signals_end_the_node_in_order_at_any_time(
     spawn_node: Callable[..., Any], number: signal.Signals, moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
