@@ -146,8 +146,9 @@ class SessionSettings:
 
 
 def settings_of(session: Path, given: Path | None = None) -> SessionSettings:
-    """The numbers of a session's twin: of the parameter file `given`; else of the node that ran beside the recording; else the
-    package's own.
+    """The numbers of a session's twin.
+
+    Those of the parameter file `given`; else of the node that ran beside the recording; else the package's own.
 
     Raises
     ------

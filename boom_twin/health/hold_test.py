@@ -66,8 +66,13 @@ class HoldTest:
         self.restart(())
 
     def restart(self, known: Sequence[tuple[int, float]]) -> None:
-        """Forget all holds; from now on these faults are known, by places of their parameters and standard deviations of what
-        their signatures leave, in the parameters' units: what they say of large faults is crude, and no further fault.
+        """Forget all holds.
+
+        Parameters
+        ----------
+        known : sequence of (int, float)
+            The faults that are known from now on: places of their parameters, and standard deviations of what their signatures
+            leave, in the parameters' units: what these say of large faults is crude, and no further fault.
         """
         self._holds: list[HoldProblem] = []
         self._known = tuple(known)
