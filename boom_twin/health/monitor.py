@@ -181,10 +181,8 @@ class HealthMonitor:
             stamps, raw, left = readings[stream]
             left = np.where(self._masked(stream), np.nan, left)
             cause = delay_cause(stream)
-            others = (
-                each for each in self.residuals.alarms if cause not in (each.cause, *(rank.cause for rank in each.ranked))
-            )
-            is_doubted = self.residuals.is_shaken(block.end) or any(True for _ in others)
+            suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
+            is_doubted = self.residuals.is_shaken(block.end) or any(cause not in each for each in suspects)
             times = np.asarray((stamps - block.number * BLOCK) * NANO)
             news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted)
         return news

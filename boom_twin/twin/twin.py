@@ -475,7 +475,8 @@ class Twin:
             return self._refuse(sample, "waiting", *events)
         if told or (from_rest and report.accepted):
             is_new = from_rest and self._is_new
-            self._is_new &= not (is_new and report.accepted)
+            if from_rest and report.accepted:
+                self._is_new = False
             return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
         return report
 
