@@ -123,14 +123,22 @@ class Remote:
     def call(self, kind: Any, name: str, request: Any) -> Any:
         import rclpy
 
-        client = self.node.create_client(kind, f"{self.name}/{name}")
-        assert client.wait_for_service(30.0)
+        service = f"{self.name}/{name}"
+        client = self.node.create_client(kind, service)
+        end = time.monotonic() + 60.0
+        while not (
+            client.service_is_ready() and self.node.count_services(service) == 1
+        ):  # a node that has ended is seen longer
+            assert time.monotonic() < end, f"{self.node.count_services(service)} of {service}"
+            rclpy.spin_once(self.node, timeout_sec=0.05)
         # A node that has just started may be seen from here before it sees who asks; an answer that it sends until then is
-        # lost, and what changes nothing is asked again.
-        is_read = name.startswith(("get_", "describe_", "list_"))
-        for _ in range(8 if is_read else 1):
+        # lost. What can be said twice is said again; a transition waits for a moment.
+        is_repeatable = name.startswith(("get_", "describe_", "list_", "set_"))
+        if not is_repeatable:
+            time.sleep(0.3)
+        for _ in range(8 if is_repeatable else 1):
             future = client.call_async(request)
-            rclpy.spin_until_future_complete(self.node, future, timeout_sec=30.0 if is_read else 240.0)
+            rclpy.spin_until_future_complete(self.node, future, timeout_sec=30.0 if is_repeatable else 240.0)
             if future.done():
                 break
         self.node.destroy_client(client)
