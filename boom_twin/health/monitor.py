@@ -197,7 +197,9 @@ class HealthMonitor:
         monitor = self._sensors[stream]
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO, float), raw, expected, block.end * NANO)
-        news = monitor.take(findings, block.number * BLOCK, block.end)
+        is_predicted = stream is not Stream.STROKES
+        blamed = self.residuals.blamed if is_predicted else frozenset()
+        news = monitor.take(findings, block.number * BLOCK, block.end, blamed)
         if stream in JUDGED and (monitor.masked & ~before).any():
             self.residuals.forget()
         return news

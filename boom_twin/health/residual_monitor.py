@@ -16,7 +16,7 @@ from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
-from .alarm_text import LIMIT_OF, AlarmText
+from .alarm_text import LIMIT_OF, LISTED, AlarmText
 from .baseline import JUDGED, Baseline
 from .detection import Detector
 from .hold_test import HoldTest
@@ -42,6 +42,7 @@ GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
 HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
+AFRESH = 30  # blocks of evidence that begins anew all the time beside an alarm: whether its fault is there still
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,8 @@ class ResidualMonitor:
         detuning = DETUNING if self._known else self._detuning
         self._healthy = InnovationFilter(len(self._names), 1 + self._count, BLOCK * NANO, detuning)
         self._detector.reset()
+        self._afresh: Suspicion | None = None
+        self._explained: tuple[Explanation, ...] = ()  # what may explain the alarm, when the evidence above began
         self.surprise = np.full(len(self._names), np.nan)
 
     @property
@@ -134,9 +137,17 @@ class ResidualMonitor:
         open_ones = [each for each in (self._alarm, self._tip_load.alarm, self._hold_alarm) if each is not None]
         return (*(each.alarm for each in self._known.values()), *open_ones)
 
+    @property
+    def blamed(self) -> frozenset[str]:
+        """Causes that may explain the alarms that last."""
+        return frozenset(rank.cause for each in self.alarms for rank in each.ranked)
+
     def is_shaken(self, stamp: int) -> bool:
-        """Whether a load shakes the boom at `stamp` (ns), or has lately."""
-        return self._load_lately(stamp) > 0.0
+        """Whether a load shakes the boom at `stamp` (ns), or has lately.
+
+        The lowest level above none does not count: what a model that is two percent wrong leaves may look like that.
+        """
+        return self._load_lately(stamp) > float(self._levels[1])
 
     @property
     def limits(self) -> dict[str, float]:
@@ -168,8 +179,9 @@ class ResidualMonitor:
             self._on_block(problem)
         news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
-        if self._limits and self._load_lately(block.start) == 0.0:
+        if self._limits and not self.is_shaken(block.start):
             self._limits = {}
+        news += self._look_for_end(problem)
         if self._suspicion is None or problem.start < self._suspicion.start:
             return news
         self._suspicion.take(problem)
@@ -192,7 +204,8 @@ class ResidualMonitor:
         for each in self._known.values():
             if self._hold_test.change(each.place, -each.value, *about) > max(HELD, found.verdict.strength - ENDED):
                 return self._end_known(each, hold.end)
-        if self._hold_alarm is None and found.verdict.strength < HELD:
+        is_load = self._weight(found.verdict.best) < LOAD_MEANS * self._load_lately(hold.end)
+        if self._hold_alarm is None and (found.verdict.strength < HELD or is_load):
             return []
         if found.verdict.strength < LET_GO:
             return self._end_hold_alarm(hold.end)
@@ -249,9 +262,39 @@ class ResidualMonitor:
         A vibration whose frequency is a little wrong runs ahead or behind, always the same way: nearly all that an IMU says of
         its lag is said by vibration, so a lag may be as large without a fault.
         """
+        self._suspicion, self._blocks = self._suspicion_from(start, self._carried), 0
+
+    def _suspicion_from(self, start: int, carried: dict[str, float]) -> Suspicion:
+        """Evidence to be collected from `start` (ns) on, see `_suspect`."""
         known = self._regression.mean, self._regression.covariance + self._out_of_step
-        self._suspicion = Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, self._carried)
-        self._blocks = 0
+        return Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, carried)
+
+    def _look_for_end(self, problem: BlockProblem) -> list[Alarm]:
+        """Take one block as evidence that begins anew all the time, and end the alarm or the known fault that it refutes.
+
+        What a suspicion has collected before the end of a fault outweighs what comes after it for long: to its filter, the
+        end is one more error of the model or a load. Evidence from after the end knows neither the fault nor its end: no fault
+        explains it well, and one of the size that the alarm has would be much less probable.
+        """
+        if self._suspicion is None or (self._alarm is None and not self._known):
+            self._afresh, self._explained = None, ()
+            return []
+        if self._afresh is None:
+            verdict = self._suspicion.explain()
+            if verdict.strength >= SURE:
+                likely = [cause for cause in verdict.causes if cause.probability >= LISTED]
+                self._explained = tuple(cause.parts[0] for cause in likely)
+            self._afresh = self._suspicion_from(problem.start, {})
+        self._afresh.take(problem)
+        if self._afresh.blocks < AFRESH:
+            return []
+        afresh, self._afresh = self._afresh, None
+        verdict = afresh.explain()
+        if verdict.strength >= SURE and (known := self._change_of_known(afresh, verdict)) is not None:
+            return self._end_known(known, problem.start)
+        is_free = self._alarm is not None and verdict.strength < GONE and bool(self._explained)
+        is_over = is_free and all(afresh.log_factor(each) < -HELD for each in self._explained)
+        return self._end_open(problem.start) if is_over else []
 
     # -- suspicion, alarm, end ------------------------------------------------------------------------------------------
 
@@ -265,7 +308,7 @@ class ResidualMonitor:
         verdict = suspicion.explain()
         self._shaken[verdict.level] = start
         if self._blocks % LIMITS_PERIOD == 0 and self._alarm is None:
-            self._limits = self._limits_of(suspicion, verdict.level) if verdict.level else {}
+            self._limits = self._limits_of(suspicion, verdict.level) if verdict.level > 1 else {}
         news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
         if self._suspicion is not suspicion:
             return news
@@ -353,6 +396,7 @@ class ResidualMonitor:
         if self._alarm is not None:
             self._restart_holds()
         self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
+        self._afresh, self._explained = None, ()
         self._detector.reset()
         return ended
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -262,6 +262,7 @@ def repeats(sigma: float, resolution: float) -> int:
 
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
+CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
 TOLD = {
     "stuck": "repeats one reading again and again",
     "noise": "is noisier than its like and than stated",
@@ -319,14 +320,18 @@ class SensorMonitor:
             flags[channel] |= kind != "spikes"
         return flags
 
-    def take(self, findings: SensorFindings, start: int, end: int) -> list[Alarm]:
-        """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended."""
+    def take(self, findings: SensorFindings, start: int, end: int, blamed: Set[str] = frozenset()) -> list[Alarm]:
+        """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended.
+
+        `blamed`: causes that residuals' alarms are explained by. A sensor among them that jumps to what the model expects has
+        come back, and residuals tell so.
+        """
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
             for channel in np.flatnonzero(flags).tolist():
-                if kind == "jump" and self._is_wild(channel):
+                if kind == "jump" and (self._is_wild(channel) or self._comes_back(channel, findings, blamed)):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
                 news += self._seen(channel, kind, start, end, jump)
@@ -340,6 +345,11 @@ class SensorMonitor:
         """Whether jumps mean nothing more: the sensor has another fault, out of which it jumps when it recovers."""
         return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
 
+    def _comes_back(self, channel: int, findings: SensorFindings, blamed: Set[str]) -> bool:
+        """Whether a jump of a sensor that is blamed, and has not jumped before, leaves it at what is expected."""
+        is_first = (channel, "jump") not in self._faults and f"{self._names[channel]}.sensor" in blamed
+        return is_first and abs(float(findings.level[channel])) < CAME_BACK * abs(float(findings.jumped[channel]))
+
     def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None) -> list[Alarm]:
         """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""
         key = (channel, kind)
@@ -347,7 +357,7 @@ class SensorMonitor:
         size, level = jump or (0.0, math.nan)
         if fault is not None:
             off = min(abs(fault.offset + size), abs(level - fault.before)) if math.isfinite(level) else abs(fault.offset + size)
-            if jump and end - fault.seen > SETTLED // 10 and off < 0.3 * abs(fault.offset):
+            if jump and end - fault.seen > SETTLED // 10 and off < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
                 return [replace(fault.alarm, until=end)]
             fault.seen = end

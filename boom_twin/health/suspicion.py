@@ -17,8 +17,8 @@ from .inference.holds import HoldProblem
 from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
 from .inference.innovation_filter import InnovationFilter
 
-LEVELS = np.array([0.0, 0.0023, 0.0077, 0.026])
-"""Of the unknown load at the tip, as shares of the boom's weight: 0, 15, 50 and 170 N of the 6.5 kN of the default one."""
+LEVELS = np.array([0.0, 0.0007, 0.0023, 0.0077, 0.026])
+"""Of the unknown load at the tip, as shares of the boom's weight: 0, 4.5, 15, 50 and 170 N of the 6.5 kN of the default one."""
 DETUNING = 0.15  # share by which a fault may change natural frequencies
 SHAKEN = 0.6  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
 CRUDE = 0.01  # share of a deviation by which its signature, a derivative, may be wrong

@@ -237,3 +237,16 @@ def test_a_fault_below_its_least_value_explains_nothing():
     verdict = HypothesisTest(known).explain(Evidence.of(white[None], np.zeros(1)), np.zeros(2), np.zeros((2, 2)), 1.0, {})
     assert verdict.causes[0].name == "tip_imu.sensor"
     assert max(part.log_factor for cause in verdict.causes if cause.name == "line_fill" for part in cause.parts) < 1.0
+
+
+def test_a_growing_fault_below_its_least_value_early_on_explains_nothing():
+    """A section twice as stiff that grows as soft as the scene has it is none, though its size at the end may be."""
+    rows, times = 30, np.linspace(0.0, 10.0, 30)
+    white = np.zeros((rows, 1 + 2 * SIZE))
+    white[:, 0] = 3.0 * (times / 10.0 - 1.0)
+    white[:, 1], white[:, 1 + SIZE] = 3.0, 3.0 * times
+    verdict = BANK.explain(Evidence.of(white[None], np.zeros(1)), np.zeros(SIZE), np.zeros((SIZE, SIZE)), 10.0, {})
+    assert explained(verdict, growing=True)[0].log_factor < 0.0
+    white[:, 0] = 3.0 * times / 10.0
+    verdict = BANK.explain(Evidence.of(white[None], np.zeros(1)), np.zeros(SIZE), np.zeros((SIZE, SIZE)), 10.0, {})
+    assert explained(verdict, growing=True)[0].log_factor > 10.0

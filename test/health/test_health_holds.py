@@ -10,7 +10,7 @@ from boom_twin import Twin, load_scene
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.health.alarm_text import AlarmText
 from boom_twin.health.baseline import Baseline
-from boom_twin.health.hold_test import HoldTest
+from boom_twin.health.hold_test import HoldTest, HoldVerdict
 from boom_twin.health.inference.fault_catalogue import Form, Parameter, parameters, step_of
 from boom_twin.health.inference.holds import HoldCollector, HoldProblem, StillReadings
 from boom_twin.health.inference.hypotheses import Cause, Explanation, HypothesisTest, Verdict
@@ -211,6 +211,20 @@ def test_a_section_that_holds_have_named_is_known_and_one_alarm() -> None:
 def test_the_same_session_of_the_right_boom_gives_no_alarm() -> None:
     scene = load_scene()
     assert run(session(27.0), twin=Twin(scene, baseline=learnt(scene))).told() == []
+
+
+def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
+    """Pulses of 15 N may have a mean of three times as much: 4.3 kg less are 42 N, 20 kg more are a fault."""
+    hold = drawn(np.random.default_rng(1), 0.0)[0]
+    known = parameters(load_scene())
+    place = next(i for i, each in enumerate(known) if each.cause == "tip.payload")
+    for weight, level, alarms in ((-4.3, 0, 1), (-4.3, 2, 0), (20.0, 2, 1)):
+        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        best = Cause("tip.payload", 1.0, (Explanation(place, 0, 30.0, weight, 0.5),))
+        found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0), 0.007)
+        monitor._hold_test.take = lambda *_, found=found: found
+        monitor._shaken[level] = hold.end
+        assert len(monitor._judge_hold(hold)) == alarms, (weight, level)
 
 
 def verdict_of(**shares: float) -> Verdict:

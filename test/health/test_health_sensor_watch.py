@@ -108,6 +108,14 @@ def test_a_jump_ends_where_the_reading_is_right_again():
     assert watched.take(findings(0, "jump", 0.8, level=0.299)) == [], "elsewhere, but not right"
 
 
+def test_a_sensor_that_is_blamed_and_jumps_to_what_is_expected_has_come_back():
+    """Its drift is over: no jump is told and it is not left out. Of another sensor, or beside what is expected, one is."""
+    for blamed, level, told in (({"joint_1.sensor"}, 1e-4, 0), ({"joint_2.sensor"}, 1e-4, 1), ({"joint_1.sensor"}, 0.005, 1)):
+        watch = SensorMonitor(NAMES, SENSORS[Stream.ANGLES])
+        assert len(watch.take(findings(0, "jump", -0.01, level), 0, BLOCK, blamed)) == told
+        assert watch.masked.tolist() == [bool(told), False]
+
+
 def test_two_faults_of_one_sensor():
     watched = Watched()
     watched.take(findings(0, "range"))

@@ -217,3 +217,20 @@ def test_an_alarm_ends_with_its_fault():
     assert outcome.causes() == {"joint_2.sensor"}
     assert any(alarm.until is not None for _, alarm in outcome.states())
     assert outcome.health[-1].alarms == ()
+
+
+def test_the_end_of_a_fault_without_a_name_is_told():
+    """Of a stroke's offset of 0.5 mm that may be the encoder's as well; without an IMU its alarm lasted on, as a load."""
+    samples = [sample for sample in session(36.0) if sample.stream is not Stream.IMU]
+    outcome = run(spoilt(samples, Stream.STROKES, 3, lambda v, t: v + 5e-4 * (t < 20.0), 5.0))
+    assert first_after(outcome, 5.0) <= 5.0 and outcome.causes() == set()
+    assert max(time for time, alarm in outcome.states() if alarm.until is None) < 30.0
+    assert outcome.states()[-1][1].until is not None
+
+
+def test_a_drift_that_is_over_is_no_jump():
+    """The encoder wanders by 0.1 degrees a second for 10 s and is right again at once: no alarm lasts, nor begins."""
+    outcome = run(spoilt(session(30.0), Stream.ANGLES, 1, lambda v, t: v + 0.1 * DEGREE * t * (t < 10.0), 5.0))
+    assert "jump" not in {alarm.kind for _, alarm in outcome.states()}
+    assert first_after(outcome, 5.0) < 10.0
+    assert max(time for time, alarm in outcome.states() if alarm.until is None) < 23.0

@@ -21,6 +21,7 @@ from boom_twin.health.inference.fault_catalogue import parameters
 from boom_twin.health.inference.innovation_filter import (
     HIGHEST,
     KEEPS_STEP,
+    LOAD_TIME,
     REACH,
     REST,
     SHAPE,
@@ -30,6 +31,7 @@ from boom_twin.health.inference.innovation_filter import (
     oscillation,
 )
 from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.health.suspicion import load_levels
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.types import G
 
@@ -139,6 +141,26 @@ def test_levels_in_one_filter_are_those_of_each_alone(boom):
         assert found.white.tobytes() == np.array([one.white for one in ones]).tobytes()
         assert found.log.tolist() == [float(one.log) for one in ones]
     assert len(set(found.log.tolist())) == len(levels)
+
+
+@pytest.mark.parametrize("size", [4.0, 8.0, 15.0, 27.0, 50.0, 92.0, 170.0])
+def test_a_load_of_any_size_suits_a_level(boom, size):
+    """A Gauss-Markov force at the tip, N: one of the levels is about as probable as its own, within e^0.6 for each block.
+
+    Between 0 and 15 N there was none: wind of 4 N was less probable by e^2.4 for each block, and passed for a fault.
+    """
+    modes, kept, count = modes_of(*boom, None), math.exp(-BLOCK / LOAD_TIME), 300
+    whitening = InnovationFilter(len(modes.shown), 1, BLOCK, DETUNING, np.append(load_levels(load_scene()), size))
+    whitening.tune(modes)
+    rng, sigma = np.random.default_rng(3), np.array([*(4e-5,) * (len(modes.shown) - 2), 5e-3, 5e-3])
+    eta, force, logs = np.zeros(len(modes.turn)), np.zeros(2), np.zeros(6)
+    for _ in range(count):
+        force = kept * force + size * math.sqrt(1.0 - kept**2) * rng.normal(size=2)
+        eta = modes.turn @ eta + modes.pushed @ force
+        row = modes.shown @ eta + modes.lifted @ force + sigma * rng.normal(size=len(sigma))
+        found = whitening.step(row[:, None], np.diag(sigma**2), np.full(len(row), 1e-12), whitening.vibration(0.0), 0.0)
+        logs += found.log
+    assert logs[:-1].max() > logs[-1] - 0.6 * count
 
 
 def filtered(whitening: InnovationFilter, modes, tables):

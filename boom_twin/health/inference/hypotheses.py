@@ -37,6 +37,7 @@ from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
+EARLY = 0.25  # share of the span at which growth has its least value, too; a line through growth from halfway on has 0 there
 CRUDE = 0.001  # see above
 AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
 
@@ -269,7 +270,7 @@ class HypothesisTest:
         return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
 
     def _growing(self, healthy: Evidence, span: float) -> Array:
-        """Likewise of faults that grow; values are those at the end of `span` (s)."""
+        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on."""
         count = len(self.known)
         pairs = np.stack([self._places, self._places + count], axis=1)
         vector = healthy.vector[..., pairs]
@@ -279,9 +280,10 @@ class HypothesisTest:
         spread = prior[:, :, None] * np.linalg.inv(scaled) * prior[:, None, :]
         found = (spread @ vector[..., None])[..., 0]
         explained = (vector * found).sum(axis=-1)
-        now = np.array([1.0, span])
+        now, early = np.array([1.0, span]), np.array([1.0, EARLY * span])
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + self._sided(values, sigmas) + self._growing_priors
+        sided = np.minimum(self._sided(values, sigmas), self._sided(found @ early, np.sqrt(spread @ early @ early)))
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + self._growing_priors
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
     def _sided(self, values: Array, sigmas: Array) -> Array:
