@@ -72,7 +72,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Serve until Ctrl-C or SIGTERM."""
+    """Serve until Ctrl-C, SIGTERM or the end of the terminal."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     from ..monitor.actions import RecorderProcess, ViewerActions
@@ -156,15 +156,15 @@ def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | No
 
 async def _run(args: Namespace, server: Any, token: str) -> None:
     import asyncio
-    import signal
 
     from aiohttp import web
 
     from ..monitor.access_control import in_address
     from ..monitor.connections import Connections
+    from ..ros.startup import stop_signals
 
     stopped = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in stop_signals():
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     if args.until_stdin_ends:
         asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)

@@ -17,6 +17,11 @@ STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What asks a process to end; SIGHUP comes when its terminal is closed, and is ignored where ``nohup`` has it so."""
 
 
+def stop_signals() -> tuple[signal.Signals, ...]:
+    """Those of `STOPS` that this process is to hear."""
+    return tuple(each for each in STOPS if each is not signal.SIGHUP or signal.getsignal(each) is not signal.SIG_IGN)
+
+
 def on_stop_signal(act: Callable[[], None]) -> None:
     """From now on the first of `STOPS` calls `act`, and further ones do nothing."""
 
@@ -25,9 +30,8 @@ def on_stop_signal(act: Callable[[], None]) -> None:
             signal.signal(each, signal.SIG_IGN)
         act()
 
-    for each in STOPS:
-        if each is not signal.SIGHUP or signal.getsignal(each) is not signal.SIG_IGN:
-            signal.signal(each, stop)
+    for each in stop_signals():
+        signal.signal(each, stop)
 
 
 class InterruptedWorkError(KeyboardInterrupt):

@@ -14,7 +14,7 @@ from .block_reader import validated
 from .format import Format
 from .glossary import MEANING
 from .schema import Base, Bore, BulkModulus, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
-from .yaml_reader import NUMBER, Document, Place, parse, read_text
+from .yaml_reader import NUMBER, Document, Kind, Place, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
 
@@ -113,6 +113,7 @@ PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, 
 """What a column of one of two numbers ends with, as in C_x, beam_end, range_deg_low."""
 TABLES = (".csv", ".tsv", ".txt")
 """Names of files with a row for every section end so; the cells lie apart by commas, semicolons or tabs."""
+TABLE_FILE = Kind("table", "boom_twin init --example-table")
 _HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(]\s*(.+?)\s*[\])])?")
 
 
@@ -124,8 +125,8 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
     SceneError
         With every fault that was found: place, value, bound, remedy.
     """
-    text = read_text(path)
-    document = csv_document(text, str(path)) if path.suffix.lower() in TABLES else parse(text, str(path))
+    text = read_text(path, TABLE_FILE)
+    document = csv_document(text, str(path)) if path.suffix.lower() in TABLES else parse(text, str(path), TABLE_FILE)
     return checked_table(document, str(path)), document
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
@@ -74,8 +74,18 @@ class Document:
         return f" (cell{'s' * (len(cells) > 1)} {', '.join(cells)})" if 0 < len(cells) <= 2 else ""
 
 
-def read_text(path: Path) -> str:
-    """Text of a scene file.
+class Kind(NamedTuple):
+    """What a file is to be, and the command that prints one to start from."""
+
+    name: str
+    example: str
+
+
+SCENE = Kind("scene", "boom_twin scene")
+
+
+def read_text(path: Path, kind: Kind = SCENE) -> str:
+    """Text of a scene file, or of another of its kind.
 
     Raises
     ------
@@ -87,17 +97,17 @@ def read_text(path: Path) -> str:
             data = stream.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             bound = f"more than {MAX_BYTES // 1_000_000} MB"
-            raise _refusal(str(path), bound, "A scene has a few kB: is this the right file?")
+            raise _refusal(kind, str(path), bound, f"A {kind.name} has a few kB: is this the right file?")
         return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
-            raise _refusal(str(path), *_not_utf8(data, error)) from None
+            raise _refusal(kind, str(path), *_not_utf8(data, error)) from None
         reason = getattr(error, "strerror", None) or str(error)
-        remedy = "Give the path of a scene file; `boom_twin scene` prints one to start from."
-        raise _refusal(str(path), reason, remedy) from None
+        remedy = f"Give the path of a {kind.name} file; `{kind.example}` prints one to start from."
+        raise _refusal(kind, str(path), reason, remedy) from None
 
 
-def parse(text: str, source: str) -> Document:
+def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
     """Plain values of a YAML text.
 
     Raises
@@ -111,7 +121,7 @@ def parse(text: str, source: str) -> Document:
         raise SceneError(source, (_syntax_fault(text, error),)) from None
     document = Document()
     if root is None:
-        raise _refusal(source, "the file is empty", "Start from the one that `boom_twin scene` prints.")
+        raise _refusal(kind, source, "the file is empty", f"Start from the one that `{kind.example}` prints.")
     document.values = _Reader(document, constructor).value(root, ())
     return document
 
@@ -129,8 +139,8 @@ def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
     )
 
 
-def _refusal(source: str, bound: str, remedy: str) -> SceneError:
-    return SceneError(source, (Fault("scene file", source, bound, remedy),))
+def _refusal(kind: Kind, source: str, bound: str, remedy: str) -> SceneError:
+    return SceneError(source, (Fault(f"{kind.name} file", source, bound, remedy),))
 
 
 def _syntax_fault(text: str, error: Exception) -> Fault:

@@ -165,3 +165,14 @@ def test_a_list_with_faulty_entries_is_not_called_empty(capsys: pytest.CaptureFi
     assert main(["init", "--table", "table.csv", "--out", "boom.yaml"]) == 1
     err = capsys.readouterr().err
     assert "sections[0].wall is absent" in err and "at least one entry" not in err
+
+
+@pytest.mark.parametrize("text", [None, "", "\xff"])
+def test_an_unusable_table_is_refused_as_a_table(text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Not as a scene, whose remedies are others."""
+    path = tmp_path / "table.yaml"
+    if text is not None:
+        path.write_bytes(text.encode("latin-1"))
+    assert main(["init", "--table", str(path), "--out", str(tmp_path / "boom.yaml")]) == 1
+    told = capsys.readouterr().err
+    assert "table file = " in told and "scene" not in told.lower()

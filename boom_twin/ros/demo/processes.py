@@ -16,7 +16,7 @@ from ...bag.async_writer import PATIENCE as DISK_PATIENCE
 from ...errors import BoomTwinError
 from ...system.child_process import end_process, python_command
 from ..isolation import isolated
-from ..startup import on_stop_signal
+from ..startup import STOPS, on_stop_signal
 
 if TYPE_CHECKING:
     from ..bag.player import Player
@@ -195,7 +195,7 @@ def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None
 
 def _run(running: DemoProcesses, origin: str) -> Iterator[DemoProcesses]:
     """Start, and end whatever happens."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in STOPS}
     on_stop_signal(running.ask_to_end)
     try:
         running.begin(origin)
