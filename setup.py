@@ -41,7 +41,7 @@ setup(
     install_requires=[  # the lowest versions have no flaw that is known and met here: docs/security.md says why each
         "numpy>=2.0,<3",
         "scipy>=1.13,<2",
-        "numba>=0.61.2,<0.69",
+        "numba>=0.62.1,<0.69",
         "pydantic>=2.7,<3",
         "ruamel.yaml>=0.18,<1",
         "mcap>=1.5,<2",

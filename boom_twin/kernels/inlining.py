@@ -13,6 +13,8 @@ from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+LEVEL = 1  # of optimisation; above it compiling takes longer, and steps as long (loops are vectorised at each)
+
 
 class Callee(NamedTuple):
     """A compiled kernel that others call: where it is in Python, types of its arguments, and the name of its machine code."""
@@ -30,6 +32,19 @@ class KernelCode(JITCodeLibrary):
         super().__init__(codegen, name)
         self.calls: set[Callee] = set()
         self.enable_object_caching()
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Leave each function as it is: what the whole module's passes do comes to the same, and once."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        """Run one pipeline over the module.
+
+        numba has three: each function at level 3, all of them for pruning reference counts, of which kernels have none, and
+        level 3 again. They took a fifth of compiling and made no kernel quicker.
+        """
+        passes, builder = self._codegen._module_pass_manager(opt=LEVEL, loop_vectorize=True, slp_vectorize=False)
+        passes.run(self._final_module, builder)
 
     def add_linking_library(self, library: Any) -> None:
         """Copy a function's code into this one, unless it is a kernel's."""
