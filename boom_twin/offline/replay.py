@@ -254,8 +254,8 @@ def replay_into(
         if recording.is_empty:
             raise BagError(
                 f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
-                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
-                f"and stamps.{refused.told}"
+                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, all in one message, values within the "
+                f"cylinders' travel, and stamps.{refused.told}"
             )
         recording.close()
         SessionSheet(__version__, taken.text).write(out / "bag")

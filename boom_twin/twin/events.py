@@ -5,7 +5,7 @@ EVENTS = {
     "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
     "partial": "some values missing, not finite or absurd; the others were used",
     "empty": "no usable value; sample left out",
-    "waiting": "not all strokes known yet, or started less than a second ago; the model has not started",
+    "waiting": "no message with all strokes yet, or started less than a second ago; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
     "leap": "stamp far from where its stream was; left out unless the next sample follows it",
