@@ -27,6 +27,8 @@ UNCERTAIN = 2.0
 SHAKEN = 3.0
 """Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
 looks like noise in strokes may be motion."""
+WHITE = 0.75
+"""Share of that variance that third differences must have for noise."""
 LOUDEST, NOISE_SHARE = 100.0, 0.05
 """Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
 CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
@@ -188,9 +190,14 @@ class HealthMonitor:
         return news
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
-        """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate."""
-        power = bends2(raw[:, ~self._masked(stream)])
-        return bool(power.sum(axis=0).max(initial=0.0) > SHAKEN * self._settings.variance(SENSORS[stream]) * len(power))
+        """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate.
+
+        Noise gives the same variance by second and by third differences, motion much less by third ones.
+        """
+        trusted = raw[:, ~self._masked(stream)]
+        power, rougher = bends2(trusted).sum(axis=0), (np.diff(trusted, n=3, axis=0) ** 2).sum(axis=0) / 20.0
+        is_bent = power > SHAKEN * self._settings.variance(SENSORS[stream]) * (len(trusted) - 2)
+        return bool((is_bent & (rougher < WHITE * power)).any())
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""

@@ -163,6 +163,17 @@ def test_twice_the_stated_noise_gives_no_spikes():
     assert run(noisy).states() == []
 
 
+def test_noise_of_all_sensors_at_once_is_told_as_noise():
+    """Three times what is stated: angles that are as noisy as strokes are no sign that the boom is shaken."""
+    rng, settings = np.random.default_rng(6), Settings()
+    more = {Stream.STROKES: settings.stroke_sigma, Stream.ANGLES: settings.angle_sigma, Stream.IMU: settings.imu_sigma}
+    noisy = [
+        replace(s, values=s.values + rng.normal(0.0, math.sqrt(8.0) * more[s.stream], s.values.shape)) for s in session(12.0)
+    ]
+    assert run(noisy).health[-1].noise["noise_over_stroke_sigma"] > 1.8
+    assert healthy().health[-1].noise["noise_over_stroke_sigma"] < 1.1
+
+
 def test_a_twin_without_a_baseline_tells_nothing():
     twin = Twin(load_scene())
     outcome = run(session(3.0), twin=twin)
