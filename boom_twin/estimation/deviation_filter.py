@@ -19,13 +19,15 @@ MODES = 6  # at most
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
 STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
 SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
+FORCE_OFF, FORCE_DRIFT = 1.0, 0.03  # standard deviation of o once forces are measured, and what is added to it in a second
+LEAST_FORCE = 0.1  # both of a cylinder's force and this share of the largest one
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
 
 LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
 """First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load
-that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode."""
+that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and o (n,) if forces are measured."""
 
-COUNT, STARTED, FED, STAMP, ANGLES_STAMP = range(5)  # of `status`
+COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED = range(6)  # of `status`
 ANGLE, FELT_X, FELT_Y, STEP = range(4)
 """Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s."""
 
@@ -34,14 +36,15 @@ ANGLE, FELT_X, FELT_Y, STEP = range(4)
 class DeviationFilter(NamedTuple):
     """The filter as kernels take it; n joints, m modes at most, s states, c measured channels, f frames, k stations.
 
-    status : (5,) number of modes; whether it has begun; whether anything was measured; stamps of the newest strokes and of the
-    newest angles, ns.
+    status : (6,) number of modes; whether it has begun; whether anything was measured; stamps of the newest strokes and of the
+    newest angles, ns; whether cylinder forces were measured.
     omega, decay, density : (m,) rad/s; 2 zeta omega, 1/s; of w, m^2 kg/s^3.
     relative : (f, m, 3) motion of every frame relative to the one before, in its axes: m, m, rad per unit of q.
     forces : (m, n) N per unit. bending : (m, k) M_j w / EI. sections : (k,) of the stations, 0-based.
     sections_off : (n,) standard deviation of b. softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
     roots : (n,) frames of the pivots. sensed, absolute : (n,) frames of the inclinometers, and which angle sensors are such.
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
+    pulls : (n,) predicted forces of the cylinders, slow, N.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
     coupling : (m, 4 + 2 n) of f, a, b and the load that stays. drawn, ahead : (n,) F_i / k_i, m, slow; by which
@@ -75,6 +78,7 @@ class DeviationFilter(NamedTuple):
     absolute: NDArray[np.bool_]
     noise: Array
     masked: NDArray[np.bool_]
+    pulls: Array
     tip: Array
     turns: Array
     lever: Array
@@ -104,8 +108,14 @@ class DeviationFilter(NamedTuple):
 
 @inner
 def states_of(f):
-    """Number of states: the first places, and those of the modes that there are."""
-    return mode_place(f, f.status[COUNT])
+    """Number of states: the first places, those of the modes that there are, and of the forces' offsets."""
+    return offset_place(f, f.softness.shape[0] if f.status[FORCED] else 0)
+
+
+@inner
+def offset_place(f, i):
+    """Place in the state of the offset of cylinder i's force."""
+    return mode_place(f, f.status[COUNT]) + i
 
 
 @inner

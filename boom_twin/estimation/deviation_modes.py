@@ -18,7 +18,7 @@ from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
-from .deviation_filter import ANGLES_STAMP, COUNT, FED, MODES, SHARES, STAMP, STARTED, USUAL_LOAD, DeviationFilter
+from .deviation_filter import ANGLES_STAMP, COUNT, FED, FORCED, MODES, SHARES, STAMP, STARTED, USUAL_LOAD, DeviationFilter
 from .posture_modes import PostureMode, PostureModes
 from .sensor_model import Mounting
 
@@ -61,7 +61,7 @@ class DeviationModes:
     def begin(self) -> None:
         """A new run: nothing is known of the deviation."""
         f = self.filter
-        f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = 0
+        f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = f.status[FORCED] = 0
         f.level[0], self._at[:] = f.loads[USUAL_LOAD], math.inf
         f.last[:], f.spread[:] = 0.0, 0.0
 
@@ -108,10 +108,18 @@ class DeviationModes:
             kept.append(self._put(j, found, -1.0 if is_turned else 1.0))
         f.softness[:], _ = plan.compliances_and_lags(plan.closed_lengths + strokes)
         levers(plan.tables.linkages, angles, f.slopes)
-        first = SHARES + 2 * (plan.joints + min(int(f.status[COUNT]), len(modes)))  # of modes that come or go
+        self._keep_states(int(f.status[COUNT]), len(modes))
         self._motions, f.status[COUNT] = kept, len(modes)
         self._set_loads()
-        f.x[first:], f.p[first:], f.p[:, first:] = 0.0, 0.0, 0.0
+
+    def _keep_states(self, before: int, now: int) -> None:
+        """Nothing is known of modes that come, as many as there are `now`; of forces' offsets as much as before."""
+        f, first, n = self.filter, SHARES + 2 * self._plan.joints, self._plan.joints
+        kept = first + 2 * min(before, now)
+        old, new = (np.r_[:kept, first + 2 * count : first + 2 * count + n] for count in (before, now))
+        x, p = f.x[old], f.p[np.ix_(old, old)]
+        f.x[:], f.p[:] = 0.0, 0.0
+        f.x[new], f.p[np.ix_(new, new)] = x, p
 
     def _set_loads(self) -> None:
         """What loads are usual: by how far they turn the joints, in standard deviations of the angle sensors."""
@@ -138,17 +146,17 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
     noise = [
         settings.variance(kind) for stream, kind in SENSORS.items() if stream is not Stream.STROKES for _ in kind.channels(n)
     ]
-    size = SHARES + 2 * n + 2 * MODES
+    size = SHARES + 3 * n + 2 * MODES
     return DeviationFilter(
-        status=np.zeros(5, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
+        status=np.zeros(6, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
         relative=np.zeros((frames, MODES, 3)), forces=np.zeros((MODES, n)), bending=np.zeros((MODES, len(places))),
         sections=np.array([each.section for each in places], np.int64),
         sections_off=np.array([settings.section_deviation * scene.is_flexible(i) for i in range(n)]),
         softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
-        noise=np.array(noise), masked=np.zeros(len(noise), bool), tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)),
-        lever=np.zeros((n, 3)), coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n),
-        variances=np.zeros(n), pushes=np.zeros(2),
+        noise=np.array(noise), masked=np.zeros(len(noise), bool), pulls=np.zeros(n),
+        tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)), lever=np.zeros((n, 3)),
+        coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n), variances=np.zeros(n), pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
         shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),

@@ -18,6 +18,7 @@ from .deviation_filter import (
     FED,
     FELT_X,
     FELT_Y,
+    FORCED,
     LEAST_LOAD,
     MOST_LOAD,
     SHARES,
@@ -28,10 +29,11 @@ from .deviation_filter import (
     covary,
     input_place,
     mode_place,
+    offset_place,
     oscillate,
     states_of,
 )
-from .deviation_step import LONGEST_STEP, add_unknown
+from .deviation_step import LONGEST_STEP, add_offsets, add_unknown
 
 AGILITY, RETREAT = 2.0, 0.03  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
@@ -75,7 +77,7 @@ def read_angle(f, i, row):
 
 @inner
 def read_force(f, i, row):
-    """Row of a cylinder's force, which no share changes at rest."""
+    """Row of a cylinder's force, which no share a or b changes at rest."""
     n, size = f.softness.shape[0], states_of(f)
     clear(row, size)
     for j in range(f.status[COUNT]):
@@ -83,6 +85,7 @@ def read_force(f, i, row):
         row[at] = f.forces[j, i]
         for k in range(2 * n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
+    row[offset_place(f, i)] = 1.0
 
 
 @inner
@@ -157,6 +160,9 @@ def take_forces(f, residuals, first, stamp):
     age = age_of(f, stamp)
     if age > OLDEST:
         return
+    if f.status[FORCED] == 0:
+        f.status[FORCED] = 1
+        add_offsets(f)
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
             read_force(f, i, f.row)

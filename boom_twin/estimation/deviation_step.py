@@ -18,6 +18,10 @@ from .deviation_filter import (
     FED,
     FELT_X,
     FELT_Y,
+    FORCE_DRIFT,
+    FORCE_OFF,
+    FORCED,
+    LEAST_FORCE,
     LOAD,
     LOAD_CHANGE,
     SCENE_ERROR,
@@ -36,6 +40,7 @@ from .deviation_filter import (
     input_place,
     mix_rows,
     mode_place,
+    offset_place,
     oscillate,
     states_of,
 )
@@ -113,7 +118,26 @@ def start_state(f):
         swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
         f.p[at, at] += swing * swing
         f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
+    if f.status[FORCED]:
+        add_offsets(f)
     f.status[STARTED] = 1
+
+
+@inner
+def add_offsets(f):
+    """What is not known of the forces' offsets at the start."""
+    widen_offsets(f, FORCE_OFF * FORCE_OFF)
+
+
+@inner
+def widen_offsets(f, share2):
+    """Add to the variances of the forces' offsets this share of the squares of the forces, and of a part of the largest."""
+    largest = 0.0
+    for i in range(f.pulls.shape[0]):
+        largest = max(largest, abs(f.pulls[i]))
+    for i in range(f.pulls.shape[0]):
+        at = offset_place(f, i)
+        f.p[at, at] += share2 * (abs(f.pulls[i]) + LEAST_FORCE * largest) ** 2
 
 
 @inner
@@ -164,6 +188,7 @@ def follow_prediction(f, results, estimates, moments, gravity):
         newest = results.cylinder_forces[i] * f.softness[i]
         f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * newest
         f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
+        f.pulls[i] = kept * f.pulls[i] + (1.0 - kept) * results.cylinder_forces[i]
         f.variances[i] = estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
@@ -229,6 +254,8 @@ def step_state(f, h):
     for b in range(2):
         fade(f, ERROR + b, kept, f.pushes[b], size)
         f.p[BIAS + b, BIAS + b] += BIAS_DRIFT * BIAS_DRIFT * h
+    if f.status[FORCED]:
+        widen_offsets(f, FORCE_DRIFT * FORCE_DRIFT * h)
 
 
 @inner

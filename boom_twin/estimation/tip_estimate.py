@@ -26,8 +26,14 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
 Measured less predicted:
 
     angle_i   Theta_i q + what is quasi-static in a and b and in no mode
-    force_i   N_i q, likewise
+    force_i   N_i q, likewise, and an offset o_i
     IMU       Phi q'' + e, turned into the tip's axes, the specific force turned by the tip's own turn, and a bias of each axis
+
+- o_i, N, a random walk once forces are measured: by what a model whose masses are not exact, friction and the sensor's own zero
+  and scale put a force off, and by what this changes as the boom moves: `FORCE_DRIFT` of the force in a second. So forces
+  tell what is quick, a load's pulses, and not where the boom hangs: as exact readings, one that was 10 % too large was
+  explained by a load and softer cylinders and put the tip off by 114 mm. It is no share of the predicted force, whose
+  quick part holds the strokes' noise as the residual does: a share would be drawn to what explains noise by noise.
 
 What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
 cylinder's force. The part of that which the few modes lack is added (static correction).

@@ -14,6 +14,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor, delay_cause
+from .force_reading import ForceReading
 from .imu_mount import ImuMount
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
 from .inference.hypotheses import Regression
@@ -69,7 +70,7 @@ class HealthMonitor:
         self._ranges = sensor_ranges(scene, mounts)
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
-        self._mount = ImuMount()
+        self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -89,6 +90,7 @@ class HealthMonitor:
         for monitor in self._delays.values():
             monitor.begin()
         self._mount.begin()
+        self._forces.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
@@ -105,6 +107,8 @@ class HealthMonitor:
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """The same of one stream."""
+        if stream is Stream.FORCES:
+            return self._sensors[stream].masked | self._forces.masked
         if stream in self._sensors:
             return self._sensors[stream].masked
         return np.full(len(self._channels[stream]), stream is Stream.IMU and self._mount.alarm is not None)
@@ -136,6 +140,7 @@ class HealthMonitor:
         for monitor in self._sensors.values():
             alarms += monitor.alarms
         alarms += [self._mount.alarm] if self._mount.alarm is not None else []
+        alarms += self._forces.alarms
         lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
         for alarm in self.residuals.alarms:  # which take vibration for a load: the size is the other's
             lag = lags.get(alarm.cause)
@@ -157,6 +162,8 @@ class HealthMonitor:
                 news += self._check(stream, block, stamps, raw, expected)
         if is_followed:
             news += self._judge_mount(block, readings[Stream.IMU])
+            forces = readings[Stream.FORCES]
+            news += self._forces.take(forces.raw, forces.left, BLOCK * NANO, block.number * BLOCK, block.end)
             news += self._judge_delays(block, readings)
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)

@@ -111,7 +111,17 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
         a[at + 1, at], a[at + 1, at + 1] = -(f.omega[j] ** 2), -f.decay[j]
         a[at + 1, places] = f.coupling[j]
         q[at + 1, at + 1] = f.density[j]
+    if f.status[layout.FORCED]:
+        unit = np.abs(f.pulls) + layout.LEAST_FORCE * np.abs(f.pulls).max()
+        places = [layout.offset_place(f, i) for i in range(n)]
+        q[places, places] = (layout.FORCE_DRIFT * unit) ** 2
     return a, q
+
+
+def measure_forces(f: DeviationFilter) -> None:
+    """As if forces had been measured: their offsets are states."""
+    f.status[layout.FORCED] = 1
+    stepping.add_offsets(f)
 
 
 def discrete(a: Array, q: Array, h: float) -> tuple[Array, Array]:
@@ -122,9 +132,12 @@ def discrete(a: Array, q: Array, h: float) -> tuple[Array, Array]:
     return turn, turn @ big[:size, size:]
 
 
-def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
+@pytest.mark.parametrize("with_forces", [False, True])
+def test_a_step_is_that_of_the_dense_system(posed: Posed, with_forces: bool) -> None:
     """Of order 2 in the step where inputs are held, and exact for the modes alone."""
     f = posed.modes.filter
+    if with_forces:
+        measure_forces(f)
     rng = np.random.default_rng(1)
     f.density[:] = rng.uniform(0.0, 1e-4, len(f.density))
     size = int(layout.states_of(f))
@@ -149,12 +162,14 @@ def test_a_step_is_that_of_the_dense_system(posed: Posed) -> None:
 
 def test_corrections_are_those_of_the_dense_filter(posed: Posed) -> None:
     f = posed.modes.filter
+    measure_forces(f)
     size, rng = int(layout.states_of(f)), np.random.default_rng(2)
     x, p = np.zeros(size), f.p[:size, :size].copy()
     f.status[layout.FED] = 1
-    for i in (0, 3):
-        reading.read_angle(f, i, f.row)
-        row, value, variance = f.row[:size].copy(), 1e-4 * rng.normal(), 1e-8
+    angles, forces = (reading.read_angle, 1e-4, 1e-8), (reading.read_force, 1e3, 1e4)
+    for i, (read, scale, variance) in ((0, angles), (3, angles), (1, forces), (3, forces)):
+        read(f, i, f.row)
+        row, value = f.row[:size].copy(), scale * rng.normal()
         reading.correct(f, i, value, variance, 0.0)
         gain = p @ row / (row @ p @ row + variance)
         x, p = x + gain * (value - row @ x), p - np.outer(gain, row @ p)
@@ -415,6 +430,49 @@ def test_the_covariance_stays_one(scene: Scene) -> None:
     used = np.diag(p) > 0.0
     assert np.abs(normal - normal.T).max() < 1e-9
     assert np.linalg.eigvalsh(normal[np.ix_(used, used)]).min() > -1e-9
+
+
+def test_offsets_of_forces_outlast_modes_that_come_and_go(posed: Posed) -> None:
+    """State and covariance of everything but the modes above those that stay is the same."""
+    f, rng = posed.modes.filter, np.random.default_rng(6)
+    measure_forces(f)
+    count, n = int(f.status[layout.COUNT]), 4
+    size = int(layout.states_of(f))
+    root = rng.normal(size=(size, size))
+    f.x[:size], f.p[:size, :size] = rng.normal(size=size), root @ root.T
+    x, p = f.x.copy(), f.p.copy()
+    first = layout.SHARES + 2 * n
+    stay = np.r_[: first + 2 * (count - 2), size - n : size]
+    f.status[layout.COUNT] = count - 2
+    posed.modes._keep_states(count, count - 2)
+    assert np.array_equal(f.x[: len(stay)], x[stay]) and np.array_equal(f.p[: len(stay), : len(stay)], p[np.ix_(stay, stay)])
+    assert not f.x[len(stay) :].any() and not f.p[len(stay) :].any() and not f.p[:, len(stay) :].any()
+    f.status[layout.COUNT] = count
+    posed.modes._keep_states(count - 2, count)
+    assert np.array_equal(f.x[stay], x[stay]) and np.array_equal(f.p[np.ix_(stay, stay)], p[np.ix_(stay, stay)])
+    come = np.r_[first + 2 * (count - 2) : size - n]
+    assert not f.x[come].any() and not f.p[come].any()
+
+
+@pytest.mark.parametrize(("factor", "zero"), [(1.1, 0.0), (0.9, 0.0), (1.0, 2e3)])
+@pytest.mark.parametrize("cylinder", [0, 1, 3])
+def test_a_force_that_reads_wrong_moves_the_tip_little(scene: Scene, cylinder: int, factor: float, zero: float) -> None:
+    """10 % too much or 2 kN beside: loads and soft cylinders that would do it are contradicted by the angles."""
+    samples, truth = pseudo_session(scene, scene, 4.0, 7)
+    true, rng, settings = statics(scene, strokes=strokes_of_posture(scene, "arch")), np.random.default_rng(8), Settings()
+    forces = np.array(true.cylinder_forces)
+    forces[cylinder] = factor * forces[cylinder] + zero
+    twin, told = Twin(scene), []
+    for sample in samples:
+        told.append(twin.update(sample).estimate)
+        if sample.stream is Stream.ANGLES:
+            twin.update(Sample(Stream.FORCES, sample.stamp, forces + settings.force_sigma * rng.normal(size=4)))
+    estimates = [each for each in told if each is not None]
+    off = np.array([each.tip[:2] for each in estimates]) - truth["tip"]
+    stated = np.sqrt([each.tip_covariance[[0, 3]] for each in estimates])
+    assert np.abs(off[200:]).max() < 4e-3
+    assert np.sqrt(np.mean((off / stated)[200:] ** 2)) < 1.5
+    assert np.abs([each.load for each in estimates[200:]]).max() < 60.0
 
 
 def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:

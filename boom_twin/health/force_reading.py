@@ -1,0 +1,116 @@
+"""Monitor in which unit and with which sign cylinder forces are read: their means must be what holds the boom up.
+
+Forces in kN for N, or positive in compression, differ from the model by a factor that no load at the tip makes. The estimate
+does not use them. Other offsets and scales it knows as states, see `boom_twin.estimation.tip_estimate`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import SENSORS, Alarm, Array, Ranked, Stream
+
+WINDOW = 2.0  # s, time constant of the means
+ENOUGH = 0.6  # of their weight: after 1.8 s
+LARGE = 0.2  # of the largest force, from which on a cylinder's is judged: a smaller one may be as large by a load
+CLOSE = 0.2  # of the factor by which a reason explains it: share by which the reading may be off it
+RIGHT = 0.5  # of the force: a reading that is less off has the right unit and sign
+
+
+def _reasons() -> dict[str, float]:
+    """What may be wrong, and by which factor it is read then; units as of who states N, and N as of who states another."""
+    units = {unit: size for unit, size in SENSORS[Stream.FORCES].units.items() if size != 1.0}
+    found = {f"in {unit}": 1.0 / size for unit, size in units.items()}
+    found |= {f"in N and stated as {unit}": size for unit, size in units.items()}
+    return found | {f"{reason} and positive in compression": -factor for reason, factor in found.items()}
+
+
+REASONS = {"positive in compression": -1.0} | _reasons()
+
+
+class ForceReading:
+    """Judges the forces of the cylinders.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of its channels.
+    """
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names, self._alarms = names, dict[int, Alarm]()
+        self.begin()
+
+    def begin(self) -> None:
+        """The boom starts from rest; alarms last until they are refuted."""
+        count = len(self._names)
+        self._read, self._expected, self._weight = np.zeros(count), np.zeros(count), np.zeros(count)
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Those that last."""
+        return tuple(self._alarms.values())
+
+    @property
+    def masked(self) -> NDArray[np.bool_]:
+        """Channels that are not to be used, shape (channels,): if all large forces are wrong, the small ones as well."""
+        found = np.isin(np.arange(len(self._names)), list(self._alarms))
+        return found | bool(self._alarms) & (found | ~self._is_large()).all()
+
+    def take(self, raw: Array, left: Array, span: float, start: int, end: int) -> list[Alarm]:
+        """Take the readings of a block; gives alarms that began or ended.
+
+        Parameters
+        ----------
+        raw, left : ndarray, shape (k, channels)
+            As measured, and less what the model has, N; NaN where there is none.
+        span : float
+            Length of the block, s.
+        start, end : int
+            Of the block, ns.
+        """
+        known = np.isfinite(left)
+        counts = known.sum(axis=0)
+        heard = counts > 0
+        if not heard.any():
+            return []
+        read = np.where(known, raw, 0.0).sum(axis=0) / np.maximum(counts, 1)
+        off = np.where(known, left, 0.0).sum(axis=0) / np.maximum(counts, 1)
+        share = np.where(heard, min(1.0, span / WINDOW), 0.0)
+        self._read += share * (read - self._read)
+        self._expected += share * (read - off - self._expected)
+        self._weight += share * (1.0 - self._weight)
+        news: list[Alarm] = []
+        for i in np.flatnonzero(heard & self._is_large()).tolist():
+            factor = self._read[i] / self._expected[i]
+            if i not in self._alarms and self._weight[i] > ENOUGH and (reason := _reason(factor)):
+                self._alarms[i] = self._begun(i, reason, start)
+                news.append(self._alarms[i])
+            elif i in self._alarms and abs(factor - 1.0) < RIGHT:
+                news.append(replace(self._alarms.pop(i), until=end))
+        return news
+
+    def _is_large(self) -> NDArray[np.bool_]:
+        expected = np.abs(self._expected)
+        return np.asarray((expected > LARGE * expected.max()) & (expected > 0.0))
+
+    def _begun(self, i: int, reason: str, start: int) -> Alarm:
+        name, cause = self._names[i], f"{self._names[i]}.sensor"
+        read, expected = self._read[i] / self._weight[i], self._expected[i] / self._weight[i]
+        told = (
+            f"{cause} reads {_three_digits(read)} N where the model has {_three_digits(expected)} N, as if {reason}: not used; "
+            "give cylinder forces their unit and sign (positive in tension) in the mapping"
+        )
+        return Alarm(name, "range", start, None, cause, told, (Ranked(cause, 1.0, ()),))
+
+
+def _three_digits(force: float) -> str:
+    return f"{float(f'{force:.3g}'):+g}"
+
+
+def _reason(factor: float) -> str:
+    """What explains that the model's force is read times `factor`, in words; empty where nothing does."""
+    return next((reason for reason, by in REASONS.items() if abs(factor / by - 1.0) < CLOSE), "")
