@@ -44,6 +44,7 @@ class DeviationFilter(NamedTuple):
     sections_off : (n,) standard deviation of b. softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
     roots : (n,) frames of the pivots. sensed, absolute : (n,) frames of the inclinometers, and which angle sensors are such.
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
+    noisier : (1,) times the variance that is stated, of the strokes.
     pulls : (n,) predicted forces of the cylinders, slow, N.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
@@ -78,6 +79,7 @@ class DeviationFilter(NamedTuple):
     absolute: NDArray[np.bool_]
     noise: Array
     masked: NDArray[np.bool_]
+    noisier: Array
     pulls: Array
     tip: Array
     turns: Array

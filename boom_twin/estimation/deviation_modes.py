@@ -54,6 +54,7 @@ class DeviationModes:
         self._bending = moments_by_unknowns(plan) * flexibility_by_station(scene)[:, None]
         mounting = Mounting(plan, scene.base.inclination, mounts)
         self.filter = _new_filter(scene, plan, settings, mounting)
+        self._angle_variance = settings.angle_variance
         self._weight = explain(scene).mass * math.hypot(*scene.gravity)
         self._motions: list[Array] = []
         self._at = np.full(plan.joints, math.inf)
@@ -64,10 +65,16 @@ class DeviationModes:
         f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = f.status[FORCED] = 0
         f.level[0], self._at[:] = f.loads[USUAL_LOAD], math.inf
         f.last[:], f.spread[:] = 0.0, 0.0
+        self.expect_noise(1.0, 1.0)
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
         """Leave out the channels (c,) that are masked."""
         self.filter.masked[:] = masked
+
+    def expect_noise(self, strokes: float, angles: float) -> None:
+        """Expect so many times the noise that is stated, of strokes and of angle sensors."""
+        self.filter.noisier[0] = strokes * strokes
+        self.filter.noise[: len(self.filter.slopes)] = angles * angles * self._angle_variance
 
     @property
     def tip_variances(self) -> Array:
@@ -96,7 +103,7 @@ class DeviationModes:
             self._make(strokes, angles, live)
         f, known = self.filter, min(len(noise.modes), int(self.filter.status[COUNT]))
         f.density[:] = 0.0
-        f.density[:known] = 2.0 * noise.collected[:known] * f.decay[:known] * f.omega[:known] ** 2
+        f.density[:known] = 2.0 * f.noisier[0] * noise.collected[:known] * f.decay[:known] * f.omega[:known] ** 2
 
     def _make(self, strokes: Array, angles: Array, live: State) -> None:
         f, plan = self.filter, self._plan
@@ -127,7 +134,7 @@ class DeviationModes:
         if not count:
             return
         bends = np.array([motion[tip : tip + 2] for motion in self._motions]) / f.omega[:count, None] ** 2
-        turns = f.turns[:count].T @ bends / np.sqrt(f.noise[: len(f.slopes), None])
+        turns = f.turns[:count].T @ bends / math.sqrt(self._angle_variance)
         f.loads[:] = LOADS / max(float(np.linalg.norm(turns, 2)), 1.0 / (STIFFEST * self._weight))
 
     def _put(self, j: int, found: PostureMode, sign: float) -> Array:
@@ -154,7 +161,7 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         sections_off=np.array([settings.section_deviation * scene.is_flexible(i) for i in range(n)]),
         softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
-        noise=np.array(noise), masked=np.zeros(len(noise), bool), pulls=np.zeros(n),
+        noise=np.array(noise), masked=np.zeros(len(noise), bool), noisier=np.ones(1), pulls=np.zeros(n),
         tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)), lever=np.zeros((n, 3)),
         coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n), variances=np.zeros(n), pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),

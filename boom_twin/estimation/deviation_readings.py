@@ -77,8 +77,11 @@ def read_angle(f, i, row):
 
 @inner
 def read_force(f, i, row):
-    """Row of a cylinder's force, which no share a or b changes at rest."""
-    n, size = f.softness.shape[0], states_of(f)
+    """Row of a cylinder's force, which no share a or b changes at rest; gives the variance that strokes' noise adds to it.
+
+    What is wrong with a stroke is in the predicted force at once, by the modes' stiffness; their motion takes it away later.
+    """
+    n, size, variance = f.softness.shape[0], states_of(f), 0.0
     clear(row, size)
     for j in range(f.status[COUNT]):
         at, still = mode_place(f, j), f.forces[j, i] / (f.omega[j] * f.omega[j])
@@ -86,6 +89,12 @@ def read_force(f, i, row):
         for k in range(2 * n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
     row[offset_place(f, i)] = 1.0
+    for k in range(n):
+        stiffness = 0.0
+        for j in range(f.status[COUNT]):
+            stiffness += f.forces[j, i] * f.forces[j, k] / (f.omega[j] * f.omega[j])
+        variance += stiffness * stiffness * f.variances[k]
+    return variance
 
 
 @inner
@@ -165,8 +174,8 @@ def take_forces(f, residuals, first, stamp):
         add_offsets(f)
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
-            read_force(f, i, f.row)
-            correct(f, first + i, residuals[i], f.noise[first + i], age)
+            variance = f.noise[first + i] + read_force(f, i, f.row)
+            correct(f, first + i, residuals[i], variance, age)
 
 
 @inner

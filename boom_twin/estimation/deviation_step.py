@@ -189,7 +189,7 @@ def follow_prediction(f, results, estimates, moments, gravity):
         f.drawn[i] = kept * f.drawn[i] + (1.0 - kept) * newest
         f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
         f.pulls[i] = kept * f.pulls[i] + (1.0 - kept) * results.cylinder_forces[i]
-        f.variances[i] = estimates.variances[i]
+        f.variances[i] = f.noisier[0] * estimates.variances[i]
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]

@@ -101,6 +101,12 @@ class HealthMonitor:
         self._blocks.measured(stream, compared)
 
     @property
+    def noise(self) -> tuple[float, float]:
+        """Times the noise that is stated, of the strokes and of the angle sensors, as it is with most of them now."""
+        strokes, angles = (self._checks[stream].noise_now for stream in MEASURED_NOISE)
+        return strokes, angles
+
+    @property
     def masked(self) -> NDArray[np.bool_]:
         """Of all measured channels in the order of the streams, those whose sensor is known to fail."""
         return np.concatenate([self._masked(stream) for stream in self._channels if stream is not Stream.STROKES])

@@ -133,13 +133,19 @@ class SensorCheck:
         self._run, self._since = np.zeros(count, dtype=np.int64), np.zeros(count)
         self._heard = np.full(count, np.nan)
         self._power, self._missing = np.full(count, np.nan), np.zeros(count)
-        self._usual2 = self._lasting2 = self._sigma**2
+        self._usual2 = self._lasting2 = self._sigma**2  # of the noise, as it is with most channels: now, and lately
         self._first = math.inf
 
     @property
     def noise(self) -> float:
         """Times the noise that is stated, as it is with most channels, lately."""
         return math.sqrt(self._lasting2) / self._sigma
+
+    @property
+    def noise_now(self) -> float:
+        """The same over `NOISY_WINDOW` where it is worth a warning; else 1."""
+        times = math.sqrt(self._usual2) / self._sigma
+        return times if times > MISSTATED else 1.0
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
@@ -177,7 +183,7 @@ class SensorCheck:
         is_known = now - self._first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
         findings = SensorFindings(
             stuck=self._stuck(float(stamps[-1])),
-            noisy=is_known & (self._power > NOISY**2 * self._usual2),
+            noisy=is_known & (self._power > NOISY**2 * min(self._usual2, NOISY**2 * self._sigma**2)),
             spikes=spikes & is_known,
             jumped=jumped,
             silent=(now - self._heard > SILENT_FOR) | (self._missing > MISSING),
@@ -205,11 +211,11 @@ class SensorCheck:
     def _usual_power(self) -> float:
         """Of the noise, as it is with most channels: a sensor is faulty that is noisier than its like, not than a data sheet.
 
-        Between what is stated and `NOISY` times that; of a single channel what is stated.
+        At least what is stated; of a single channel just that. A judgement takes at most `NOISY` times that for usual.
         """
         known, stated = np.sort(self._power[np.isfinite(self._power)]), self._sigma**2
         middle = float(known[(len(known) - 1) // 2]) if len(known) > 1 else stated
-        return min(max(middle, stated), NOISY**2 * stated)
+        return max(middle, stated)
 
     def _stuck(self, newest: float) -> Flags:
         """One reading again and again until `newest` (s), while others of the stream are alive with noise."""

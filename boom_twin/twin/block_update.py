@@ -232,6 +232,7 @@ class BlockUpdate:
         off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
         health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
         self._modes.mask(self._judge.masked)
+        self._modes.expect_noise(*self._judge.noise)
         return health
 
     def _take_judgement(self, row: int) -> None:

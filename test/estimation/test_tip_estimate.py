@@ -475,6 +475,27 @@ def test_a_force_that_reads_wrong_moves_the_tip_little(scene: Scene, cylinder: i
     assert np.abs([each.load for each in estimates[200:]]).max() < 60.0
 
 
+@pytest.mark.parametrize("sensors", ["angles", "angles, imu", "angles, imu, forces"])
+def test_noise_beyond_what_is_stated_is_noise_to_the_estimate_too(scene: Scene, sensors: str) -> None:
+    """Strokes five times as noisy as stated shake the prediction; no load is made of it, and the deviations hold the error."""
+    samples, truth = pseudo_session(scene, scene, 8.0, 9)
+    rng, settings = np.random.default_rng(10), Settings()
+    forces = np.array(statics(scene, strokes=strokes_of_posture(scene, "arch")).cylinder_forces)
+    twin, told = Twin(scene), []
+    for sample in with_imu(scene, scene, samples) if "imu" in sensors else samples:
+        if sample.stream is Stream.STROKES:
+            sample = Sample(sample.stream, sample.stamp, sample.values + 4.9 * settings.stroke_sigma * rng.normal(size=4))
+        report = twin.update(sample)
+        told += [report.estimate] if report.estimate is not None else []
+        if sample.stream is Stream.ANGLES and "forces" in sensors:
+            twin.update(Sample(Stream.FORCES, sample.stamp, forces + settings.force_sigma * rng.normal(size=4)))
+    late = told[len(told) // 2 :]
+    off = np.array([each.tip[:2] for each in late]) - truth["tip"]
+    stated = np.sqrt([each.tip_covariance[[0, 3]] for each in late])
+    assert np.sqrt(np.mean((off / stated) ** 2)) < 1.2
+    assert np.abs([each.load for each in late]).max() < 150.0
+
+
 def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
     """Tips of scenes whose compliances differ as stated: the normalised error is near 1 over many of them."""
     errors = []

@@ -174,6 +174,23 @@ def test_noise_of_all_sensors_at_once_is_told_as_noise():
     assert healthy().health[-1].noise["noise_over_stroke_sigma"] < 1.1
 
 
+def test_noise_of_strokes_is_no_load() -> None:
+    """Five times as noisy as stated, they put the estimate off by 30 mm and more, by a load of 500 N that was none."""
+    samples, rng, sigma = session(25.0), np.random.default_rng(4), Settings().stroke_sigma
+    noisy = [
+        replace(each, values=each.values + 4.9 * sigma * rng.normal(size=4)) if each.stream is Stream.STROKES else each
+        for each in samples
+    ]
+    found, quiet = (
+        [report.estimate for report in run(each).reports if report.estimate is not None][600:] for each in (noisy, samples)
+    )
+    off = np.array([each.tip[:2] for each in found]) - [each.tip[:2] for each in quiet]
+    stated = np.sqrt([each.tip_covariance[[0, 3]] for each in found])
+    assert np.sqrt(np.mean(off**2)) < 3e-3
+    assert np.sqrt(np.mean((off / stated) ** 2)) < 1.2
+    assert np.abs([each.load for each in found]).max() < 150.0
+
+
 def test_a_twin_without_a_baseline_tells_nothing():
     twin = Twin(load_scene())
     outcome = run(session(3.0), twin=twin)
