@@ -12,6 +12,7 @@ from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
+from .angle_reading import AngleReading
 from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor, delay_cause
 from .force_reading import ForceReading
@@ -71,6 +72,7 @@ class HealthMonitor:
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
+        self._angles = AngleReading(scene, mounts)
         self._ended: list[Alarm] = []
         self._told = 0
         self.begin()
@@ -91,6 +93,7 @@ class HealthMonitor:
             monitor.begin()
         self._mount.begin()
         self._forces.begin()
+        self._angles.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Predictions, at least one."""
@@ -115,6 +118,8 @@ class HealthMonitor:
         """The same of one stream."""
         if stream is Stream.FORCES:
             return self._sensors[stream].masked | self._forces.masked
+        if stream is Stream.ANGLES:
+            return self._sensors[stream].masked | self._angles.masked
         if stream in self._sensors:
             return self._sensors[stream].masked
         return np.full(len(self._channels[stream]), stream is Stream.IMU and self._mount.alarm is not None)
@@ -144,7 +149,8 @@ class HealthMonitor:
         self._told = done[-1].end
         alarms = [alarm for alarm in news if alarm.until is not None]
         for monitor in self._sensors.values():
-            alarms += monitor.alarms
+            alarms += [alarm for alarm in monitor.alarms if not self._angles.explains(alarm)]
+        alarms += self._angles.alarms
         alarms += [self._mount.alarm] if self._mount.alarm is not None else []
         alarms += self._forces.alarms
         lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
@@ -168,13 +174,14 @@ class HealthMonitor:
                 news += self._check(stream, block, stamps, raw, expected)
         if is_followed:
             news += self._judge_mount(block, readings[Stream.IMU])
+            news += self._judge_angles(block, predictions, readings[Stream.ANGLES])
             forces = readings[Stream.FORCES]
             news += self._forces.take(forces.raw, forces.left, BLOCK * NANO, block.number * BLOCK, block.end)
             news += self._judge_delays(block, readings)
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
-        if self._sensors[Stream.STROKES].masked.any() or self._noise is None:
+        if self._sensors[Stream.STROKES].masked.any() or self._angles.has_wrong_strokes or self._noise is None:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
@@ -184,8 +191,17 @@ class HealthMonitor:
     def _judge_mount(self, block: Block, imu: MeasuredRows) -> list[Alarm]:
         """Look whether the IMU reads gravity; gives the alarms that began or ended."""
         news = self._mount.take(imu.raw, imu.left, BLOCK * NANO, block.number * BLOCK, block.end)
-        if news and self._mount.alarm is not None:  # what was suspected by its readings, or is being collected, is void
-            news += self.residuals.close(block.end)
+        return self._void(news, block.end)
+
+    def _judge_angles(self, block: Block, predictions: PredictionRows, angles: MeasuredRows) -> list[Alarm]:
+        """Look whether encoders read their own joints; gives the alarms that began or ended."""
+        strokes, span = predictions.measured.mean(axis=0), BLOCK * NANO
+        return self._void(self._angles.take(angles.raw, angles.left, strokes, span, block.number * BLOCK, block.end), block.end)
+
+    def _void(self, news: list[Alarm], end: int) -> list[Alarm]:
+        """With news of readings that mean something else: what was suspected by them, or is being collected, is void."""
+        if any(alarm.until is None for alarm in news):
+            news += self.residuals.close(end)
             self.residuals.begin()
         return news
 

@@ -1,0 +1,197 @@
+"""Monitor which joint's angle every encoder reads, and with which sign: swapped encoders and swapped strokes are told as such.
+
+Readings of two joints that are exchanged, or of the other sign, differ from the model by far more than a boom can give way,
+and by an amount that is known: each is what the model expects elsewhere. As evidence of a fault they would point at a stroke's
+scale or an offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import degrees, radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BoomTwinError
+from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.schema import Scene
+from ..types import Alarm, Array, Mount, Ranked
+
+WINDOW = 2.0  # s, time constant of the means
+ENOUGH = 0.6  # of their weight: after 1.8 s
+FAR = radians(1.0)  # by which readings have to be off, and two expected angles apart, for their exchange to be told
+FAR_SIGN = radians(10.0)  # likewise a reading for its sign: an offset looks like it where the angle is minus half of it
+FAR_STROKES = radians(6.0)  # likewise two joints for strokes that are swapped
+CLOSE = 0.1  # of how far a reading is off: by so much it may miss what it is taken for
+SAG = radians(2.0)  # what cylinders and links give way by, which rigid angles of strokes leave out
+RIGHT = 0.3  # of how far an exchange would put it off: a reading that is less off is right again
+
+
+@dataclass(frozen=True)
+class _Exchange:
+    """Joints (0-based) of which readings are exchanged, one if its sign is; whether strokes are; what was told."""
+
+    joints: tuple[int, ...]
+    is_of_strokes: bool
+    alarm: Alarm
+
+
+class AngleReading:
+    """Judges the angle sensors against one another.
+
+    Parameters
+    ----------
+    scene : Scene
+    mounts : sequence of Mount or None
+        Of the sensors; strokes are only judged where all are encoders.
+    """
+
+    def __init__(self, scene: Scene, mounts: tuple[Mount | None, ...]) -> None:
+        self._scene, self._are_encoders = scene, not any(mounts)
+        self._found: list[_Exchange] = []
+        self.begin()
+
+    def begin(self) -> None:
+        """The boom starts from rest; alarms last until they are refuted."""
+        count = len(self._scene.joints)
+        self._read, self._expected, self._strokes = np.zeros(count), np.zeros(count), np.zeros(count)
+        self._weight, self._since = np.zeros(count), np.full(count, -1, dtype=np.int64)
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Those that last."""
+        return tuple(found.alarm for found in self._found)
+
+    @property
+    def masked(self) -> NDArray[np.bool_]:
+        """Angle sensors that are not to be used, shape (n,)."""
+        mask = np.full(len(self._scene.joints), self.has_wrong_strokes)
+        for found in self._found:
+            mask[list(found.joints)] = True
+        return mask
+
+    @property
+    def has_wrong_strokes(self) -> bool:
+        """Whether strokes are swapped, and so nothing is predicted rightly."""
+        return any(found.is_of_strokes for found in self._found)
+
+    def explains(self, alarm: Alarm) -> bool:
+        """Whether an alarm of a single sensor says less of what is told here."""
+        joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
+        return alarm.kind in {"range", "jump"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
+
+    def take(self, raw: Array, left: Array, strokes: Array, span: float, start: int, end: int) -> list[Alarm]:
+        """Take the readings of a block; gives alarms that began or ended.
+
+        Parameters
+        ----------
+        raw, left : ndarray, shape (k, n)
+            As measured, and less what the model has, rad; NaN where there is none.
+        strokes : ndarray, shape (n,)
+            Mean of the measured strokes, m.
+        span : float
+            Length of the block, s.
+        start, end : int
+            Of the block, ns.
+        """
+        known = np.isfinite(left)
+        counts = known.sum(axis=0)
+        heard = counts > 0
+        if not heard.any():
+            return []
+        read = np.where(known, raw, 0.0).sum(axis=0) / np.maximum(counts, 1)
+        off = np.where(known, left, 0.0).sum(axis=0) / np.maximum(counts, 1)
+        share = np.where(heard, min(1.0, span / WINDOW), 0.0)
+        self._read += share * (read - self._read)
+        self._expected += share * (read - off - self._expected)
+        self._strokes += share * (strokes - self._strokes)
+        self._weight += share * (1.0 - self._weight)
+        is_off = np.abs(off) > FAR
+        self._since = np.where(is_off, np.where(self._since < 0, start, self._since), np.where(heard, -1, self._since))
+        return self._ended(end) + self._begun()
+
+    def _means(self) -> tuple[Array, Array, Array]:
+        """Angles that were read and expected, rad, and strokes, m, lately, shape (n,) each."""
+        weight = np.maximum(self._weight, 1e-9)
+        return self._read / weight, self._expected / weight, self._strokes / weight
+
+    def _ended(self, end: int) -> list[Alarm]:
+        read, expected, _ = self._means()
+        over = [found for found in self._found if self._is_over(found, read, expected)]
+        self._found = [found for found in self._found if found not in over]
+        return [replace(found.alarm, until=end) for found in over]
+
+    @staticmethod
+    def _is_over(found: _Exchange, read: Array, expected: Array) -> bool:
+        """Whether joints read their own angles; where an exchange would make no difference, that is not known."""
+        first, last = found.joints[0], found.joints[-1]
+        apart = abs(expected[first] - (expected[last] if last != first else -expected[first]))
+        least = FAR_STROKES if found.is_of_strokes else apart
+        return bool(apart > FAR and all(abs(read[i] - expected[i]) < RIGHT * least for i in found.joints))
+
+    def _begun(self) -> list[Alarm]:
+        taken = self.masked
+        read, expected, strokes = self._means()
+        off = (self._weight > ENOUGH) & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
+        if not off.any():
+            return []
+        news: list[Alarm] = []
+        for found in self._exchanges(np.flatnonzero(off).tolist(), read, expected, strokes):
+            if not any(taken[i] for i in found.joints):
+                self._found.append(found)
+                news.append(found.alarm)
+                taken = self.masked
+        return news
+
+    def _exchanges(self, off: list[int], read: Array, expected: Array, strokes: Array) -> Iterator[_Exchange]:
+        for i, j in combinations(off, 2):
+            apart = float(abs(expected[i] - expected[j]))
+            if max(abs(read[i] - expected[j]), abs(read[j] - expected[i])) < CLOSE * apart and apart > FAR:
+                yield self._swapped_angles(i, j, apart)
+        for i in off:
+            apart = abs(expected[i] - read[i])
+            if abs(read[i] + expected[i]) < CLOSE * apart and apart > FAR_SIGN:
+                yield self._of_other_sign(i, read[i], expected[i])
+        if self._are_encoders:
+            for i, j in combinations(off, 2):
+                if self._would_swapped_strokes_fit([i, j], read, expected, strokes.copy()):
+                    yield self._swapped_strokes(i, j)
+
+    def _would_swapped_strokes_fit(self, pair: list[int], read: Array, expected: Array, strokes: Array) -> bool:
+        off = np.abs(read[pair] - expected[pair])
+        if off.min() < FAR_STROKES:
+            return False
+        strokes[pair] = strokes[pair[::-1]]
+        try:
+            angles = joint_angles_of_strokes(self._scene, strokes, read)
+        except BoomTwinError:  # no angle has such a stroke
+            return False
+        return bool((np.abs(angles[pair] - read[pair]) < np.maximum(SAG, CLOSE * off)).all())
+
+    def _swapped_angles(self, i: int, j: int, apart: float) -> _Exchange:
+        told = (
+            f"joint_{i + 1}.sensor and joint_{j + 1}.sensor read each other's angle, {degrees(apart):.3g} deg apart: not used; "
+            "exchange their names in the mapping, or their cables"
+        )
+        return _Exchange((i, j), False, self._alarm(i, "swapped", f"joint_{i + 1}.sensor", told))
+
+    def _of_other_sign(self, i: int, read: float, expected: float) -> _Exchange:
+        told = (
+            f"joint_{i + 1}.sensor reads {degrees(read):+.4g} deg where the model has {degrees(expected):+.4g} deg, as if of "
+            "the other sign: not used; give it its sign in the mapping"
+        )
+        return _Exchange((i,), False, self._alarm(i, "range", f"joint_{i + 1}.sensor", told))
+
+    def _swapped_strokes(self, i: int, j: int) -> _Exchange:
+        told = (
+            f"cylinder_{i + 1}.sensor and cylinder_{j + 1}.sensor read each other's stroke: joint_{i + 1} and joint_{j + 1} "
+            "stand where the other's stroke would put them; nothing is predicted rightly until their names in the mapping, or "
+            "their cables, are exchanged"
+        )
+        return _Exchange((i, j), True, self._alarm(i, "swapped", f"cylinder_{i + 1}.sensor", told))
+
+    def _alarm(self, i: int, kind: str, cause: str, told: str) -> Alarm:
+        return Alarm(f"joint_{i + 1}", kind, int(self._since[i]), None, cause, told, (Ranked(cause, 1.0, ()),))
