@@ -151,6 +151,7 @@ class AlarmText:
             amount = f"{now:.3g} +- {spread:.1g} {si}, {100 * (now / own - 1):+.0f} % of the scene's"
         else:
             amount = f"{value:+.3g} +- {sigma:.1g} {unit}".rstrip()
+            amount += f" ({np.degrees(value):+.2g} deg)" if unit == "rad" else ""
         trend = f", {best.rate:+.2g} {unit}/s" if best.is_growing and unit else ", growing" if best.is_growing else ""
         remedy = delay_remedy(tuple(JUDGED)[each.index]) if each.form is Form.DELAY else ""
         return f"{rank.cause} {kind}: {amount}{trend} (probability {rank.probability:.3f}){remedy}"

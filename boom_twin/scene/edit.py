@@ -1,12 +1,13 @@
 """Change a scene: single parameters by name, keys as an editor would change them, the text with comments kept, another load.
 
 ``cylinder_i.k`` (N/m), ``cylinder_i.d`` (N s/m), ``section_i.EI`` (N m^2), ``section_i.beta`` (s), ``section_i.mass`` (kg, of
-all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m). k of a cylinder with `oil` is that at half its
+all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m), ``base.inclination`` (rad). k of a cylinder with `oil` is that at half its
 stroke; to change it changes the bulk modulus, and with that k by the same factor over the whole stroke.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,7 +30,7 @@ _NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
 
 
 def parameter_names(scene: Scene) -> tuple[str, ...]:
-    """Every parameter that `scene` has; payload and line fill always, for they may be nothing."""
+    """Every parameter that `scene` has; payload, line fill and inclination always, for they may be nothing."""
     names = []
     for i, joint in enumerate(scene.joints):
         names += [f"cylinder_{i + 1}.k"] if joint.cylinder.is_compressible else []
@@ -38,7 +39,7 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
         names += [f"section_{i + 1}.EI"] if scene.is_flexible(i) else []
         names += [f"section_{i + 1}.beta"] if scene.is_flexible(i) and section.beta else []
         names += [f"section_{i + 1}.mass"] if section_mass(section) > 0.0 else []
-    return (*names, "tip.payload", "line_fill")
+    return (*names, "tip.payload", "line_fill", "base.inclination")
 
 
 def parameter(scene: Scene, name: str) -> float:
@@ -54,6 +55,8 @@ def parameter(scene: Scene, name: str) -> float:
         return 0.0 if scene.tip is None or scene.tip.payload is None else scene.tip.payload
     if owner == "line_fill":
         return scene.line_fill or 0.0
+    if owner == "base":
+        return scene.base.inclination
     if owner == "cylinder":
         cylinder = scene.joints[index].cylinder
         return middle_stiffness(cylinder) if key == "k" else float(cylinder.d or 0.0)
@@ -86,8 +89,11 @@ def section_mass(section: Section) -> float:
 def _with_one(scene: Scene, name: str, value: float) -> Scene:
     owner, index, key = _parsed(scene, name)
     least_is_open = key in ("k", "EI", "mass")
-    if not (value > 0.0 if least_is_open else value >= 0.0) or value == float("inf"):
-        raise UsageError(f"{name} = {value:g}: must be finite and {'above 0' if least_is_open else 'at least 0'}.")
+    bound = "" if owner == "base" else " and above 0" if least_is_open else " and at least 0"
+    if not math.isfinite(value) or (bound and not (value > 0.0 if least_is_open else value >= 0.0)):
+        raise UsageError(f"{name} = {value:g}: must be finite{bound}.")
+    if owner == "base":
+        return cast(Scene, _with(scene, ("base", "inclination"), value))
     place, part = cast(Place, (owner,)), cast(Any, value)
     if owner == "cylinder":
         place, part = ("joints", index, "cylinder"), _cylinder(scene.joints[index].cylinder, key, value)
@@ -132,6 +138,8 @@ def _parsed(scene: Scene, name: str) -> tuple[str, int, str]:
         return "tip", 0, "payload"
     if name == "line_fill":
         return "line_fill", 0, "line_fill"
+    if name == "base.inclination":
+        return "base", 0, "inclination"
     found = _NAME.fullmatch(name)
     if found is None or name not in parameter_names(scene):
         known = ", ".join(parameter_names(scene))

@@ -24,9 +24,16 @@ ELEMENTS, STEP, SCHEME = 6, 5e-3, Scheme(tolerance=1e-4)  # see test/bench/healt
 pytestmark = pytest.mark.slow
 
 
-def session(seed: int, seconds: float, fault: str | None = None, posture: str = "arch", loads: tuple[RigLoad, ...] = ()):
+def session(
+    seed: int,
+    seconds: float,
+    fault: str | None = None,
+    posture: str = "arch",
+    loads: tuple[RigLoad, ...] = (),
+    inclination: float = 0.0,
+):
     """Random moves of a rig that the scene describes 2 % wrong."""
-    boom = wrong_by(load_scene(), 0.02, 1)
+    boom = wrong_by(load_scene().with_(**{"base.inclination": inclination}), 0.02, 1)
     boom = boom if fault is None else with_faults(boom, [parse(fault)])
     programme = random_programme(load_scene(), posture, seconds, seed)
     resting = at_rest(boom, np.array(programme.first), ELEMENTS, nodally_exact=True)
@@ -81,6 +88,14 @@ def estimate(outcome, cause: str) -> float:
     """The last value of a cause that is ranked."""
     ranked = [each for _, alarm in outcome.states() for each in alarm.ranked if each.cause == cause]
     return ranked[-1].parts[0][1]
+
+
+@pytest.mark.parametrize("inclination", [0.02, -0.05])
+def test_a_base_that_is_inclined_is_no_offset_of_the_imu(baseline, inclination):
+    """By 1.1 and 2.9 degrees, of which the scene says nothing."""
+    outcome = run(session(23, 40.0, inclination=inclination), baseline=baseline)
+    assert outcome.causes() == {"base.inclination"}
+    assert estimate(outcome, "base.inclination") == pytest.approx(inclination, abs=0.005)
 
 
 @pytest.mark.parametrize("seed", [21, 22])

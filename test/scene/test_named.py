@@ -13,7 +13,7 @@ SCENE = load_scene()
 
 @pytest.mark.parametrize("name", parameter_names(SCENE))
 def test_what_is_set_is_read_and_nothing_else_changes(name: str) -> None:
-    value = 1.3 * parameter(SCENE, name) + (5.0 if name in ("tip.payload", "line_fill") else 0.0)
+    value = 1.3 * parameter(SCENE, name) + {"tip.payload": 5.0, "line_fill": 5.0, "base.inclination": -0.1}.get(name, 0.0)
     other = with_parameters(SCENE, {name: value})
     assert parameter(other, name) == pytest.approx(value, rel=1e-12)
     for same in set(parameter_names(SCENE)) - {name}:
@@ -37,7 +37,10 @@ def test_unknown_names_are_refused_with_the_known_ones(name: str) -> None:
         parameter(SCENE, name)
 
 
-@pytest.mark.parametrize(("name", "value"), [("cylinder_1.k", 0.0), ("tip.payload", -1.0), ("section_2.EI", float("inf"))])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("cylinder_1.k", 0.0), ("tip.payload", -1.0), ("section_2.EI", float("inf")), ("base.inclination", float("nan"))],
+)
 def test_values_that_no_scene_may_have(name: str, value: float) -> None:
     with pytest.raises(UsageError, match="must be finite"):
         with_parameters(SCENE, {name: value})

@@ -73,6 +73,8 @@ class Parameter:
 
 COMPLIANCE = (0.02, 0.5)
 BENDING = (0.02, 0.3)
+STEPS = {"kg": 1.0, "kg/m": 0.1, "rad": 2e-4}
+"""Small values of the scene's parameters that are not judged by their share."""
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -93,6 +95,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         Parameter("tip.payload", "changed", Form.SCENE, 0, "kg", 1.0, 30.0, least=-parameter(scene, "tip.payload")),
         Parameter("line_fill", "changed", Form.SCENE, 0, "kg/m", 0.1, 5.0, least=-parameter(scene, "line_fill")),
     ]
+    found.append(Parameter("base.inclination", "changed", Form.SCENE, 0, "rad", 1e-3, 0.03, prior=0.5))
     found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
@@ -114,7 +117,7 @@ def step_of(each: Parameter, scene: Scene) -> tuple[float, dict[str, float]]:
     if each.unit == "":
         share = 0.01
         return share, {each.cause: value * (1.0 + share) if each.cause.endswith(".mass") else value / (1.0 + share)}
-    step = 1.0 if each.unit == "kg" else 0.1
+    step = STEPS[each.unit]
     return step, {each.cause: value + step}
 
 
