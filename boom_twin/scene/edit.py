@@ -1,8 +1,9 @@
 """Change a scene: single parameters by name, keys as an editor would change them, the text with comments kept, another load.
 
 ``cylinder_i.k`` (N/m), ``cylinder_i.d`` (N s/m), ``section_i.EI`` (N m^2), ``section_i.beta`` (s), ``section_i.mass`` (kg, of
-all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m), ``base.inclination`` (rad). k of a cylinder with `oil` is that at half its
-stroke; to change it changes the bulk modulus, and with that k by the same factor over the whole stroke.
+all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m), ``base.inclination`` (rad). k of a cylinder with
+`oil` is that at half its stroke; to change it changes the bulk modulus, and with that k by the same factor over the whole
+stroke.
 """
 
 from __future__ import annotations
