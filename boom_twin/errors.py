@@ -70,6 +70,8 @@ class Fault:
         What to do about it.
     line : int, optional
         Line of the file, from 1.
+    is_note : bool
+        Told, but no warning: ``check --strict`` lets it pass.
     """
 
     path: str
@@ -77,12 +79,18 @@ class Fault:
     bound: str
     remedy: str
     line: int | None = None
+    is_note: bool = False
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
         state = "is absent" if self.value is ABSENT else f"= {_shortened(self.value)}"
         stop = "" if self.bound.endswith("?") else "."
         return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
+
+    @property
+    def kind(self) -> str:
+        """What it is called where it does not stop a scene."""
+        return "note" if self.is_note else "warning"
 
 
 def _shortened(value: Any, width: int = 60) -> str:
@@ -115,4 +123,4 @@ class SceneError(BoomTwinError):
         self.oddities = oddities
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
         lines = [f"{source}: {count}", *(f"  {fault}" for fault in faults)]
-        super().__init__("\n".join(lines + [f"  warning: {oddity}" for oddity in oddities]))
+        super().__init__("\n".join(lines + [f"  {oddity.kind}: {oddity}" for oddity in oddities]))

@@ -242,8 +242,13 @@ def checked_strokes(scene: Scene, strokes: Array) -> Array:
     for i, value in enumerate(values):
         most = scene.joints[i].cylinder.max_stroke
         if not 0.0 <= value <= most:
-            raise UsageError(f"stroke_{i + 1} = {value:g} m: cylinder {i + 1} travels 0 to {most:g} m. Give it in metres.")
+            raise UsageError(f"stroke_{i + 1} = {value:g} m: {travel_words(i, most)}")
     return values
+
+
+def travel_words(i: int, most: float) -> str:
+    """What strokes cylinder `i` (0-based) has, and what to do about another."""
+    return f"cylinder {i + 1} travels 0 to {most:g} m. Give in m by how much it is longer than closed_length."
 
 
 def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, Work]:

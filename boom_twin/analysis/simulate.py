@@ -18,7 +18,7 @@ from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .drive import DriveCourse, Run
-from .equilibrium import checked_strokes, motion_beyond_validity, rest_at
+from .equilibrium import motion_beyond_validity, rest_at, travel_words
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
 from .initial_state import InitialState, started, state_now
 
@@ -224,6 +224,9 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
         raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")
-    for values in (strokes.min(axis=0), strokes.max(axis=0), strokes[0]):
-        checked_strokes(scene, values)
+    most = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+    beyond = np.argwhere((strokes < 0.0) | (strokes > most))
+    if len(beyond):
+        row, i = beyond[0]
+        raise UsageError(f"stroke_{i + 1} = {strokes[row, i]:g} m in row {row + 1} of the drive: {travel_words(i, most[i])}")
     return times, strokes

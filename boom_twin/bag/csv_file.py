@@ -1,6 +1,7 @@
 """Read a session from a CSV file: a row for every stamp, a column for every sensor, in SI units.
 
 ``t_s,stroke_1_m,..[,joint_1_rad,..][,imu_x_m_s2,imu_z_m_s2][,cylinder_force_1_N,..]``, an empty cell where there is no value.
+The file is read some thousand rows at a time, once to check and count, and once more for its messages: it may be of any size.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from ..errors import BagError
 from ..messages.topic_table import load_topics
 from ..messages.type_store import jazzy
-from ..system.csv_table import CsvTable, read_csv
+from ..system.csv_table import CsvTable, read_csv_pieces
 from ..system.received_files import open_received
 from ..types import SECOND, SENSORS, Sample, Stream, channels_of
 from .session_file import SessionFile, channel_of, schema_of
@@ -25,8 +26,6 @@ from .session_files import samples_of, sensor_message
 TIME = "t_s"
 STROKE = "stroke_{}_m"
 IMU = ("imu_x_m_s2", "imu_z_m_s2")
-LARGEST = 2**26
-"""Bytes of a file that are read: it is held as a whole."""
 FEWEST, SLOWEST = 20, 1.0  # rows; s from row to row, at least, by which times are in another unit: 1 kHz in ms
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 """Channel of every stream."""
@@ -34,15 +33,7 @@ NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 
 @dataclass(frozen=True, slots=True)
 class CsvFile(SessionFile):
-    """What one CSV file holds; its log times are its stamps.
-
-    Attributes
-    ----------
-    samples : list of Sample
-        In the order of their stamps.
-    """
-
-    samples: list[Sample]
+    """What one CSV file holds; its log times are its stamps."""
 
     @property
     def storage(self) -> str:
@@ -56,7 +47,7 @@ class CsvFile(SessionFile):
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """See `SessionFile`; by log time."""
         encode = jazzy().serialize_cdr
-        for sample in self.samples:
+        for sample in _samples(self.path):
             data = encode(sensor_message(sample), SENSORS[sample.stream].message)
             yield NUMBERS[sample.stream], sample.stamp, bytes(data)
 
@@ -71,42 +62,56 @@ def summarise(path: Path) -> CsvFile:
     """
     try:
         open_received(path).close()
-        size = path.stat().st_size
     except OSError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
-    if size > LARGEST:
-        raise BagError(f"{path}: {size} bytes, of which {LARGEST} are read. Split the session, or store it as a rosbag2.")
-    samples = _samples(read_csv(path, BagError))
+    counts, start, end = dict.fromkeys(Stream, 0), 0, 0
+    for sample in _samples(path):
+        counts[sample.stream] += 1
+        start, end = start or sample.stamp, sample.stamp
     topics = load_topics().inputs
-    streams = [stream for stream in Stream if any(sample.stream is stream for sample in samples)]
+    streams = [stream for stream in Stream if counts[stream]]
     return CsvFile(
         path=path,
         channels={NUMBERS[stream]: channel_of(NUMBERS[stream], topics[stream].absolute) for stream in streams},
         schemas={NUMBERS[stream]: schema_of(NUMBERS[stream], topics[stream].type) for stream in streams},
-        counts={NUMBERS[stream]: sum(sample.stream is stream for sample in samples) for stream in streams},
-        start=samples[0].stamp if samples else 0,
-        end=samples[-1].stamp if samples else 0,
+        counts={NUMBERS[stream]: counts[stream] for stream in streams},
+        start=start,
+        end=end,
         checked=False,
         notes={},
-        samples=samples,
     )
 
 
-def _samples(table: CsvTable) -> list[Sample]:
+def _samples(path: Path) -> Iterator[Sample]:
+    """All samples in the order of their stamps."""
+    shift = 0
+    last: int | None = None
+    for number, piece in enumerate(read_csv_pieces(path, BagError)):
+        columns = _columns_of(piece)
+        stamps = _stamps(piece, last)
+        if number == 0:
+            _refuse_other_units(piece, stamps)
+            shift = max(0, SECOND - stamps[0])
+        last = stamps[-1]
+        values = {
+            stream: np.column_stack([_column(piece, name) for name in names])
+            for stream, names in columns.items()
+            if any(name in piece.names for name in names)
+        }
+        angles, imu, forces = (values.get(stream) for stream in (Stream.ANGLES, Stream.IMU, Stream.FORCES))
+        shifted = np.array(stamps, np.int64) + shift
+        yield from samples_of(shifted, values[Stream.STROKES], angles, imu, forces=forces)
+
+
+def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
+    """The names of the columns that every stream may have; refuses a header that lacks one or has another."""
     joints = 1
     while STROKE.format(joints + 1) in table.names:
         joints += 1
     table.require([TIME, *(STROKE.format(number) for number in range(1, joints + 1))])
     columns = _columns(joints)
     _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
-    values = {
-        stream: np.column_stack([_column(table, name) for name in names])
-        for stream, names in columns.items()
-        if any(name in table.names for name in names)
-    }
-    strokes, angles, imu, forces = (values.get(stream) for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES))
-    assert strokes is not None
-    return samples_of(np.array(_stamps(table), np.int64), strokes, angles, imu, forces=forces)
+    return columns
 
 
 def _columns(joints: int) -> dict[Stream, list[str]]:
@@ -134,27 +139,31 @@ def _column(table: CsvTable, name: str) -> list[float]:
     return table.column(name, np.nan) if name in table.names else [np.nan] * len(table.rows)
 
 
-def _stamps(table: CsvTable) -> list[int]:
-    """Stamps, ns: the times, or if they begin before 1 s, these later by what makes the first one 1 s; 0 is no stamp in ROS."""
+def _stamps(table: CsvTable, last: int | None) -> list[int]:
+    """Times, ns, each after the one before; `last` is that of the row before the first, if there is one."""
     place = table.names.index(TIME)
     found: list[int] = []
     for row, line in zip(table.rows, table.lines, strict=True):
         text = row[place].strip() if place < len(row) else ""
         try:
-            found.append(int((Decimal(text) * SECOND).to_integral_value()))
+            stamp = int((Decimal(text) * SECOND).to_integral_value())
         except (ArithmeticError, ValueError):
             raise BagError(f"{table.path}, line {line}: {TIME} = {text!r} is not a time in s.") from None
-        if len(found) > 1 and found[-1] <= found[-2]:
+        if last is not None and stamp <= last:
             raise BagError(f"{table.path}, line {line}: {TIME} = {text} is not after the row before. Sort the rows by {TIME}.")
-    if found[-1] >= 2**31 * SECOND:
-        raise BagError(
-            f"{table.path}: {TIME} is beyond {2**31} s, so not in seconds. Divide it: stamps in ms or ns are no seconds."
-        )
-    step = float(np.median(np.diff(found))) / SECOND if len(found) >= FEWEST else 0.0
+        if stamp >= 2**31 * SECOND:
+            remedy = "Divide it: stamps in ms or ns are no seconds."
+            raise BagError(f"{table.path}, line {line}: {TIME} = {text} is beyond {2**31} s, so not in seconds. {remedy}")
+        found.append(stamp)
+        last = stamp
+    return found
+
+
+def _refuse_other_units(table: CsvTable, stamps: list[int]) -> None:
+    """Refuse times that go on as ms do."""
+    step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) >= FEWEST else 0.0
     if step >= SLOWEST:
         raise BagError(
             f"{table.path}: {TIME} goes on by {step:g} s from row to row, and a twin needs several rows a second. If these are "
             f"ms, divide them by 1000: {TIME} is in seconds."
         )
-    shift = max(0, SECOND - found[0])
-    return [stamp + shift for stamp in found]

@@ -57,7 +57,8 @@ def check_ends(path: Path, file: BinaryIO) -> None:
     if (start := file.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
         if MCAP0_MAGIC.startswith(start):
             raise BagError(f"{path}: incomplete: {size} bytes, of which nothing can be saved. Its recorder was ended at once.")
-        raise BagError(f"{path}: not an MCAP file (it begins otherwise). Give a bag that was stored as mcap.")
+        remedy = "Give a rosbag2 directory, or a file that ends with .mcap, .db3, .bag or .csv."
+        raise BagError(f"{path}: not an MCAP file (it begins otherwise). {remedy}")
     if (ends := _footer(file, size)) is None:
         raise BagError(f"{path}: incomplete: the end is missing (no footer at the end of its {size} bytes). {REMEDY}")
     summary, is_sound = ends

@@ -51,10 +51,10 @@ def run(args: Namespace) -> int:
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
-    if args.strict and oddities:
+    if args.strict and any(not oddity.is_note for oddity in oddities):
         for line in drawn:  # the picture shows what the warnings are about
             print(line, file=sys.stderr)
-        raise SceneError(name, tuple(oddities))
+        raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
@@ -112,7 +112,8 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "over_pivot": [", ".join(joint.linkage.over_pivot) for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
-        "warnings": [str(oddity) for oddity in oddities],
+        "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
+        "notes": [str(oddity) for oddity in oddities if oddity.is_note],
     }
 
 
@@ -144,7 +145,9 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
     lines += ["", "Strokes that a twin follows, by their sample rate (sensors and stroke_agility as in twin.yaml)"]
     lines += _indent(_filter())
-    lines += ["", f"Warnings: {len(oddities) or 'none'}", *(f"  {oddity}" for oddity in oddities)]
+    warnings = [oddity for oddity in oddities if not oddity.is_note]
+    lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
+    lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
     return lines
 
 

@@ -28,9 +28,10 @@ KEPT = ".table.yaml"
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("--table", metavar="FILE", help="dimensions in YAML or CSV; without it, they are asked for")
-    parser.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")
     parser.add_argument("--force", action="store_true", help="replace a scene that is there, after the table was mended")
-    parser.add_argument("--example-table", action="store_true", help="print a table to start from, and do no more")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")
+    what.add_argument("--example-table", action="store_true", help="print a table to start from, and do no more")
 
 
 def run(args: Namespace) -> int:
@@ -38,10 +39,10 @@ def run(args: Namespace) -> int:
     if args.example_table:
         sys.stdout.write((files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8"))
         return 0
-    if args.out is None:
-        raise UsageError("--out is absent: it names the scene to write, for example --out my_boom.yaml.")
     sources = [Path(args.table)] if args.table else []
-    (check_target if args.force else check_new)(args.out, sources)
+    check_target(args.out, sources)
+    if not args.force and args.out.is_file() and args.out.stat().st_size:
+        raise UsageError(f"{args.out}: is there already. Name another file, or give --force to replace it.")
     if args.table:
         table, document = read_table(Path(args.table))
         source = args.table
@@ -55,7 +56,9 @@ def run(args: Namespace) -> int:
     text, scene, oddities = first_scene(table, document, source)
     write_atomic(args.out, text)
     tell(oddities, source)
-    print(f"Written: {args.out}, {len(scene.sections)} sections, {scene.reach:.2f} m. {_next(args.out, source, len(oddities))}")
+    count = len(scene.sections)
+    size = f"{count} section{'s' * (count > 1)}, {scene.reach:.2f} m"
+    print(f"Written: {args.out}, {size}. {_next(args.out, source, len(oddities))}")
     return 0
 
 

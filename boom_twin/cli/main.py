@@ -236,9 +236,9 @@ def open_session_settings(session: str | Path, params: Path | None) -> Settings:
 
 
 def tell(oddities: Iterable[Fault], source: str | None) -> None:
-    """Print warnings on stderr, with the file that they are about."""
+    """Print warnings and notes on stderr, with the file that they are about."""
     for oddity in oddities:
-        print(f"warning: {source}: {oddity}", file=sys.stderr)
+        print(f"{oddity.kind}: {source}: {oddity}", file=sys.stderr)
 
 
 def warn_incomplete(session: Session) -> None:

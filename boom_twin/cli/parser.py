@@ -20,6 +20,13 @@ class DefaultsFormatter(RawDescriptionHelpFormatter):
         is_told = f"({text}" in told or f"default {text}" in told
         return told if is_told else f"{told} ({text.replace('%', '%%')})"
 
+    def add_argument(self, action: Action) -> None:
+        """As of the base class, which forgets how far in commands stand, and breaks the line of the longest."""
+        super().add_argument(action)
+        for command in self._iter_indented_subactions(action):
+            length = self._current_indent + len(self._format_action_invocation(command))
+            self._action_max_length = max(self._action_max_length, length)
+
 
 class CommandParser(ArgumentParser):
     """A parser whose errors name the nearest option or choice."""

@@ -111,12 +111,21 @@ def run(args: Namespace) -> int:
             files.append(name)
     warn_incomplete(result.session)
     if args.json:
-        print_json({key: value for key, value in result.summary.items() if key not in ("events", "alarms", "lost_contacts")})
+        print_json(flat(result.summary))
         return 0
     print("\n".join(as_text(result.summary)))
     for name in ["summary.json", "bag", *files]:
         print(out / name)
     return 0
+
+
+def flat(summary: dict[str, Any]) -> dict[str, Any]:
+    """A summary as one flat object: of its counts one key each, of its alarms one list for each of their keys."""
+    found = {key: value for key, value in summary.items() if key not in ("events", "alarms", "lost_contacts")}
+    for group in ("events", "lost_contacts"):
+        found |= {f"{group}_{name.replace(' ', '_')}": count for name, count in summary.get(group, {}).items()}
+    alarms = summary["alarms"]
+    return found | {f"alarm_{key}": [alarm[key] for alarm in alarms] for key in ("channel", "kind", "from_s", "to_s", "cause")}
 
 
 def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionScene, out: Path) -> list[Path]:

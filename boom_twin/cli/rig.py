@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from .. import __version__
 from ..errors import UsageError
+from .arguments import positive
 from .main import add_scene, tell
 
 SENSORS = ("angles", "imu", "forces")
@@ -20,7 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
-    parser.add_argument("--duration", type=float, metavar="S", help="s (default 60)")
+    parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
     share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %%"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from ..system.atomic_files import check_new, check_target, write_atomic
 from ..system.csv_table import columns_text, read_csv
 from ..system.summary_display import numbers
 from ..types import Array
+from .arguments import not_negative
 from .main import add_json, add_scene, open_scene, print_result
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
     parser.add_argument("--save-state", metavar="FILE.json", help="the boom at the last row, for --start of another run")
     parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
+    damping = "numerical damping of the fastest vibrations, as what is left of them after a step: 0 to 1 (default 0.8)"
+    parser.add_argument("--rho", type=_share, metavar="RHO", help=damping)
     many = "Monte Carlo: so many booms with parameters drawn at random; OUT.csv has mean, deviation, quantiles"
     parser.add_argument("--samples", type=int, metavar="N", help=many)
     what = "a parameter and its standard deviation: a share, of loads kg or kg/m; may be repeated (with --samples)"
@@ -55,12 +58,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the samples (0)")
 
 
+def _share(text: str) -> float:
+    """A number from 0 to 1."""
+    if (value := not_negative(text)) > 1.0:
+        raise ArgumentTypeError(f"{text}: must be at most 1")
+    return value
+
+
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
     from ..analysis.energy_balance import energy_balance
     from ..analysis.initial_state import write_state
     from ..analysis.momentum_balance import momentum_balance
-    from ..analysis.simulate import course_of, simulate
+    from ..analysis.simulate import RHO, course_of, simulate
     from ..compiler.compile import compile_scene
 
     scene = open_scene(args.scene)
@@ -68,7 +78,7 @@ def run(args: Namespace) -> int:
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
-    check_target(Path(args.out), sources, _earlier(len(scene.joints)))
+    check_target(Path(args.out), sources, _is_earlier)
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
@@ -79,7 +89,8 @@ def run(args: Namespace) -> int:
     if args.samples is not None:
         return _sample(args, scene, times, strokes, angles)
     start = _start(args, scene, strokes[0], angles)
-    result = simulate(scene, times, strokes, args.dt, angles, estimate_errors=not args.no_error_estimate, start=start)
+    rho = RHO if args.rho is None else args.rho
+    result = simulate(scene, times, strokes, args.dt, angles, rho, not args.no_error_estimate, start)
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
     write_atomic(Path(args.out), columns_text(result.columns()))
@@ -87,7 +98,7 @@ def run(args: Namespace) -> int:
         write_state(Path(args.save_state), result.end)
     balances = None
     if args.check:
-        course = course_of(scene, times, strokes, args.dt, angles, start=start)
+        course = course_of(scene, times, strokes, args.dt, angles, rho, start)
         balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
     print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
     if args.orbits:
@@ -110,6 +121,7 @@ def _check_sampling(args: Namespace) -> None:
             raise UsageError(f"--vary {args.vary[0]}: goes with --samples N. Add it, or leave --vary out.")
         return
     single = {"--check": args.check, "--start": args.start != "rest", "--save-state": args.save_state, "--orbits": args.orbits}
+    single["--rho"] = args.rho is not None
     for option, is_given in single.items():
         if is_given:
             raise UsageError(f"{option}: is of one motion, --samples of many. Leave one of them out.")
@@ -220,9 +232,11 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
     orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
 
 
-def _earlier(joints: int) -> bytes:
-    """How a file of results begins, and no drive."""
-    return ",".join(["t_s", *(f"stroke_{i + 1}_m" for i in range(joints)), "joint_1_rad,"]).encode()
+def _is_earlier(start: bytes) -> bool:
+    """Whether a file that begins so holds results of any boom, and is no drive and no session."""
+    names = start.partition(b"\n")[0].decode(errors="replace").split(",")
+    is_replay = any(name.startswith("measured_") for name in names)
+    return names[0] == "t_s" and not is_replay and any(name.startswith("tip_x_m") for name in names)
 
 
 def read_drive(path: Path, n: int) -> tuple[Array, Array]:

@@ -43,16 +43,16 @@ def run(args: Namespace) -> int:
 
 
 def as_json(found: Equilibrium) -> dict[str, object]:
-    """The contract's keys, and warnings."""
-    return {
+    """The keys of a result; `warnings` only where there are any."""
+    told: dict[str, object] = {
         "stroke_m": found.strokes,
         "tip_rigid_m": found.tip_rigid,
         "tip_m": found.tip,
         "joint_rad": found.joints,
         "cylinder_force_N": found.cylinder_forces,
         "frequencies_Hz": found.frequencies,
-        "warnings": found.doubts,
     }
+    return told | {"warnings": found.doubts} if found.doubts else told
 
 
 def as_text(found: Equilibrium) -> list[str]:

@@ -48,6 +48,8 @@ def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> f
 
 Flags = NDArray[np.bool_]
 
+GIVE = math.radians(5.0)
+"""What an encoder may read beyond ``range_deg``, which is of the rigid boom: at its end a joint sags and swings on."""
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
 JUMP = 10.0  # likewise, by which readings change at once and for good
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
@@ -70,7 +72,7 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
     Parameters
     ----------
     scene : Scene
-        Strokes are from 0 to ``max_stroke``, angles as in ``range_deg``; others have no bounds.
+        Strokes are from 0 to ``max_stroke``, angles as in ``range_deg`` and `GIVE` beyond; others have no bounds.
     mounts : sequence of Mount or None
         Of the sensor of each joint; an inclinometer (not None) has no bounds either.
 
@@ -84,8 +86,9 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
     found[Stream.STROKES] = np.zeros(len(joints)), np.array([joint.cylinder.max_stroke for joint in joints])
     for i, (joint, mount) in enumerate(zip(joints, mounts, strict=True)):
         if mount is None:
-            for bound, degrees in zip(found[Stream.ANGLES], joint.range_deg, strict=True):
-                bound[i] = math.radians(degrees)
+            low, high = map(math.radians, joint.range_deg)
+            for bound, end in zip(found[Stream.ANGLES], (low - GIVE, high + GIVE), strict=True):
+                bound[i] = end
     return found
 
 

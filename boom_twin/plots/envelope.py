@@ -61,9 +61,19 @@ def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
         worst["lowest frequency"] = found.frequencies[:, 0].argmin()
     if np.isfinite(found.stresses).any():
         worst["largest stress"] = np.nan_to_num(found.stresses).max(axis=1).argmax()
-    for (name, row), colour in zip(worst.items(), (INK, BLUE, ORANGE), strict=False):
-        bones = skeleton(scene, np.diff(np.radians(found.angles[row]), prepend=0.0))
-        axes.plot(*bones.pivots.T, "o-", color=colour, linewidth=2.2, markersize=5, label=f"{name}: {found.posture(int(row))}")
+    names: dict[int, list[str]] = {}
+    for name, row in worst.items():
+        names.setdefault(int(row), []).append(name)
+    for (place, of), colour in zip(names.items(), (INK, BLUE, ORANGE), strict=False):
+        bones = skeleton(scene, np.diff(np.radians(found.angles[place]), prepend=0.0))
+        axes.plot(
+            *bones.pivots.T,
+            "o-",
+            color=colour,
+            linewidth=2.2,
+            markersize=5,
+            label=f"{' and '.join(of)}: {found.posture(place)}",
+        )
     draw_base(axes, np.array(scene.base.pivot), 0.035 * scene.reach)
     axes.set_xlabel("x forward, m")
     axes.set_ylabel("y up, m")

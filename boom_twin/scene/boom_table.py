@@ -132,6 +132,9 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
 
 def checked_table(document: Document, source: str) -> BoomTable:
     """The table that a document holds; SceneError with all its faults."""
+    if isinstance(document.values, dict) and "gravity" in document.values:
+        bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
+        raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
     read = validated(document, TABLE)
     faults = [*read.faults, *document.faults]
     if read.block is not None:
@@ -214,7 +217,7 @@ def csv_document(text: str, source: str) -> Document:
 
     A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
     name a unit: ``length [mm]``. Columns of the base and of the whole boom have one value, in the first row or the same in all;
-    a pipe in the first row alone is that of the whole boom.
+    a pipe in the first row alone is that of the whole boom. Without columns of the pivot, the pin of section 1 is the origin.
     """
     document = Document({"sections": [], "joints": [], "base": {}})
     try:
@@ -246,6 +249,7 @@ def csv_document(text: str, source: str) -> Document:
             elif cell.strip():
                 _put(document, place, _value(cell.strip(), column[3]), line)
                 document.cells[place] = f"{_letters(number)}{line}"
+    document.values["base"].setdefault("pivot", [0.0, 0.0])  # without such columns, the origin is there
     document.values = frozen(document.values)
     return document
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -108,13 +108,13 @@ def _text(folder: str, name: str) -> str:
     return (files("boom_twin") / folder / name).read_text(encoding="utf-8")
 
 
-def load_scene(source: str | Path | None = None) -> Scene:
+def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
     """A boom as its scene file describes it.
 
     Parameters
     ----------
-    source : str or Path, optional
-        A YAML file; without it, the package's default scene.
+    source : str, Path or dict, optional
+        A YAML file, or a dict with the keys of one; without it, the package's default scene.
 
     Returns
     -------
@@ -131,10 +131,16 @@ def load_scene(source: str | Path | None = None) -> Scene:
     SceneWarning
         One for each thing that can be computed but looks odd.
     """
-    scene, oddities = examine(source)
+    scene, oddities = _examine_values(source) if isinstance(source, Mapping) else examine(source)
     for oddity in oddities:
         warnings.warn(str(oddity), SceneWarning, stacklevel=2)
     return scene
+
+
+def _examine_values(values: Mapping[str, Any]) -> tuple[Scene, list[Fault]]:
+    from .edit import text_of  # which reads scenes itself
+
+    return examine_text(text_of(values), "mapping")
 
 
 def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:

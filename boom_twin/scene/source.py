@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import SceneWarning, UsageError
-from .edit import text_of
-from .load import examine_text, load_scene
+from ..errors import UsageError
+from .load import load_scene
 from .schema import Scene
 
 SceneSource = Scene | Mapping[str, Any] | str | Path | None
@@ -33,11 +31,6 @@ def as_scene(source: SceneSource) -> Scene:
     """
     if isinstance(source, Scene):
         return source
-    if isinstance(source, Mapping):
-        scene, oddities = examine_text(text_of(source), "mapping")
-        for oddity in oddities:
-            warnings.warn(str(oddity), SceneWarning, stacklevel=2)
-        return scene
-    if source is None or isinstance(source, str | Path):
+    if source is None or isinstance(source, str | Path | Mapping):
         return load_scene(source)
     raise UsageError(f"scene = {source!r}: give a Scene, the path of a scene file, a dict with its keys, or None.")

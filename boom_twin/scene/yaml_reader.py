@@ -240,7 +240,10 @@ def with_end_mark(text: str) -> str:
 
 
 def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
-    """What is wrong with the end of a scene file: a fault that stops, an oddity that only warns, or neither."""
+    """What is wrong with the end of a scene file: a fault that stops, an oddity that is only told, or neither.
+
+    Many files that were written by hand have no mark: it is a note, and a warning where not even the last line ends.
+    """
     lines = text.splitlines()
     number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
     last = lines[number - 1].strip() if number else ""
@@ -251,6 +254,7 @@ def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
         remedy = "Fetch the whole file; or, if nothing is missing, add that line."
         return Fault("end of the file", last, bound, remedy, number), None
     bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
-    if text and not text.endswith("\n"):
+    is_note = text.endswith("\n")
+    if not is_note:
         bound = f"no line `{MARK}`, and not even an end of line: it may have been cut off"
-    return None, Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number)
+    return None, Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, is_note)

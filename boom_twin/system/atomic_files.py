@@ -15,6 +15,9 @@ from ..errors import BagError, UsageError
 DRAFT = ".draft"
 """How the name of a file ends that is being written; it begins with a dot. A kill may leave one."""
 
+HEAD = 4096
+"""Bytes of a file by which an earlier result is known."""
+
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
 
@@ -56,7 +59,7 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
         raise BagError(f"{path}: {reason}") from error
 
 
-def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) -> None:
+def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[bytes], bool] | None = None) -> None:
     """Refuse to replace a file that is read, one of a recording, or one that another wrote; to be asked before the work begins.
 
     Parameters
@@ -65,8 +68,9 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) 
         If it is a symbolic link, its target is judged: that is what `write_atomic` replaces.
     sources : sequence of Path
         What is read.
-    own : bytes, optional
-        How an earlier result of the same command begins, which is replaced. None: any file is replaced.
+    own : bytes or callable, optional
+        How an earlier result of the same command begins, which is replaced, or whether what begins so (the first `HEAD` bytes)
+        is one. None: any file is replaced.
 
     Raises
     ------
@@ -84,8 +88,9 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | None = None) 
         raise UsageError(f"{path}: this is a file of a recording, and none is written over. Name another file.")
     if own is not None:
         with real.open("rb") as stream:
-            if stream.read(len(own)) not in (own, b""):
-                raise UsageError(f"{path}: is there already, and is no earlier result of this command. Name another file.")
+            start = stream.read(HEAD)
+        if start and not (start.startswith(own) if isinstance(own, bytes) else own(start)):
+            raise UsageError(f"{path}: is there already, and is no earlier result of this command. Name another file.")
 
 
 def check_new(path: Path, sources: Sequence[Path]) -> None:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from ..errors import BoomTwinError
 from ..types import Array
 
+LONGEST_LINE = 2**16
+"""Characters of a line that are read."""
+
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """The cells of a CSV file below its header.
+    """The cells of a CSV file below its header, or of some of its rows.
 
     Attributes
     ----------
@@ -67,17 +72,41 @@ class CsvTable:
 
 def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     """The table in a file; `error` if the file cannot be read or has no row below its header."""
+    pieces = list(read_csv_pieces(path, error))
+    rows, lines = [row for piece in pieces for row in piece.rows], [line for piece in pieces for line in piece.lines]
+    return CsvTable(path, pieces[0].names, rows, lines, error)
+
+
+def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096) -> Iterator[CsvTable]:
+    """The table in a file, up to `together` of its rows at a time, so that a file of any size takes little memory.
+
+    Raises
+    ------
+    BoomTwinError
+        As `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
+    """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            found = [(reader.line_num, row) for row in reader if row]
+            reader = csv.reader(_lines(file))
+            found = ((reader.line_num, row) for row in reader if row)
+            _, header = next(found, (1, []))
+            names, some = [name.strip() for name in header], list(islice(found, together))
+            if header and not some:
+                raise error(f"{path}: no rows below the header. Give at least one.")
+            yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
+            while some := list(islice(found, together)):
+                yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
     except (OSError, UnicodeDecodeError, csv.Error) as reason:
         raise error(f"{path}: {getattr(reason, 'strerror', None) or reason}. Give a CSV file.") from None
-    (_, header), *rows = found or [(1, [])]
-    table = CsvTable(path, [name.strip() for name in header], [row for _, row in rows], [line for line, _ in rows], error)
-    if header and not rows:
-        raise error(f"{path}: no rows below the header. Give at least one.")
-    return table
+
+
+def _lines(file: TextIO) -> Iterator[str]:
+    number = 0
+    while line := file.readline(LONGEST_LINE):
+        number += 1
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            raise csv.Error(f"line {number} is longer than {LONGEST_LINE} characters")
+        yield line
 
 
 def columns_text(columns: Mapping[str, Array]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import sqlite3
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -147,6 +148,42 @@ def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path,
     with pytest.raises(BagError, match=r"s\.csv") as error:
         scan(file)
     assert words in str(error.value) and file.read_text() == text
+
+
+def long_csv(file: Path, rows: int) -> Path:
+    file.write_text("t_s,stroke_1_m,joint_1_rad\n" + "".join(f"{5 + 0.005 * k:.3f},0.{k % 997:03d},0.1\n" for k in range(rows)))
+    return file
+
+
+def test_a_csv_takes_as_little_memory_as_one_stretch_of_it(tmp_path: Path) -> None:
+    """So days of data may come as CSV."""
+    file = long_csv(tmp_path / "s.csv", 40_000)
+    scan(long_csv(tmp_path / "short.csv", 10))
+    tracemalloc.start()
+    session = scan(file)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 12e6, "all rows at once take more"
+    assert [topic.count for topic in session.topics] == [40_000, 40_000]
+    assert (session.start, session.end) == (5_000_000_000, 204_995_000_000)
+
+
+@pytest.mark.parametrize(
+    ("row", "time", "told"), [(4097, "5", "is not after the row before"), (9000, "x", "is not a time in s")]
+)
+def test_a_row_far_down_a_csv_is_refused_by_its_line(tmp_path: Path, row: int, time: str, told: str) -> None:
+    file = long_csv(tmp_path / "s.csv", 9_500)
+    lines = file.read_text().splitlines()
+    lines[row] = time + lines[row][lines[row].index(",") :]
+    file.write_text("\n".join(lines))
+    with pytest.raises(BagError, match=rf"line {row + 1}: t_s = '?{time}'? {told}"):
+        scan(file)
+
+
+def test_a_csv_without_ends_of_lines_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "s.csv").write_text("1," * 100_000)
+    with pytest.raises(BagError, match="line 1 is longer than 65536 characters"):
+        scan(tmp_path / "s.csv")
 
 
 @pytest.mark.parametrize("kind", ["db3 file", "ros1"])

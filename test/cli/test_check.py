@@ -43,7 +43,25 @@ def test_check_takes_a_file_and_prints_its_warnings(tmp_path: Path, capsys: pyte
     assert main(["check", path]) == 0
     out = capsys.readouterr().out
     assert out.startswith(f"{path}: this scene can be used")
-    assert "Warnings: 1\n" in out and "joints[0].cylinder.k = 40.0: less than 1e4 N/m: kN/mm?" in out
+    assert "Warnings: 1\n" in out and "joints[0].cylinder.k = 40.0: expected from 1e6 to 1e9 N/m: kN/mm?" in out
+
+
+@pytest.mark.parametrize(("end", "code"), [("\n", 0), ("", 1)], ids=["whole line", "cut line"])
+def test_a_scene_without_end_mark_is_noted_and_strict_lets_it_pass(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], end: str, code: int
+) -> None:
+    """As a scene that was written by hand; but not where even the end of the last line is missing."""
+    path = tmp_path / "scene.yaml"
+    kept = [line for line in default_text().splitlines() if "end of scene" not in line]
+    path.write_text("\n".join(kept).rstrip() + end, encoding="utf-8")
+    assert main(["check", str(path), "--strict"]) == code
+    out, err = capsys.readouterr()
+    assert ("Note: line" in out and "Warnings: none" in out) if code == 0 else "it may have been cut off" in err
+    assert main(["check", str(path), "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert [len(values[key]) for key in ("notes", "warnings")] == [1 - code, code]
+    assert main(["statics", str(path), "--posture", "arch"]) == 0
+    assert capsys.readouterr().err.startswith(f"{'warning' if code else 'note'}: {path}: line ")
 
 
 def test_the_z_fold_example_is_printed_and_checks_without_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

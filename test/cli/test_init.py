@@ -10,6 +10,7 @@ import pytest
 
 from boom_twin.cli.main import main
 from boom_twin.scene import load_scene
+from boom_twin.scene.load import default_text
 
 ANSWERS = """Small boom
 0, 0
@@ -69,11 +70,12 @@ def test_nothing_is_written_over(capsys: pytest.CaptureFixture[str]) -> None:
     main(["init", "--example-table"])
     Path("table.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
     assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 1
-    assert "is not written over" in capsys.readouterr().err
+    assert "boom.yaml: is there already. Name another file, or give --force to replace it." in capsys.readouterr().err
     assert main(["init", "--table", "table.yaml", "--out", "table.yaml"]) == 1
     assert Path("boom.yaml").read_text(encoding="utf-8") == "mine"
-    assert main(["init", "--table", "table.yaml"]) == 1
-    assert "--out is absent" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        main(["init", "--table", "table.yaml"])
+    assert ended.value.code == 2 and "one of the arguments --out --example-table is required" in capsys.readouterr().err
 
 
 def test_links_that_cannot_meet_end_with_exit_code_1_and_no_scene(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
@@ -144,6 +146,41 @@ def test_a_table_as_spreadsheets_write_it(name: str, mark: str) -> None:
     Path(name).write_text("\n".join(rows), encoding="utf-8-sig")
     assert main(["init", "--table", name, "--out", "boom.yaml"]) == 0
     assert load_scene("boom.yaml").sections[0].length == 8.3
+
+
+def test_a_table_without_columns_of_the_pivot_has_it_in_the_origin(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = {name: value for name, value in COLUMNS.items() if not name.startswith("pivot")}
+    Path("table.csv").write_text(f"{','.join(columns)}\n{','.join(map(str, columns.values()))}\n", encoding="utf-8")
+    assert main(["init", "--table", "table.csv", "--out", "boom.yaml"]) == 0
+    assert load_scene("boom.yaml").base.pivot == (0.0, 0.0)
+    assert "boom.yaml, 1 section, 8.30 m" in capsys.readouterr().out
+
+
+def test_a_scene_in_place_of_a_table_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("scene.yaml").write_text(default_text(), encoding="utf-8")
+    assert main(["init", "--table", "scene.yaml", "--out", "boom.yaml"]) == 1
+    err = capsys.readouterr().err
+    assert "1 fault" in err and "gravity = [0.0, -9.81]: only a scene has it" in err
+
+
+SLIPS = {
+    "a line in litres": ("rod: 125 mm}", "rod: 125 mm, cap_line: 0.5}", "joints[0].cap_line", "at most"),
+    "a rod as radius": ("bore: 140 mm, rod: 90 mm", "bore: 140 mm, rod: 45 mm", "joints[2].rod", "not one as a radius"),
+    "links in N": ("mL: 30 kg, mR: 22 kg", "mL: 300, mR: 22 kg", "joints[2].mL", "not N"),
+    "aluminium with the density of steel": ("E: 210 GPa", "E: 70 GPa", "material.E", "with the density of steel"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_in_a_table_is_warned_of_at_its_key(slip: str, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new, key, told = SLIPS[slip]
+    main(["init", "--example-table"])
+    table = capsys.readouterr().out
+    assert table.count(old) == 1
+    Path("table.yaml").write_text(table.replace(old, new), encoding="utf-8")
+    assert main(["init", "--table", "table.yaml", "--out", "boom.yaml"]) == 0
+    warnings = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: table.yaml: line ")]
+    assert len(warnings) == 1 and f": {key} = " in warnings[0] and told in warnings[0], warnings
 
 
 @pytest.mark.parametrize(

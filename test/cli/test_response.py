@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from oracle import booms
 
 from boom_twin import frequency_response, load_scene
@@ -132,7 +131,7 @@ def test_without_damping_no_amplitude_is_made_up_at_a_resonance(capsys: Capture,
         joint["cylinder"].pop("d")
     for section in spec["sections"]:
         section.pop("beta", None)
-    (tmp_path / "undamped.yaml").write_text(yaml.safe_dump(spec))
+    (tmp_path / "undamped.yaml").write_text(json.dumps(spec))
     assert main(["response", str(tmp_path / "undamped.yaml"), "--posture", "arch", "--points", "5", "--to", "3", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert len(found["frequency_Hz"]) == 5 and len(found["natural_frequencies_Hz"]) == 2
@@ -149,7 +148,7 @@ def test_a_boom_that_does_not_give_has_no_rates_to_avoid(capsys: Capture, tmp_pa
     for section in spec["sections"]:
         for key in ("beam", "A", "I", "beta", "head", "rho_A", "rho_I"):
             section.pop(key)
-    (tmp_path / "rigid.yaml").write_text(yaml.safe_dump(spec))
+    (tmp_path / "rigid.yaml").write_text(json.dumps(spec))
     found = answer(capsys, str(tmp_path / "rigid.yaml"), "--map", "arch", "--pump", "0.4:100", "--rates", "0.2:0.6:9")
     assert max(found["swing_m"][0]) < 1e-9 and found["avoid_posture"] == []
 

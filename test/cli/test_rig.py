@@ -118,6 +118,12 @@ def test_what_cannot_be_is_told_before_anything_is_simulated(
     assert told in capsys.readouterr().err and not (tmp_path / "none").exists()
 
 
+def test_a_duration_is_above_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["rig", "--out", str(tmp_path / "none"), "--duration", "-1"])
+    assert ended.value.code == 2 and "argument --duration: -1: must be >= 0" in capsys.readouterr().err
+
+
 def test_a_bad_fault_is_told_before_anything_is_simulated(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene
+from boom_twin import load_scene, simulate
 from boom_twin.cli.main import main
 from boom_twin.cli.simulate import odd_in_drive
+from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
 
 TIMES = np.arange(0.0, 2.0, 0.01)
@@ -38,3 +39,35 @@ def test_simulate_says_it_first(tmp_path: Path, capsys: pytest.CaptureFixture[st
     drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n{rows}\n", encoding="utf-8")
     assert main(["simulate", "--drive", str(drive), "--out", str(tmp_path / "out.csv"), "--no-error-estimate"]) == 0
     assert f"warning: {drive}: line 12: stroke_1_m goes " in capsys.readouterr().err
+
+
+def test_results_of_another_boom_are_replaced_and_no_drive_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, drive = tmp_path / "out.csv", tmp_path / "drive.csv"
+    drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n0,{','.join(map(str, STROKES[0]))}\n")
+    command = ["simulate", "--drive", str(drive), "--out", str(out)]
+    out.write_text("t_s,stroke_1_m,joint_1_rad,tip_x_m,tip_y_m\n0,0.1,0,1,1\n")
+    assert main(command) == 0 and len(out.read_text().splitlines()) == 2
+    for other in ("t_s,stroke_1_m,joint_1_rad\n0,0.1,0\n", "t_s,stroke_1_m,tip_x_m,measured_joint_1_rad\n0,0.1,0,0\n"):
+        out.write_text(other)
+        assert main(command) == 1 and out.read_text() == other
+        assert "is no earlier result of this command" in capsys.readouterr().err
+
+
+def test_a_stroke_out_of_reach_is_told_with_its_row() -> None:
+    with pytest.raises(UsageError, match=r"stroke_2 = 0\.5 m in row 3 of the drive: cylinder 2 travels 0 to 0\.42 m"):
+        simulate(None, [0.0, 0.1, 0.2], [[0.63, 0.16, 0.23, 0.18]] * 2 + [[0.63, 0.5, 0.23, 0.18]])
+
+
+def test_numerical_damping_is_an_option_as_a_ringing_motion_is_told_to_take(tmp_path: Path) -> None:
+    drive, jump = tmp_path / "drive.csv", STROKES[:20].copy()
+    jump[10:, 0] += 0.002
+    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([TIMES[:20], jump]).tolist())
+    drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n{rows}\n", encoding="utf-8")
+    tables = []
+    for rho in ([], ["--rho", "0.8"], ["--rho", "0.1"]):
+        out = tmp_path / f"out{len(tables)}.csv"
+        assert main(["simulate", "--drive", str(drive), "--out", str(out), "--no-error-estimate", *rho]) == 0
+        tables.append(out.read_text())
+    assert tables[0] == tables[1] != tables[2]
+    with pytest.raises(SystemExit):
+        main(["simulate", "--drive", str(drive), "--out", str(tmp_path / "out.csv"), "--rho", "1.1"])

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from boom_twin.cli.examples import EXAMPLES
-from boom_twin.cli.main import main
+from boom_twin.cli.main import COMMANDS, main
+from boom_twin.cli.replay import flat
 from boom_twin.offline.progress import TenthLines
 from boom_twin.scene.load import default_text
 
@@ -130,3 +131,42 @@ def test_a_refused_stroke_is_told_with_its_likely_unit(tmp_path: Path, capsys: p
     told = capsys.readouterr().err
     assert "first refused value: cylinder_1 = 630 m, its travel is 0 to 0.79 m. With the unit `mm` it would fit" in told
     assert "replay: 100 %, 30 of 30 messages" in told
+
+
+def test_every_command_is_helped_in_its_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    out = capsys.readouterr().out
+    assert all(
+        any(line.split()[:2] == [name, purpose.split()[0]] for line in out.splitlines()) for name, purpose in COMMANDS.items()
+    )
+
+
+@pytest.mark.parametrize("where", [["--posture", "arch"], [f"--strokes={STROKES}"]])
+def test_statics_as_json_has_the_keys_of_the_reference(capsys: pytest.CaptureFixture[str], where: list[str]) -> None:
+    assert main(["statics", *where, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["stroke_m", "tip_rigid_m", "tip_m", "joint_rad", "cylinder_force_N", "frequencies_Hz"]
+
+
+def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
+    alarm = {
+        "channel": "joint_2",
+        "kind": "residual",
+        "from_s": 4.0,
+        "to_s": None,
+        "cause": "cylinder_2.k",
+        "told": "",
+        "ranked": [],
+    }
+    found = flat({"samples": 3, "events": {"not followed": 2}, "alarms": [alarm, {**alarm, "channel": "joint_3"}]})
+    assert found == {
+        "samples": 3, "events_not_followed": 2, "alarm_channel": ["joint_2", "joint_3"], "alarm_kind": ["residual"] * 2,
+        "alarm_from_s": [4.0] * 2, "alarm_to_s": [None] * 2, "alarm_cause": ["cylinder_2.k"] * 2,
+    }  # fmt: skip
+
+
+def test_what_is_no_session_is_told_with_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.yaml").write_text(default_text())
+    assert main(["info", str(tmp_path / "scene.yaml")]) == 1
+    assert "a file that ends with .mcap, .db3, .bag or .csv" in capsys.readouterr().err

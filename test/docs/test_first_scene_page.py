@@ -10,6 +10,7 @@ import pytest
 from boom_twin.cli.main import main
 
 PAGE = (Path(__file__).parents[2] / "docs" / "your_boom_init.md").read_text(encoding="utf-8")
+EXAMPLES = Path(__file__).parents[2] / "examples"
 QUOTES = re.findall(r"```text\n(.*?)\n```", PAGE, re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
@@ -69,6 +70,25 @@ def test_check_and_statics_print_what_is_quoted(table: Path, capsys: pytest.Capt
     printed = capsys.readouterr().out
     assert printed.startswith(quoted(command).removesuffix("..")) and "Warnings: none" in printed
     command = "boom_twin statics my_boom.yaml --posture stretched"
+    assert main(command.split()[1:]) == 0
+    agrees(capsys.readouterr().out, quoted(command))
+
+
+def test_the_fourth_boom_is_as_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (EXAMPLES / "zr_fold_20m_table.yaml").read_text(encoding="utf-8")
+    assert "boom_twin init --table examples/zr_fold_20m_table.yaml --out zr_fold.yaml" in PAGE
+    table = tmp_path / "zr_fold_table.yaml"
+    table.write_text(text.replace("[-174, 0]", "[-180, 0]"), encoding="utf-8")
+    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml"]) == 0
+    assert capsys.readouterr().err.strip() in QUOTES
+    table.write_text(text, encoding="utf-8")
+    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml", "--force"]) == 0
+    assert main(["check", "zr_fold.yaml", "--strict"]) == 0
+    capsys.readouterr()
+    command = "boom_twin statics zr_fold.yaml --posture stretched"
     assert main(command.split()[1:]) == 0
     agrees(capsys.readouterr().out, quoted(command))
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
-from boom_twin.health.sensor_monitor import SensorCheck, repeats
+from boom_twin import Stream as Channels
+from boom_twin import load_scene, statics
+from boom_twin.errors import SceneWarning
+from boom_twin.health.sensor_monitor import SensorCheck, repeats, sensor_ranges
+from boom_twin.scene.load import default_text
 
 SIGMA, RESOLUTION, PERIOD, ROWS = 1.745e-4, 8.727e-5, 0.005, 20
 LOW, HIGH = np.full(4, -1.0), np.full(4, 1.0)
@@ -209,3 +214,15 @@ def test_patience_follows_from_rounding_over_noise():
     read = np.round(rng.normal(0.0, SIGMA, 10**6) / RESOLUTION)
     change = np.flatnonzero(np.diff(read))
     assert np.diff(change).max() < repeats(SIGMA, RESOLUTION), "the longest run of a million clean readings is shorter"
+
+
+def test_an_encoder_at_the_end_of_its_range_may_read_the_sag_beyond_it():
+    """Joint 2 of the default boom stretched out, if it turned upwards only: it sags to -0.92 degrees, and is no fault."""
+    boom = YAML(typ="safe", pure=True).load(default_text())
+    boom["joints"][1]["range_deg"], boom["postures"] = [0.0, 10.0], {"horizontal": [0, 0, 0, 0]}
+    with pytest.warns(SceneWarning, match="expected at least 25 deg"):
+        scene = load_scene(boom)
+    low, high = sensor_ranges(scene, [None] * 4)[Channels.ANGLES]
+    sag = statics(scene, "horizontal").joints[1]
+    assert sag < -0.016 and low[1] < 2.0 * sag, "swinging it goes as far again"
+    assert high[1] == pytest.approx(np.radians(15.0))

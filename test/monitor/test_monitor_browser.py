@@ -246,6 +246,13 @@ def test_a_chart_is_zoomed_by_dragging_and_all_with_it(page: Any) -> None:
     wait(page, "twin.view.zoom === null")
 
 
+def test_times_next_to_nothing_have_no_minus(page: Any) -> None:
+    fixed = (
+        "import('/page/html_table.js').then(m => [[-0.003, 1], [-0.003, 2], [-0.06, 1], [0, 2]].map(each => m.fixed(...each)))"
+    )
+    assert page.evaluate(fixed) == ["0.0", "0.00", "-0.1", "0.00"]
+
+
 def test_missing_rows_are_a_break_in_the_line(page: Any) -> None:
     go(page, 35.0)
     rows = "m.decimate(twin.connection.table('displacement'), [0, 1], 29, 32, 2000)"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 import boom_twin.plots.envelope as drawing
 from boom_twin.analysis.envelope import Envelope
@@ -63,3 +64,25 @@ def test_words_fit_beside_their_bars_and_the_legend_covers_nothing(tmp_path: Pat
 
 def test_an_angle_next_to_zero_has_no_minus() -> None:
     assert envelope_of(load_scene()).posture(0) == "[0, 0, 0, 0]"
+
+
+def test_a_posture_that_is_worst_in_two_ways_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the second line hides the first."""
+    labels: list[str] = []
+    plot = Axes.plot
+
+    def kept(axes: Any, *args: Any, **options: Any) -> Any:
+        labels.append(options.get("label", ""))
+        return plot(axes, *args, **options)
+
+    monkeypatch.setattr(Axes, "plot", kept)
+    scene = load_scene()
+    found = envelope_of(scene)
+    found.frequencies[found.deflections.argmax(), 0] = 0.1
+    drawing.envelope_picture(tmp_path / "envelope.png", scene, found, [])
+    rows = found.deflections.argmax(), found.stresses.max(axis=1).argmax()
+    words = [
+        f"{of}: {found.posture(int(row))}"
+        for of, row in zip(("largest deflection and lowest frequency", "largest stress"), rows, strict=True)
+    ]
+    assert [label for label in labels if ":" in label] == words

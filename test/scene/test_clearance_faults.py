@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from boom_twin.scene.load import clearance_text
+
 PIN = {"at": "cylinder_1.rod", "pin_radius": 0.03, "radial_clearance": 1e-4}
 FORM = ("not the name of a pin", "cylinder_i. with rod or barrel", "pivot, link_L, link_R or Q")
 
@@ -78,3 +80,8 @@ def test_a_law_that_does_not_keep_its_restitution_is_odd(bench: Any, law: str, a
 def test_a_clearance_wide_for_its_pin_is_odd(bench: Any) -> None:
     (fault,) = bench.oddities(lambda values: values.update(clearance=pin(radial_clearance=0.004)))
     assert fault.path == "clearance.pins[0].radial_clearance" and "more than a tenth of pin_radius" in fault.bound
+
+
+def test_a_block_without_a_boom_is_no_fault_of_its_pins(bench: Any) -> None:
+    faults = bench.faults_of(bench.text(clearance_text() + "\n"))
+    assert {fault.path for fault in faults} == {"gravity", "material", "base", "sections", "joints"}

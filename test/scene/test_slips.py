@@ -30,7 +30,9 @@ def j(i: int, *rest: str | int) -> Place:
 
 SLIPS: dict[str, tuple[Place, Any, str, tuple[str, ...]]] = {
     "k in kN/m": (j(0, "cylinder", "k"), 40e3, "joints[0].cylinder.k", ("kN/m?", "4e+07")),
-    "k of the last cylinder in kN/m": (j(3, "cylinder", "k"), 6e3, "joints[3].cylinder.k", ("kN/mm?",)),
+    "k of the last cylinder in kN/m": (j(3, "cylinder", "k"), 6e3, "joints[3].cylinder.k", ("kN/m?", "6e+06")),
+    "k in kN/mm": (j(3, "cylinder", "k"), 6.0, "joints[3].cylinder.k", ("kN/mm?", "6e+06")),
+    "k ten times too large": (j(0, "cylinder", "k"), 4e8, "joints[0].cylinder.k", ("a bore of 0.26 m", "at most 0.16 m")),
     "k ten times too small": (j(1, "cylinder", "k"), 3.0e6, "joints[1].cylinder.k", ("gives way by", "2 % of its stroke")),
     "k in N/m times a thousand": (j(2, "cylinder", "k"), 2e10, "joints[2].cylinder.k", ("expected from 1e6 to 1e9",)),
     "d in kN s/m": (j(0, "cylinder", "d"), 120.0, "joints[0].cylinder.d", ("would damp a mode of",)),
@@ -52,6 +54,7 @@ SLIPS: dict[str, tuple[Place, Any, str, tuple[str, ...]]] = {
     "mass of a root in t": (s(0, "root", "mass"), 0.036, "sections[0].root.mass", ("not tonnes",)),
     "mass of a head in g": (s(1, "head", "mass"), 13000.0, "sections[1].head.mass", ("not grams",)),
     "mass of a link in g": (j(1, "mL"), 4000.0, "joints[1].mL", ("not grams",)),
+    "mass of a link in N": (j(1, "mL"), 40.0, "joints[1].mL", ("26 kg", "not N")),
     "mass of a barrel in t": (j(1, "cylinder", "barrel", "mass"), 0.016, "joints[1].cylinder.barrel.inertia", ("gyration",)),
     "centre of a rod from the other pin": (j(2, "cylinder", "rod", "com"), 1.0, "joints[2].cylinder.rod.com", ("rod pin",)),
     "beam end as length": (s(0, "beam"), [0.6, 3.0], "sections[0].beam", ("length of the beam, then x1 = 3.6",)),
@@ -61,6 +64,11 @@ SLIPS: dict[str, tuple[Place, Any, str, tuple[str, ...]]] = {
     "inclination in degrees": (("base", "inclination"), 3.0, "base.inclination", ("degrees?",)),
     "inclination of half a radian": (("base", "inclination"), 0.25, "base.inclination", ("0.2 rad",)),
     "E of another power": (("material", "E"), 2.06e10, "material.E", ("expected from 6.3e+10",)),
+    "E of aluminium": (("material", "E"), 7e10, "material.E", ("1.7e+11 to 2.3e+11", "density of steel")),
+    "rho in g/cm^3": (("material", "rho"), 7.85, "material.rho", ("g/cm^3", "7850")),
+    "rho in kN/m^3": (("material", "rho"), 77.0, "material.E", ("with a density of 77",)),
+    "a centre in mm": (s(0, "root", "com"), [300.0, 0.0], "sections[0].root.com", ("mm?",)),
+    "a length in mm": (s(0, "length"), 3860.0, "sections[0].length", ("mm?",)),
     "concrete as a whole": (("line_fill",), 400.0, "line_fill", ("whole load",)),
     "open length as stroke": (j(1, "cylinder", "max_stroke"), 1.13, "joints[1].cylinder.max_stroke", ("not the open length",)),
     "payload in g": (("tip",), {"payload": 40e3}, "tip.payload", ("half of what the boom weighs",)),
@@ -137,6 +145,33 @@ def test_a_rod_is_as_far_from_the_pins_as_the_skeleton_says() -> None:
         stations = pins.barrel_pin + np.linspace(0.0, 1.0, 20001)[:, None] * (pins.rod_pin - pins.barrel_pin)
         for name, pin in (("the pivot", pins.pivot), ("D", pins.d), ("E", pins.e), ("Q", pins.q)):
             assert passed[name].distance[k] == pytest.approx(np.hypot(*(stations - pin).T).min(), abs=1e-6)
+
+
+OIL = {
+    "a rod as radius": ("rod", 0.07, "not one as a radius"),
+    "a line in litres": ("cap_line", 0.5, "twice what the chamber takes"),
+    "a line in ml": ("rod_line", 500.0, "litres?"),
+}
+
+
+@pytest.mark.parametrize("slip", OIL)
+def test_slips_in_the_oil_are_warned_of(slip: str) -> None:
+    key, value, told = OIL[slip]
+    values = YAML(typ="safe", pure=True).load(example_text("five_section_z_fold"))
+    values["joints"][1]["cylinder"]["oil"][key] = value
+    (found,) = examine_text(text_of(values), "scene")[1]
+    assert found.path == f"joints[1].cylinder.oil.{key}" and told in str(found)
+
+
+def test_incompressible_cylinders_are_not_called_too_stiff(bench: Any) -> None:
+    """What is left out of the model is no slip."""
+
+    def edit(values: Any) -> None:
+        for joint, section in zip(values["joints"], values["sections"], strict=True):
+            del joint["cylinder"]["k"], joint["cylinder"]["d"]
+            section["modes"] = 3 if section is values["sections"][3] else 0
+
+    assert [str(oddity) for oddity in bench.oddities(edit)] == []
 
 
 def test_sound_scenes_have_no_warning() -> None:

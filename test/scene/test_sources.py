@@ -19,7 +19,7 @@ DOCUMENT: dict[str, Any] = YAML(typ="safe").load(default_text())
 def test_a_path_a_dict_and_nothing_are_scenes(tmp_path: Path) -> None:
     path = tmp_path / "boom.yaml"
     path.write_text(default_text())
-    found = [statics(source, "arch").tip for source in (path, str(path), DOCUMENT, None, load_scene())]
+    found = [statics(source, "arch").tip for source in (path, str(path), DOCUMENT, None, load_scene(DOCUMENT))]
     assert all(np.array_equal(tip, found[0]) for tip in found)
     assert Twin(str(path)).scene == Twin(DOCUMENT).scene == load_scene()
     rest = statics(DOCUMENT, "arch")

@@ -11,6 +11,11 @@ export class HtmlTable {
 }
 
 // Three or four digits of a number, – where it is not known.
+export function fixed(number, digits) { // without the sign of what is rounded to nothing
+  const text = number.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text;
+}
+
 export function formatNumber(cell) {
   if (typeof cell === "string") return escapeHtml(cell);
   if (!Number.isFinite(cell)) return "–";

@@ -1,6 +1,6 @@
 // The first glance: how everything is, and each group; then every lamp and alarm in tables.
 
-import { escapeHtml, formatNumber } from "./html_table.js";
+import { escapeHtml, fixed, formatNumber } from "./html_table.js";
 
 export const SIGNS = { OK: "✔", WARN: "▲", ERROR: "✖", STALE: "◌", OFF: "–" };
 const OVERALL = { OK: "ALL WELL", WARN: "WARNING", ERROR: "FAULT", STALE: "STALE" };
@@ -76,7 +76,7 @@ export class Lamps {
     const table = document.getElementById("alarms");
     table.innerHTML = `<caption>alarms: ${alarms.length || "none"}</caption>` + (alarms.length ? "<tr><th>of<th class=text>level<th class=text>reason<th class=text>cause<th>from, s<th>to, s<th></tr>" : "") +
       alarms.slice(-50).reverse().map(alarm => `<tr><td>${escapeHtml(alarm.name)}<td class=text data-level=${alarm.level}>${SIGNS[alarm.level]} ${alarm.level}<td class=text>${escapeHtml(alarm.reason)}` +
-        `<td class=text>${alarm.causes.map(([cause, share]) => escapeHtml(cause) + (share === null ? "" : ` ${(100 * share).toFixed(0)} %`)).join(", ")}<td>${alarm.begin.toFixed(2)}<td>${alarm.end === null ? "lasts" : alarm.end.toFixed(2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
+        `<td class=text>${alarm.causes.map(([cause, share]) => escapeHtml(cause) + (share === null ? "" : ` ${(100 * share).toFixed(0)} %`)).join(", ")}<td>${fixed(alarm.begin, 2)}<td>${alarm.end === null ? "lasts" : fixed(alarm.end, 2)}<td>${alarm.is_acknowledged ? "acknowledged" : `<button data-number=${alarm.number}>Acknowledge</button>`}</tr>`).join("");
   }
 }
 

@@ -3,7 +3,7 @@
 import { Chart } from "./chart.js";
 import { themeColour } from "./colours.js";
 import { RANKS, SIGNS } from "./lamps.js";
-import { escapeHtml } from "./html_table.js";
+import { escapeHtml, fixed } from "./html_table.js";
 import uPlot from "/page/uplot.js";
 import { decimate, statistics } from "./decimation.js";
 
@@ -142,7 +142,7 @@ export class Traces {
   // In words, the worst first.
   listAlarms(from, to) {
     const words = this.alarmsBetween(from, to).reverse().map(({ name, reason, level, begin, end }) =>
-      `<span data-level=${level}>${SIGNS[level]} ${escapeHtml(name)}</span>: ${escapeHtml(reason)}, ${end === null ? `since ${begin.toFixed(1)} s` : `${begin.toFixed(1)} to ${end.toFixed(1)} s`}`);
+      `<span data-level=${level}>${SIGNS[level]} ${escapeHtml(name)}</span>: ${escapeHtml(reason)}, ${end === null ? `since ${fixed(begin, 1)} s` : `${fixed(begin, 1)} to ${fixed(end, 1)} s`}`);
     document.getElementById("during").innerHTML = words.join(" &nbsp; ");
   }
 

@@ -22,7 +22,7 @@ def pins(draft: Draft) -> Iterator[Finding]:
     for i, pin in enumerate(draft.clearance.pins):
         place = ("clearance", "pins", i)
         there = [name for k, joint in enumerate(draft.joints) if joint is not None for name in names_of(k, joint)]
-        if pin.at not in there and None not in draft.joints:
+        if there and pin.at not in there and None not in draft.joints:
             yield fault(draft, (*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
         if pin.at in seen:
             bound = f"clearance.pins[{seen[pin.at]}] is this pin already"

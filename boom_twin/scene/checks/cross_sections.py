@@ -19,13 +19,16 @@ LEAST_BEAM = 0.6  # of the length
 LONGEST_HEAD = 0.125  # of the length
 DEEP, WALL = 2.4, 20.7  # a thin box is DEEP radii of gyration high, and its wall is A^2/(I WALL) of that
 STEEL, STEEL_E = 7850.0, (1.9e11, 2.2e11)
+STEEL_RHO, OF_STEEL = (7700.0, 8000.0), (1.7e11, 2.3e11)  # densities that only steel has, and its E with a wide margin
 SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2.6e7, carbon fibre 9e7
 
 
 def density(scene: Scene) -> float | None:
-    """Of the material, kg/m^3; of steel where none is given and E is that of steel."""
-    known = scene.material.rho
-    return STEEL if known is None and STEEL_E[0] <= scene.material.E <= STEEL_E[1] else known
+    """Of the material, kg/m^3; of steel where none is given and E is that of steel. None where it does not fit E."""
+    known, stiffness = scene.material.rho, scene.material.E
+    if known is None:
+        return STEEL if _between(stiffness, STEEL_E, 1.0) else None
+    return known if _between(stiffness, SPECIFIC_STIFFNESS, known) else None
 
 
 def gyration(section: Section) -> float | None:
@@ -40,6 +43,9 @@ def material(draft: Draft, scene: Scene) -> Iterator[Finding]:
         low, high = (limit * rho for limit in SPECIFIC_STIFFNESS)
         bound = f"expected from {low:.2g} to {high:.2g} Pa with a density of {rho:g} kg/m^3"
         yield warning(draft, ("material", "E"), scene.material.E, bound, "Steel has 2.06e11 Pa and 7850 kg/m^3.")
+    elif rho is not None and _between(rho, STEEL_RHO, 1.0) and not _between(scene.material.E, OF_STEEL, 1.0):
+        bound = f"expected from {OF_STEEL[0]:.2g} to {OF_STEEL[1]:.2g} Pa with the density of steel, {rho:g} kg/m^3"
+        yield warning(draft, ("material", "E"), scene.material.E, bound, "Check E, or give the density of this material.")
 
 
 def beams(draft: Draft, scene: Scene) -> Iterator[Finding]:

@@ -14,12 +14,13 @@ OVERHANG = 0.05  # of the section's length, that a rigid part may reach beyond t
 BESIDE = 2.0  # depths of the section, that a centre may lie beside its axis
 LARGEST_GYRATION = 0.6  # of the size of a part
 LEAST_SHARE, LONG_PART = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
-ROD_BY_BEAM = (0.01, 10.0)  # mass per metre of links, barrels and rods against that of the section
+ROD_BY_BEAM = (0.01, 10.0)  # mass per metre of barrels and rods against that of the section
+LINK_BY_BEAM = (0.01, 1.5)  # likewise of links
 CYLINDER_GYRATION = (0.05, 0.5)  # of the closed length; a uniform rod has 0.29
 CYLINDER_CENTRE = 0.8  # of the closed length
 LONGEST_STROKE = 0.95  # of the closed length
 LONGEST_CYLINDER = 0.5  # of the section that it lies along: closed length
-LEAST_LINE = 1e-3  # oil between piston and valve, of what the chamber takes
+LINE = (1e-3, 2.0)  # oil between piston and valve, of what the chamber takes
 
 
 def rigid_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
@@ -73,7 +74,7 @@ def moving_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
         for key, length in (("mL", joint.lL), ("mR", joint.lR)):
             mass = getattr(joint, key)
             if mass and length:
-                yield from _rod_mass(draft, ("joints", i, key), mass, length, per_metre)
+                yield from _rod_mass(draft, ("joints", i, key), mass, length, per_metre, LINK_BY_BEAM)
         yield from _cylinder(draft, i, joint, per_metre)
         yield from _cylinder_size(draft, i, joint.cylinder, scene.sections[max(0, i - 1)].length)
 
@@ -83,11 +84,13 @@ def _mass_per_metre(section: Section) -> float:
     return section.rho_A if section.rho_A is not None else root / section.length
 
 
-def _rod_mass(draft: Draft, place: Place, mass: float, length: float, per_metre: float) -> Iterator[Finding]:
-    low, high = (limit * per_metre * length for limit in ROD_BY_BEAM)
+def _rod_mass(
+    draft: Draft, place: Place, mass: float, length: float, per_metre: float, limits: tuple[float, float] = ROD_BY_BEAM
+) -> Iterator[Finding]:
+    low, high = (limit * per_metre * length for limit in limits)
     if per_metre > 0.0 and not low <= mass <= high:
         bound = f"expected {low:.2g} to {high:.2g} kg for {length:g} m beside a section of {per_metre:.3g} kg/m"
-        yield warning(draft, place, mass, bound, "Give kg: not grams, not tonnes.")
+        yield warning(draft, place, mass, bound, "Give kg: not grams, not tonnes, not N.")
 
 
 def _cylinder(draft: Draft, i: int, joint: Joint, per_metre: float) -> Iterator[Finding]:
@@ -113,9 +116,10 @@ def _cylinder_size(draft: Draft, i: int, cylinder: Cylinder, section: float) -> 
         yield warning(draft, (*place, "closed_length"), closed, bound, remedy)
     if cylinder.oil is not None:
         for key, area in (("cap_line", cylinder.oil.cap_area), ("rod_line", cylinder.oil.rod_area)):
-            volume, least = getattr(cylinder.oil, key), LEAST_LINE * area * cylinder.max_stroke
-            if 0.0 < volume < least:
-                bound = f"expected at least {least:.2g} m^3, a thousandth of what the chamber takes"
+            volume, (least, most) = getattr(cylinder.oil, key), (share * area * cylinder.max_stroke for share in LINE)
+            if 0.0 < volume < least or volume > most:
+                words = f"at least {least:.2g} m^3, a thousandth of" if volume < least else f"at most {most:.2g} m^3, twice"
+                bound = f"expected {words} what the chamber takes"
                 yield warning(draft, (*place, "oil", key), volume, bound, "Give m^3: half a litre is 5e-4.")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..oil_spring import middle_stiffness
-from ..schema import Scene
+from ..schema import Scene, section_depth
 from ..straight_boom import StraightBoom, straight_boom
 from ..worst_load import worst_loads
 from ..yaml_reader import Place
@@ -20,13 +20,14 @@ PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at 
 QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
 PRESSURE = (5e6, 4.5e7)  # Pa, of the chamber that bears most; placing booms have up to 30 to 40 MPa
 GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
+OIL, WIDEST_BORE = 1.5e9, 0.8  # bulk modulus, Pa; bore that a constant k needs, of the height of the section it lies along
 TINY = 1e-300
 MOST_PAYLOAD = 0.5  # of the boom's mass
 
 
 TAKES = frozenset(
-    {"E", "A", "I", "k", "rho_A", "mass", "mL", "mR", "payload", "line_fill", "beam", "gravity", "inclination", "bulk_modulus"}
-)
+    ("E", "rho", "A", "I", "k", "rho_A", "mass", "com", "mL", "mR", "payload", "line_fill", "length", "beam", "gravity")
+) | {"inclination", "bulk_modulus"}
 """Keys on which all of it depends: where one of these is odd, it would be told again."""
 
 
@@ -39,7 +40,7 @@ def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Findi
         return []
     stiffnesses = np.array([middle_stiffness(joint.cylinder) for joint in scene.joints])
     found = straight_boom(scene, stiffnesses)
-    checks = (_payload, _pressure, _give, _frequency, _damping)
+    checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
     findings = (
         [each for each in check(draft, scene, found) if not each.fault.path.startswith(tuple(turned))] for check in checks
@@ -49,6 +50,8 @@ def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Findi
 
 def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
     low, high = (limit / scene.reach for limit in FREQUENCY)
+    if not all(joint.cylinder.is_compressible for joint in scene.joints):
+        high = math.inf  # what was left out is not too stiff
     first = float(found.frequencies[0]) if len(found.frequencies) else low
     if not low <= first <= high:
         bound = (
@@ -134,6 +137,19 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
                 )
                 key, remedy = ("k", "k (N/m)") if joint.cylinder.oil is None else ("oil", "bore and rod (diameters, m)")
                 yield warning(draft, ("joints", i, "cylinder", key), k, bound, f"Check {remedy}, and the masses.")
+
+
+def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
+    """A constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
+    for i, joint in enumerate(scene.joints):
+        bore = math.sqrt((joint.cylinder.k or 0.0) * joint.cylinder.max_stroke / (math.pi * OIL))
+        depth = section_depth(scene, max(0, i - 1))
+        if bore > WIDEST_BORE * depth:
+            bound = (
+                f"amid its stroke a cylinder has it with a bore of {bore:.2g} m; "
+                f"expected at most {WIDEST_BORE * depth:.2g} m beside a section {depth:.2g} m high"
+            )
+            yield warning(draft, ("joints", i, "cylinder", "k"), joint.cylinder.k, bound, "Check k (N/m), and its decimals.")
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:

@@ -149,6 +149,10 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Iterator[Finding]:
     if oil.rod >= oil.bore:
         bound = f"the rod must be thinner than the bore, {oil.bore:g} m"
         yield fault(draft, (*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m.")
+    elif not ROD_BY_BORE[0] * oil.bore <= oil.rod <= ROD_BY_BORE[1] * oil.bore:
+        low, high = (share * oil.bore for share in ROD_BY_BORE)
+        bound = f"expected {low:.3g} to {high:.3g} m in a bore of {oil.bore:g} m"
+        yield warning(draft, (*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m, not one as a radius.")
     for key, end in (("cap_line", "stroke 0"), ("rod_line", f"its full stroke, {cylinder.max_stroke:g} m")):
         if getattr(oil, key) == 0.0:
             bound = f"no oil is left there at {end}, and the cylinder is incompressible"
@@ -172,6 +176,7 @@ LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin"
            "closed_length", "max_stroke")  # fmt: skip
 MASSES = ("mass", "mL", "mR", "payload")
 
+ROD_BY_BORE = (0.4, 0.92)  # rods that may be pushed; the series of ISO 7181 has 0.45 to 0.89 for ratios of areas from 1.25 on
 BULK = (4e8, 2.5e9)  # Pa; water has 2.2e9
 TURNS = "the joint turns by"
 NARROW = 25.0  # deg; joints of booms turn by 60 and more
@@ -222,11 +227,10 @@ def _value(draft: Draft, place: Place, value: Any) -> Iterator[Finding]:
             yield warning(draft, place, value, "less than 1e6 Pa: GPa or MPa?", remedy)
     elif key == "rho" and value < 50:
         yield warning(draft, place, value, "less than 50 kg/m^3: g/cm^3 or t/m^3?", f"Give kg/m^3: {value * 1000:g}.")
-    elif key == "k" and value < 1e4:
-        yield warning(draft, place, value, "less than 1e4 N/m: kN/mm?", f"Give N/m: {value:g} kN/mm are {value * 1e6:g}.")
     elif key == "k" and value < 1e6:
-        bound = "expected from 1e6 to 1e9 N/m: kN/m?"
-        yield warning(draft, place, value, bound, f"Give N/m: {value:g} kN/m are {value * 1e3:g}.")
+        unit, size = ("kN/m", 1e3) if value >= 1e3 else ("kN/mm", 1e6)
+        bound = f"expected from 1e6 to 1e9 N/m: {unit}?"
+        yield warning(draft, place, value, bound, f"Give N/m: {value:g} {unit} are {value * size:g}.")
     elif key == "k" and value > 1e9:
         remedy = "Check its unit, N/m, or the bore and the oil that it comes from."
         yield warning(draft, place, value, "expected from 1e6 to 1e9 N/m", remedy)
