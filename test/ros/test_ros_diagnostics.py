@@ -21,6 +21,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 
+from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.ros.node.diagnostics import GraphPeers
 from boom_twin.types import Stream
@@ -174,12 +175,11 @@ sys.stdin.read()
     driver = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
     node = rclpy.create_node("boom_twin")
     book, end = GraphPeers(node, load_topics()), time.monotonic() + 60.0
-    shape = book.subscribers[Output.SHAPE]
-    while not (book.publishers[Stream.STROKES].mistyped and shape.mistyped) and time.monotonic() < end:
+    strokes = shape = Peers()
+    while not all("/driver: " in "".join(each.mistyped) for each in (strokes, shape)) and time.monotonic() < end:
         book.look()
-        shape = book.subscribers[Output.SHAPE]
+        strokes, shape = book.publishers[Stream.STROKES], book.subscribers[Output.SHAPE]
         time.sleep(0.02)
-    strokes = book.publishers[Stream.STROKES]
     assert strokes.mistyped == ("/driver: std_msgs/msg/String, not sensor_msgs/msg/JointState",) and strokes.names == ()
     assert shape.mistyped == ("/driver: std_msgs/msg/String, not visualization_msgs/msg/MarkerArray",)
     driver.communicate()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
@@ -32,6 +33,9 @@ from ..log import Log
 from ..runtime import qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
 
+MOST_LINES, LINES_SPAN = 4, 600.0
+"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
+
 
 class DiagnosticsPublisher:
     """The states of one node.
@@ -51,11 +55,14 @@ class DiagnosticsPublisher:
         self._hardware_id = hardware_id or self._name
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
+        self._logged: dict[str, deque[float]] = {}
 
     def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all, and log in one line those whose level is another than before; a new one is taken to have been well."""
-        before, self._levels = self._levels, {status.name: status.level for status in statuses}
-        self._log([status for status in statuses if before.get(status.name, Level.OK) != status.level])
+        """Publish all, and log in one line those whose level is another than was logged; one that is new was well."""
+        before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
+        changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
+        self._levels = before | {status.name: status.level for status in changed}
+        self._log(changed)
         message = DiagnosticArray(status=[self._message(status) for status in statuses])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
@@ -63,6 +70,16 @@ class DiagnosticsPublisher:
     def settle(self) -> None:
         """Wait until those that listen have got it, at most a second."""
         self._publisher.wait_for_all_acked(Duration(seconds=1))
+
+    def _is_due(self, status: Status) -> bool:
+        """Whether a change is logged now, or once the component has not come and gone so often; an error is, and its end."""
+        if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
+            return True
+        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
+        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
+            return False
+        times.append(now)
+        return True
 
     def _log(self, changed: Sequence[Status]) -> None:
         """Names of the same state together: the sensors of a topic fall silent as one."""
