@@ -109,7 +109,7 @@ class ModelWatch:
         judge.note("passes_mean", self._passes / steps if steps else nan)
         judge.note("step_longest_s", self._longest if steps else nan)
         judge.note("step_budget_s", span / steps if steps else nan)
-        told = f"the model takes {load:.0%} of the time there is: raise step or look_step, or lower modes"
+        told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or raise step or look_step"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0
 

@@ -27,6 +27,8 @@ class Peers:
         GIDs, hexadecimal, in the order of `names`.
     rivals : int
         Publishers of an output beside the node's own.
+    mistyped : sequence of str
+        Others at this topic, which have another type of message and so neither hear nor are heard, with that type, in words.
     """
 
     address: str = ""
@@ -34,6 +36,7 @@ class Peers:
     incompatible: Sequence[str] = ()
     ids: Sequence[str] = ()
     rivals: int = 0
+    mistyped: Sequence[str] = ()
 
 
 class TopicJudge:
@@ -82,6 +85,8 @@ class TopicJudge:
         judge.note("publisher_names", ", ".join(publishers.names))
         if publishers.incompatible:
             judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
+        if publishers.mistyped:
+            judge.fault(Level.WARN, "another type of message: " + "; ".join(publishers.mistyped))
         if stream.newest is None and not self._required:
             return judge.finish("not there; optional")
         told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
@@ -121,6 +126,8 @@ class OutputsJudge:
             judge.note(f"subscribers {each.address}", len(each.names))
             if each.incompatible:
                 judge.fault(Level.WARN, f"{each.address}: incompatible QoS: {'; '.join(each.incompatible)}")
+            if each.mistyped:
+                judge.fault(Level.WARN, f"{each.address}: another type of message: {'; '.join(each.mistyped)}")
         if shared:
             told = f"{shared} of them are published by another node too: give each node a namespace of its own, or end one"
             judge.fault(Level.ERROR, told)

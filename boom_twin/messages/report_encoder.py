@@ -146,10 +146,13 @@ def _put_covariance(holder: Any, fields: NumberFields) -> None:
     holder.covariance = table.ravel()
 
 
+_MIRRORED = np.array([0, 1, 2, 3, 4, 5, 1, 2, 4])
+_SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])[_MIRRORED]
+
+
 def _covariance_numbers(triangle: Array) -> Array:
     """Numbers of `_put_covariance` from an upper triangle (6,) or (6, k) of x, y and the angle: the turn counts about -y."""
-    signed = (triangle.T * np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])).T
-    return np.concatenate([signed, signed[[1, 2, 4]]])
+    return np.asarray((triangle[_MIRRORED].T * _SIGNS).T)
 
 
 def _pose_numbers(e: Estimate | EstimateBlock) -> Array:
@@ -211,8 +214,14 @@ class ReportEncoder:
         for output in Output:  # their encoders are compiled here, not when the first message waits
             jazzy().get_msgdef(TYPES[output])
 
-    def fill(self, report: Report) -> Messages:
+    def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """The messages of one report.
+
+        Parameters
+        ----------
+        report : Report
+        is_wanted : callable
+            Of which outputs; all by default.
 
         Returns
         -------
@@ -222,16 +231,22 @@ class ReportEncoder:
         """
         messages: Messages = []
         if (p := report.prediction) is not None:
-            messages += [(output, template.fill(p.stamp, numbers(p))) for output, template, numbers in self._predicted]
-            messages.append((Output.JOINT_STATES, self._fill_joint_states(p)))
+            messages += [
+                (key, template.fill(p.stamp, numbers(p))) for key, template, numbers in self._predicted if is_wanted(key)
+            ]
+            if is_wanted(Output.JOINT_STATES):
+                messages.append((Output.JOINT_STATES, self._fill_joint_states(p)))
         if (e := report.estimate) is not None:
-            messages += [(output, template.fill(e.stamp, numbers(e))) for output, template, numbers in self._estimated]
-        messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
-        if report.change is not None:
+            messages += [
+                (key, template.fill(e.stamp, numbers(e))) for key, template, numbers in self._estimated if is_wanted(key)
+            ]
+        if report.residuals and is_wanted(Output.RESIDUALS):
+            messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
+        if report.change is not None and is_wanted(Output.CHANGES):
             messages.append((Output.CHANGES, encode_changes(report.change, self._frame)))
         if report.health is not None:
-            messages += self._fill_health(report.health)
-        if p is not None and p.shape is not None:
+            messages += [each for each in self._fill_health(report.health) if is_wanted(each[0])]
+        if p is not None and p.shape is not None and is_wanted(Output.SHAPE):
             messages.append((Output.SHAPE, self._markers.fill(p)))
         return messages
 

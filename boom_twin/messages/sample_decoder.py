@@ -60,6 +60,22 @@ class _Channels:
         return [value if value is _ABSENT else (value - zero) * scale for value, (zero, scale) in pairs]
 
 
+ODDITIES = {
+    "unequal arrays": "position (of forces effort) shorter or longer than name; the values that have a name are used",
+    "missing names": "some of the scene's cylinders or joints are not in the message; the others are used",
+    "unknown names only": "none of the scene's cylinders or joints is in the message, which is left out",
+    "names of another boom": "cylinders or joints that the scene does not have; the message is left out",
+    "too many names": f"more than {LONGEST} in a message, which is left out",
+    "not finite": "NaN or infinity in a message; that value is left out",
+    "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
+    "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
+    "no usable value": "nothing of a message could be used",
+    "no stamp": "zero, which a driver leaves that does not set header.stamp; the message is left out",
+    "impossible stamp": "before 1970, or more seconds than a message can hold; the message is left out",
+}
+"""What may be odd about a message. That a message of a topic that strokes and angles share has only one kind of them is not."""
+
+
 class SampleDecoder:
     """Maps messages to samples and counts what is odd about them.
 
@@ -73,31 +89,7 @@ class SampleDecoder:
     Attributes
     ----------
     oddities : Counter
-        How often each of these was met:
-
-        ``unequal arrays``
-            ``position`` (of forces ``effort``) shorter or longer than ``name``; the values that have a name are used.
-        ``missing names``
-            Some of the scene's channels are not in the message; they are NaN.
-        ``unknown names only``
-            None of the scene's channels is in the message; no sample. A message of a topic that strokes and angles share
-            may have only one kind of them, which is nothing odd.
-        ``names of another boom``
-            Cylinders or joints are named that the scene does not have; no sample.
-        ``too many names``
-            More than `LONGEST`; no sample.
-        ``not finite``
-            NaN or infinity; NaN in the sample.
-        ``absurd magnitude``
-            Above `boom_twin.types.LIMIT`; NaN in the sample.
-        ``no measurement``
-            An Imu that says by ``linear_acceleration_covariance[0] = -1`` that it has none (REP-145); no sample.
-        ``no usable value``
-            Nothing was left; no sample.
-        ``no stamp``
-            Zero, which a driver leaves that does not set it; no sample.
-        ``impossible stamp``
-            Before 1970, or more seconds than a message can hold; no sample.
+        How often each of `ODDITIES` was met.
     other_boom_names : dict of Stream to list of str
         The names that the newest of these messages had, of another boom.
     delays : dict of Stream to int

@@ -17,6 +17,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from ..errors import UsageError
 from ..messages.topic_table import Qos
@@ -70,17 +71,17 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
     """Do the node's work until `is_over`, in this one thread: messages are read in the order of their arrival.
 
     The events executor takes half the processor time, but it is experimental. Its ``spin`` does not return, with a finite wait
-    neither as long as messages come, so it is driven callback by callback; and where it is missing or fails, the
+    neither as long as messages come, so every turn of it is ended from here; and where it is missing or fails, the
     single-threaded executor goes on.
     """
     try:
-        _drive(_events_executor(), node, queue, is_over)
+        _drive(_events_executor(), node, queue, is_over, _read_at_once)
     except STOPPED:
         raise
     except Exception as error:
         told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
         Log(node).warning(told % one_line(error))
-        _drive(SingleThreadedExecutor(), node, queue, is_over)
+        _drive(SingleThreadedExecutor(), node, queue, is_over, _call_back_once)
 
 
 def _events_executor() -> Any:
@@ -89,15 +90,47 @@ def _events_executor() -> Any:
     return EventsExecutor()
 
 
-def _drive(executor: Any, node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
+Serve = Callable[[Any, ReceiveQueue], None]
+
+
+def _drive(executor: Any, node: Node, queue: ReceiveQueue, is_over: Callable[[], bool], serve: Serve) -> None:
     executor.add_node(node)
     try:
         while not is_over():
-            executor.spin_once(timeout_sec=0.0 if queue else WAKE)
+            serve(executor, queue)
             _take_over(executor, queue)
             queue.work(BUDGET)
     finally:
         executor.remove_node(node)
+
+
+def _call_back_once(executor: Any, queue: ReceiveQueue) -> None:
+    executor.spin_once(timeout_sec=0.0 if queue else WAKE)
+
+
+def _read_at_once(executor: Any, queue: ReceiveQueue) -> None:
+    """Let the executor wait and call back for `WAKE`; messages are read as they come, which saves a turn for each.
+
+    That ends as soon as one cannot be read at once: then more are to be taken over first.
+    """
+    if queue:
+        _call_back_once(executor, queue)
+        return
+    turn, end = Future(), time.monotonic() + WAKE
+
+    def read() -> None:
+        if turn.done():
+            return
+        if not queue.is_behind:
+            queue.work(BUDGET)
+        if queue or time.monotonic() >= end:
+            turn.set_result(None)
+
+    queue.on_put = read
+    try:
+        executor.spin_until_future_complete(turn, timeout_sec=WAKE)
+    finally:
+        queue.on_put = None
 
 
 def _take_over(executor: Any, queue: ReceiveQueue) -> None:

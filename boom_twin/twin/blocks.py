@@ -119,32 +119,32 @@ class EstimateBlock(NamedTuple):
     @property
     def tip(self) -> Array:
         """Place of the tip, shape (p, 3): x, y (m) and the angle of the last head (rad)."""
-        return self.rows[:, TIP : TIP + 3]
+        return self.rows[:, ESTIMATED["tip"]]
 
     @property
     def acceleration(self) -> Array:
         """Of these, shape (p, 3): m/s^2, rad/s^2."""
-        return self.rows[:, ACCELERATION : ACCELERATION + 3]
+        return self.rows[:, ESTIMATED["acceleration"]]
 
     @property
     def load(self) -> Array:
         """Force at the tip that the model does not know, shape (p, 2), N."""
-        return self.rows[:, FORCE : FORCE + 2]
+        return self.rows[:, ESTIMATED["load"]]
 
     @property
     def tip_covariance(self) -> Array:
         """Of `tip`, upper triangle by rows, shape (p, 6)."""
-        return self.rows[:, TIP_COVARIANCE : TIP_COVARIANCE + 6]
+        return self.rows[:, ESTIMATED["tip_covariance"]]
 
     @property
     def acceleration_covariance(self) -> Array:
         """Of `acceleration`, likewise."""
-        return self.rows[:, ACCELERATION_COVARIANCE : ACCELERATION_COVARIANCE + 6]
+        return self.rows[:, ESTIMATED["acceleration_covariance"]]
 
     @property
     def load_variance(self) -> Array:
         """Of `load`, shape (p, 2)."""
-        return self.rows[:, FORCE_VARIANCE : FORCE_VARIANCE + 2]
+        return self.rows[:, ESTIMATED["load_variance"]]
 
     def one(self, row: int) -> Estimate:
         """The estimate of a row."""
@@ -153,8 +153,7 @@ class EstimateBlock(NamedTuple):
 
 def estimate_of(stamp: int, row: Array) -> Estimate:
     """The estimate at `stamp` (ns) in a row, see `boom_twin.estimation.tip_estimate.WIDTH`; its arrays are views."""
-    block = EstimateBlock(np.array([stamp]), row[None, :])
-    return Estimate(stamp, *(getattr(block, name)[0] for name in ESTIMATED))
+    return Estimate(stamp, *(row[place] for place in ESTIMATED.values()))
 
 
 def row_of(estimate: Estimate) -> Array:
@@ -162,7 +161,15 @@ def row_of(estimate: Estimate) -> Array:
     return np.concatenate([getattr(estimate, name) for name in ESTIMATED])
 
 
-ESTIMATED = ("tip", "acceleration", "load", "tip_covariance", "acceleration_covariance", "load_variance")
+ESTIMATED = {
+    "tip": slice(TIP, TIP + 3),
+    "acceleration": slice(ACCELERATION, ACCELERATION + 3),
+    "load": slice(FORCE, FORCE + 2),
+    "tip_covariance": slice(TIP_COVARIANCE, TIP_COVARIANCE + 6),
+    "acceleration_covariance": slice(ACCELERATION_COVARIANCE, ACCELERATION_COVARIANCE + 6),
+    "load_variance": slice(FORCE_VARIANCE, FORCE_VARIANCE + 2),
+}
+"""Fields of an `Estimate` and where each stands in a row, see `boom_twin.estimation.tip_estimate.WIDTH`."""
 
 
 class ResidualBlock(NamedTuple):

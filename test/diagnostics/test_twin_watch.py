@@ -156,8 +156,14 @@ def test_other_ends(rig: Rig) -> None:
     status = after(rig, 4)["cylinder_strokes"]
     assert status.level == Level.WARN and status.values["publishers"] == 2
     assert "incompatible QoS: /b: Best effort publisher" in status.message
+    rig.peers[Stream.STROKES] = Peers(
+        "/strokes", ("/a",), mistyped=("/b: std_msgs/msg/String, not sensor_msgs/msg/JointState",)
+    )
+    status = after(rig, 7)["cylinder_strokes"]
+    assert status.level == Level.WARN and status.values["publishers"] == 1
+    assert "another type of message: /b: std_msgs/msg/String, not sensor_msgs/msg/JointState" in status.message
     rig.peers[Stream.STROKES] = Peers("/strokes", ("/a",))
-    assert after(rig, 7)["cylinder_strokes"].level == Level.OK
+    assert after(rig, 10)["cylinder_strokes"].level == Level.OK
 
 
 def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:

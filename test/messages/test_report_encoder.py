@@ -238,3 +238,11 @@ def assert_same(one: Any, other: Any, place: str) -> None:
             assert_same(left, right, place)
     else:
         assert one == (other[0] if isinstance(other, bytes) else other), place  # rclpy has a byte as bytes
+
+
+def test_only_what_is_wanted_is_encoded_and_as_ever() -> None:
+    given = replace(judged(ALARM), prediction=prediction(STAMP), residuals=report().residuals)
+    everything = dict(encoder().fill(given))
+    for wanted in everything:
+        assert encoder().fill(given, wanted.__eq__) == [(wanted, everything[wanted])]
+    assert encoder().fill(given, lambda output: False) == []

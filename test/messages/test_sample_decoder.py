@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boom_twin.messages.sample_decoder import LONGEST, SampleDecoder, stamp_of
+from boom_twin.messages.sample_decoder import LONGEST, ODDITIES, SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
 from boom_twin.messages.type_store import new_message
 from boom_twin.types import SENSORS, Stream
@@ -169,7 +169,7 @@ def test_a_flood_of_names_is_not_looked_through() -> None:
     decoder = SampleDecoder(1)
     names = [*(f"x{i}" for i in range(LONGEST)), "cylinder_1"]
     assert decoder.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
-    assert decoder.oddities == {"too many names": 1}
+    assert decoder.oddities == {"too many names": 1} and f"more than {LONGEST}" in ODDITIES["too many names"]
     assert decoder.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * LONGEST)) is not None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from array import array
 from collections.abc import Callable, Iterator
@@ -19,7 +21,8 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 
-from boom_twin.messages.topic_table import load_topics
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.ros.node.diagnostics import GraphPeers
 from boom_twin.types import Stream
 
@@ -156,6 +159,31 @@ def test_a_second_node_of_the_same_name_is_told(prompt: Any, bench: Any) -> None
     other.destroy_node()
     bench.until(lambda: not told())
     assert prompt.stop() == 0
+
+
+def test_ends_of_another_type_are_told(domain: None) -> None:
+    """Nothing of them arrives, and DDS does not say why; discovery tells their type, from another process."""
+    code = """
+import rclpy, sys, time
+from std_msgs.msg import String
+rclpy.init()
+driver = rclpy.create_node("driver")
+sends = driver.create_publisher(String, "/cylinder_strokes", 10)
+hears = driver.create_subscription(String, "/boom_twin/shape", print, 10)
+sys.stdin.read()
+"""
+    driver = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+    node = rclpy.create_node("boom_twin")
+    book, end = GraphPeers(node, load_topics()), time.monotonic() + 60.0
+    strokes = shape = Peers()
+    while not all("/driver: " in "".join(each.mistyped) for each in (strokes, shape)) and time.monotonic() < end:
+        book.look()
+        strokes, shape = book.publishers[Stream.STROKES], book.subscribers[Output.SHAPE]
+        time.sleep(0.02)
+    assert strokes.mistyped == ("/driver: std_msgs/msg/String, not sensor_msgs/msg/JointState",) and strokes.names == ()
+    assert shape.mistyped == ("/driver: std_msgs/msg/String, not visualization_msgs/msg/MarkerArray",)
+    driver.communicate()
+    node.destroy_node()
 
 
 def test_a_publisher_that_cannot_be_heard_is_named(domain: None) -> None:

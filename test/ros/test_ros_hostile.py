@@ -73,4 +73,5 @@ def test_every_good_sample_is_answered_and_no_other(spawn_node: Callable[..., An
     odd = ("leap", "no stamp", "not finite", "absurd magnitude", "unequal arrays", "unknown names only", "too many names")
     for name in odd:
         assert node.said().count(f"{name}:") == 1, name
+    assert "too many names: more than 1000 in a message" in node.said() and "seen in a message" not in node.said()
     assert node.stop() == 0

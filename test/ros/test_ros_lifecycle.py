@@ -15,10 +15,15 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+import rclpy
+from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.msg import Transition
 from rcl_interfaces.srv import DescribeParameters
+from rclpy.lifecycle import TransitionCallbackReturn
 
 from boom_twin.config.settings import Settings
+from boom_twin.messages.topic_table import Output
+from boom_twin.ros.node.node import TwinNode
 from boom_twin.scene.load import default_text
 
 
@@ -78,6 +83,12 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
         ("gap", "long"),
     ]:
         assert not remote.set(name, value).successful, (name, value)
+    for name, value, reason in [
+        ("playload", 40.0, "playload: unknown. The nearest is `payload`. `ros2 param list` names all."),
+        ("payload", 40, "payload: a number needs a decimal point: 40.0, not 40"),
+    ]:
+        refused = remote.set(name, value)
+        assert not refused.successful and refused.reason == reason
     assert remote.set("look_step", 0.03).successful
     assert remote.change(Transition.TRANSITION_CONFIGURE), idle.said()
     for name, value in [("look_step", 0.05), ("scene", "other.yaml")]:
@@ -88,6 +99,23 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     assert not remote.set("payload", -2.0).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)
     assert remote.set("look_step", 0.05).successful
+
+
+def test_only_what_is_listened_to_is_encoded_and_what_late_listeners_get(domain: None) -> None:
+    node, listener, end = TwinNode(), rclpy.create_node("listener"), time.monotonic() + 60.0
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert [key for key in node._outputs if node._is_wanted(key)] == [Output.CHANGES]
+    heard = listener.create_subscription(PointStamped, "/boom_twin/tip/position", print, 10)
+    while not node._is_wanted(Output.TIP_POSITION):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    listener.destroy_subscription(heard)
+    while node._is_wanted(Output.TIP_POSITION):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    node.destroy_node()
+    listener.destroy_node()
 
 
 def test_a_scene_that_cannot_be_used_can_be_replaced(idle: Any, remote: Any, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from boom_twin.ros.node.receive_queue import ReceiveQueue
+from boom_twin.ros.node.receive_queue import LARGEST, ReceiveQueue
+from boom_twin.ros.runtime import _read_at_once
 
 MS = 1_000_000
 
@@ -51,6 +52,14 @@ def test_the_oldest_of_a_flooded_topic_gives_way_and_the_other_topic_suffers_not
     assert (found["b"].received, found["b"].dropped) == (1, 0)
 
 
+def test_a_message_that_would_take_long_to_read_is_left_out_at_once(bus: Bus) -> None:
+    bus.send("b", bytes(LARGEST + 1), 1)
+    assert not bus.queue and bus.queue.oddities == {"too large": 1}
+    bus.send("b", bytes(LARGEST), 2)
+    bus.queue.work(1.0)
+    assert bus.read == [bytes(LARGEST)] and bus.queue.look()["b"].lost == 0
+
+
 def test_work_ends_when_its_time_is_over_and_goes_on_later() -> None:
     queue, read = ReceiveQueue(), list[bytes]()
 
@@ -65,6 +74,23 @@ def test_work_ends_when_its_time_is_over_and_goes_on_later() -> None:
     assert len(read) == 1 and queue
     queue.work(60.0)
     assert len(read) == 5 and not queue
+
+
+def test_messages_are_read_as_they_come_until_one_had_to_wait(bus: Bus) -> None:
+    class Executor:
+        """Has three messages in one turn."""
+
+        def spin_until_future_complete(self, turn: Any, timeout_sec: float) -> None:
+            bus.send("b", b"1")
+            assert bus.read == [b"1"] and not turn.done()
+            bus.send("b", b"2", age=30 * MS)
+            bus.send("b", b"3")
+            assert bus.read == [b"1"] and turn.done()
+
+    _read_at_once(Executor(), bus.queue)
+    bus.queue.work(1.0)
+    bus.send("b", b"4")
+    assert bus.read == [b"1", b"2", b"3"] and bus.queue
 
 
 def test_what_arrived_before_a_request_is_read_before_it_is_answered(bus: Bus) -> None:

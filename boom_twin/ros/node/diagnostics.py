@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
@@ -21,7 +22,7 @@ from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.stress_status import stress_watch
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
-from ...messages.sample_decoder import SampleDecoder
+from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
@@ -30,7 +31,10 @@ from ...twin.twin import Twin
 from ...types import NANO, Health, Report, Sample, Stream
 from ..log import Log
 from ..runtime import qos_profile
-from .receive_queue import ReceiveQueue
+from .receive_queue import LARGEST, ReceiveQueue
+
+MOST_LINES, LINES_SPAN = 4, 600.0
+"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
 
 
 class DiagnosticsPublisher:
@@ -51,11 +55,14 @@ class DiagnosticsPublisher:
         self._hardware_id = hardware_id or self._name
         self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
         self._levels: dict[str, Level] = {}
+        self._logged: dict[str, deque[float]] = {}
 
     def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all, and log in one line those whose level is another than before; a new one is taken to have been well."""
-        before, self._levels = self._levels, {status.name: status.level for status in statuses}
-        self._log([status for status in statuses if before.get(status.name, Level.OK) != status.level])
+        """Publish all, and log in one line those whose level is another than was logged; one that is new was well."""
+        before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
+        changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
+        self._levels = before | {status.name: status.level for status in changed}
+        self._log(changed)
         message = DiagnosticArray(status=[self._message(status) for status in statuses])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
@@ -63,6 +70,16 @@ class DiagnosticsPublisher:
     def settle(self) -> None:
         """Wait until those that listen have got it, at most a second."""
         self._publisher.wait_for_all_acked(Duration(seconds=1))
+
+    def _is_due(self, status: Status) -> bool:
+        """Whether a change is logged now, or once the component has not come and gone so often; an error is, and its end."""
+        if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
+            return True
+        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
+        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
+            return False
+        times.append(now)
+        return True
 
     def _log(self, changed: Sequence[Status]) -> None:
         """Names of the same state together: the sensors of a topic fall silent as one."""
@@ -108,18 +125,18 @@ class GraphPeers:
         self.publishers = dict.fromkeys(topics.inputs, Peers())
         self.subscribers = dict.fromkeys(topics.outputs, Peers())
         entries: list[tuple[Stream | Output, Topic]] = [*topics.inputs.items(), *topics.outputs.items()]
-        self._entries = cycle([(key, topic.name, _as_discovered(qos_profile(topic.qos))) for key, topic in entries])
+        self._entries = cycle([(key, topic, _as_discovered(qos_profile(topic.qos))) for key, topic in entries])
 
     def look(self) -> None:
         """Look up the next topic."""
-        key, name, own = next(self._entries)
-        address = self._node.resolve_topic_name(name)
+        key, topic, own = next(self._entries)
+        address = self._node.resolve_topic_name(topic.name)
         if isinstance(key, Stream):
             ends = self._node.get_publishers_info_by_topic(address)
-            self.publishers[key] = _peers(address, [(end, end.qos_profile, own) for end in ends])
+            self.publishers[key] = _peers(address, topic.type, [(end, end.qos_profile, own) for end in ends])
         else:
             ends = self._node.get_subscriptions_info_by_topic(address)
-            found = _peers(address, [(end, own, end.qos_profile) for end in ends])
+            found = _peers(address, topic.type, [(end, own, end.qos_profile) for end in ends])
             mine = sum(publisher.topic_name == address for publisher in self._node.publishers)
             others = 0 if key is Output.DIAGNOSTICS else self._node.count_publishers(address) - mine
             self.subscribers[key] = replace(found, rivals=max(0, others))
@@ -132,11 +149,14 @@ def _as_discovered(qos: QoSProfile) -> QoSProfile:
     return qos
 
 
-def _peers(address: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
-    """From the other ends, and the QoS offered and asked for."""
+def _peers(address: str, kind: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
+    """From the other ends, and the QoS offered and asked for; `kind` is the type of message that is right."""
+    strange = tuple(f"{node_name(end)}: {end.topic_type}, not {kind}" for end, _, _ in ends if end.topic_type != kind)
+    ends = [each for each in ends if each[0].topic_type == kind]
     faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
     names, ids = tuple(name for name, _ in faults), tuple(bytes(end.endpoint_gid).hex() for end, _, _ in ends)
-    return Peers(address, names, tuple(f"{name}: {reason}" for name, reason in faults if reason), ids)
+    incompatible = tuple(f"{name}: {reason}" for name, reason in faults if reason)
+    return Peers(address, names, incompatible, ids, mistyped=strange)
 
 
 def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
@@ -152,6 +172,8 @@ def node_name(endpoint: Any) -> str:
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
+WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
+"""What is told of the first sample of a kind."""
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
 PIECE = 0.002  # s from one piece of such a look to the next: samples are taken in between
@@ -195,6 +217,7 @@ class Diagnostics:
         stress = stress_watch(twin.scene)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
         self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
+        self._counts["received"] = self._queue.oddities
         self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()
 
@@ -268,7 +291,8 @@ class Diagnostics:
         yield
         self._publisher.show(found)
         self._tell_oddities()
-        self._tell_clock(clock)
+        self._tell_types()
+        self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 
     def _other_booms(self) -> dict[Stream, str]:
         """The inputs that named cylinders or joints of another boom since the last look, in words."""
@@ -282,18 +306,26 @@ class Diagnostics:
     def _tell_oddities(self) -> None:
         """Log the first sample of every kind that is out of the ordinary; all of them are counted."""
         for name in sorted({name for found in self._counts.values() for name in found} - TOLD_AT_ONCE):
-            self._tell(name, f"{name}: {EVENTS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
+            self._tell(name, f"{name}: {WORDS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
 
-    def _tell_clock(self, clock: float) -> None:
-        """Log that the strokes are stamped by another clock than the node's."""
+    def _tell_types(self) -> None:
+        """Log what cannot be heard for its type: an input that is silent anyway does not change its level by that."""
+        for each in self._peers.publishers.values():
+            if each.mistyped:
+                self._tell(f"type of {each.address}", f"{each.address}: another type of message: {'; '.join(each.mistyped)}")
+
+    def _tell_clock(self, clock: float, wait: float) -> None:
+        """Log that the strokes are stamped by another clock than the node's, in which messages waited so long, s."""
         newest = self._watch.newest if self._active else None
         if newest is not None and clock == 0.0:
             self._tell(
                 "no clock", "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
             )
             return
-        if newest is not None and abs(clock - newest * NANO) > self._watch.thresholds.stamp_offset:
-            apart = clock - newest * NANO
+        if newest is None:
+            return
+        apart = clock - newest * NANO
+        if abs(apart) > self._watch.thresholds.stamp_offset + wait:
             self._tell("clock", f"newest stamp is {apart:.1f} s from the node's clock: set use_sim_time or play with --clock")
 
     def _tell(self, name: str, text: str) -> None:

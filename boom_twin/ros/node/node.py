@@ -10,7 +10,9 @@ from importlib import import_module
 from time import perf_counter
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 
 from ...bag.session_model import scene_from
@@ -29,7 +31,7 @@ from ..log import Log
 from ..runtime import message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
-from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of
+from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of, refusal
 from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
@@ -69,6 +71,12 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def autostart(self) -> bool:
         """Whether the node is to configure and activate itself."""
         return bool(self.get_parameter("autostart").value)
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter[Any]]) -> SetParametersResult:
+        """As any node's; but where rclpy names neither fault nor remedy, the reason does."""
+        if reason := refusal(self, parameter_list):
+            return SetParametersResult(successful=False, reason=reason)
+        return super().set_parameters_atomically(parameter_list)
 
     def start(self) -> bool:
         """Configure and activate; whether both went well."""
@@ -231,5 +239,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._diagnostics.judged(health, perf_counter() - began)
 
     def _publish(self, report: Report) -> None:
-        for key, encoded in self._encoder.fill(report):
-            self._outputs[key].publish(encoded)
+        """What somebody listens to, or may ask for later; the node is active, which the publishers need not look at again."""
+        for key, encoded in self._encoder.fill(report, self._is_wanted):
+            self._outputs[key].handle.publish_raw(encoded)
+
+    def _is_wanted(self, key: Output) -> bool:
+        is_heard = self._outputs[key].handle.get_subscription_count() > 0
+        return is_heard or self._topics.outputs[key].qos.durability == "transient_local"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,9 +75,25 @@ def declare(node: Node) -> None:
         raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
     except ParameterException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
-    if unknown := sorted(name for name in node._parameter_overrides if not _is_known(node, name)):
-        told = "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
+    if told := _unknown(node, node._parameter_overrides):
         raise UsageError(f"{SOURCE}: {told}. See msg_config/twin.yaml.")
+
+
+def _unknown(node: Node, names: Iterable[str]) -> str:
+    """What is said of those of `names` that are no parameters; empty if all are."""
+    unknown = sorted(name for name in names if not _is_known(node, name))
+    return "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
+
+
+def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:
+    """Why these cannot be set, for which rclpy has no remedy: no such parameter, or a whole number; else empty."""
+    given = {parameter.name: parameter for parameter in parameters}
+    if told := _unknown(node, given):
+        return f"{told}. `ros2 param list` names all."
+    kinds = {row.name: type(row.default) for row in TABLE}
+    integers = {name: each.value for name, each in given.items() if each.type_ == Parameter.Type.INTEGER}
+    whole = [(name, value) for name, value in integers.items() if kinds.get(name) is float]
+    return "; ".join(f"{name}: a number needs a decimal point: {value}.0, not {value}" for name, value in whole)
 
 
 def _is_known(node: Node, name: str) -> bool:

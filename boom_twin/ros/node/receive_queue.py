@@ -8,7 +8,7 @@ where messages come faster than they are read, the row grows without limit.
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature
 from math import nan
@@ -19,6 +19,8 @@ from ...types import NANO
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
+LARGEST = 1 << 18
+"""Bytes of a message that is put: a thousand names, which are as many as are looked at, take a part of that."""
 CATCH_UP = 0.5
 """Most time (s) for reading what arrived before a request, where the answer depends on it."""
 
@@ -67,20 +69,26 @@ class ReceiveQueue:
     ----------
     received : int
         Messages of all topics that were put.
+    oddities : Counter
+        How many of all topics were left out at once as ``too large``, see `LARGEST`: reading them would take too long.
     share : float
         Messages that wait behind the one that is being read, or was last, of its topic; as a share of what may.
     is_behind : bool
         Whether the newest message had waited for the executor, so that there may be more.
+    on_put : callable, optional
+        Is called with every message that was put, and may read it at once.
     """
 
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
         self._clock = clock
         self._topics: dict[str, _Topic] = {}
         self.received, self.is_behind, self.share = 0, False, 0.0
+        self.oddities: Counter[str] = Counter()
+        self.on_put: Callable[[], None] | None = None
 
     def __bool__(self) -> bool:
         """Whether a message waits."""
-        return any(topic.waiting for topic in self._topics.values())
+        return self._next() is not None
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
         """The callback of a raw subscription.
@@ -102,12 +110,17 @@ class ReceiveQueue:
             now = self._clock()
             arrival = info["received_timestamp"] or now
             topic.count(info["publication_sequence_number"])
+            if len(data) > LARGEST:
+                self.oddities["too large"] += 1
+                return
             topic.waiting.append((self.received, arrival, data))
             if len(topic.waiting) > topic.depth:
                 topic.waiting.popleft()
                 topic.dropped += 1
             self.received += 1
             self.is_behind = (now - arrival) * NANO > FRESH
+            if self.on_put is not None:
+                self.on_put()
 
         # rclpy tells by the signature that the information is wanted too
         both = [Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")]
@@ -147,5 +160,8 @@ class ReceiveQueue:
 
     def _next(self) -> _Topic | None:
         """The topic with the oldest message."""
-        waiting = [topic for topic in self._topics.values() if topic.waiting]
-        return min(waiting, key=lambda topic: topic.waiting[0][0], default=None)
+        found: _Topic | None = None
+        for topic in self._topics.values():
+            if topic.waiting and (found is None or topic.waiting[0][0] < found.waiting[0][0]):
+                found = topic
+        return found

@@ -135,5 +135,7 @@ class StartLog:
             words.insert(0, f"started from rest ({', '.join(report.events) or 'first strokes'})")
         elif "clock set" in report.events:
             words.insert(0, "clock set; the model goes on")
+        if not words:  # what was asked for was so before
+            return
         self._told = time.monotonic()
         self._log.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")
