@@ -217,6 +217,7 @@ class Diagnostics:
         stress = stress_watch(twin.scene)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
         self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
+        self._queue.oddities.clear()
         self._counts["received"] = self._queue.oddities
         self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
         self._told.clear()
