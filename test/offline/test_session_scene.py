@@ -76,7 +76,7 @@ def test_a_scene_that_its_checksum_shows_whole_needs_no_end_mark(tmp_path, capsy
     assert main(["info", str(bag)]) == 0
     assert "end of the file" not in capsys.readouterr().err
     assert main(["info", str(bag), "--scene", str(file)]) == 0
-    assert f"warning: {file}: line " in (told := capsys.readouterr().err) and "end of the file" in told
+    assert f"note: {file}: line " in (told := capsys.readouterr().err) and "end of the file" in told
     sheet = bag / FILE_NAME
     sheet.write_text("".join(line for line in sheet.read_text().splitlines(keepends=True) if "scene_sha256:" not in line))
     assert main(["info", str(bag)]) == 0
