@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import degrees, radians
+from operator import neg
 
 import numpy as np
 
@@ -64,4 +65,14 @@ class OtherBoom:
         if 2 * len(far) <= len(live):
             return ""
         told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
-        return f"{told} off what the strokes say, and at most {degrees(FAR):g} deg can be a fault of the rig"
+        bound = f"{told} off what the strokes say, and at most {degrees(FAR):g} deg can be a fault of the rig"
+        return bound + _likely({i: (float(np.nanmedian(table[:, i])), value) for i, value in far.items()})
+
+
+def _likely(readings: Mapping[int, tuple[float, float]]) -> str:
+    """What else readings may be, by what they are and how far off (rad): degrees or of the other sign; else nothing."""
+    for key, read in (("unit: deg", radians), ("sign: -1", neg)):
+        if all(abs(read(value) - (value - off)) < FAR for value, off in readings.values()):
+            mapping = f"sensors: {{joint_{min(readings) + 1}: {{{key}}}}}"
+            return f". With `{key}` they would fit: give by --mapping `{mapping}`, others likewise"
+    return ""

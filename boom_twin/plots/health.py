@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 COLOURS = (BLUE, GREEN, PURPLE, SKY, INK, GREY)
+IN_ROW, ROW = 8, 20.0  # channels in a row of the legend, and what it takes, points
 SMALLEST = 0.05
 """Level below which nothing is drawn."""
 
@@ -50,7 +51,7 @@ def timeline_picture(
         1 is an alarm.
     note : str
     """
-    height = 4.2 + 0.45 * max(len(alarms), 1)
+    height = 4.5 + 0.45 * max(len(alarms), 1)
     with picture(path, f"{session}: alarms, and how near they were", note, (16.0, height)) as figure:
         ratios = [0.45 * max(len(alarms), 1) + 0.3, 3.0]
         upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": ratios})
@@ -78,14 +79,15 @@ def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
 
 
 def _levels(axes: Axes, stamps: Array, names: tuple[str, ...], levels: Array) -> None:
-    axes.set_title("How far every channel deviates: above 1 causes are weighed; what a load at the tip explains is no alarm")
+    words = "How far every channel deviates: above 1 causes are weighed; what a load at the tip explains is no alarm"
+    axes.set_title(words, pad=6.0 + ROW * -(-len(names) // IN_ROW))  # above the legend
     for i, name in enumerate(names):
         values = np.maximum(levels[:, i], SMALLEST) if len(levels) else np.zeros(0)
         axes.semilogy(stamps, values, color=COLOURS[i % len(COLOURS)], label=name)
     axes.axhline(1.0, color=ORANGE, linewidth=1.6)
     axes.set_ylim(SMALLEST, max(2.0, float(levels.max(initial=1.0)) * 1.5))
     if names:
-        legend_above(axes, 8, handlelength=1.2)
+        legend_above(axes, IN_ROW, handlelength=1.2)
 
 
 def frequency_picture(

@@ -76,7 +76,7 @@ def test_a_scene_that_its_checksum_shows_whole_needs_no_end_mark(tmp_path, capsy
     assert main(["info", str(bag)]) == 0
     assert "end of the file" not in capsys.readouterr().err
     assert main(["info", str(bag), "--scene", str(file)]) == 0
-    assert f"warning: {file}: line " in (told := capsys.readouterr().err) and "end of the file" in told
+    assert f"note: {file}: line " in (told := capsys.readouterr().err) and "end of the file" in told
     sheet = bag / FILE_NAME
     sheet.write_text("".join(line for line in sheet.read_text().splitlines(keepends=True) if "scene_sha256:" not in line))
     assert main(["info", str(bag)]) == 0
@@ -286,3 +286,13 @@ def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):
 def test_the_bundled_session_keeps_the_default_scene():
     assert scene_of(BUNDLED).text == default_text()
     assert "synthetic" in str(as_document(BUNDLED)["origin"])
+
+
+@pytest.mark.parametrize(("factor", "key"), [(180.0 / np.pi, "unit: deg"), (-1.0, "sign: -1"), (3.0, None)])
+def test_angles_in_another_unit_are_told_with_it(factor, key):
+    right = np.array([1.04, -0.72, -0.88, -0.87]) + 1e-4 * np.random.default_rng(2).normal(size=(20, 4))
+    judge = OtherBoom()
+    judge.take(1, factor * right, factor * right - right)
+    told = judge.judge()
+    assert told.startswith("joint_1 by ") and ("would fit" in told) == (key is not None)
+    assert key is None or f"`sensors: {{joint_1: {{{key}}}}}`" in told
