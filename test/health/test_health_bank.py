@@ -95,6 +95,15 @@ def test_every_fault_is_as_probable_as_densely(seed):
     assert found[1].value == pytest.approx(gain @ (problem.values - problem.signature @ problem.mean) / information)
 
 
+def test_the_usual_size_of_an_offset_is_no_bound():
+    """A sensor may be off by any amount: the width of the prior is that which makes the measurements most probable."""
+    problem = Problem(2, {1: 40.0})
+    found = explained(problem.verdict())[1]
+    dense = [problem.log(1, width**2) - problem.log() for width in np.geomspace(2.0, 400.0, 400)]
+    assert found.log_factor == pytest.approx(max(dense), abs=1e-3) and max(dense) > dense[0] + 100.0
+    assert found.value == pytest.approx(40.0, abs=4.0 * found.sigma)
+
+
 @pytest.mark.parametrize("value", [0.8, 0.0, -0.8])
 def test_a_one_sided_fault(value):
     """Its prior is the half of the normal one, and twice as dense: by quadrature."""

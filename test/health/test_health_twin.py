@@ -72,6 +72,22 @@ def test_an_angle_sensor_that_was_never_right(channel):
     assert outcome.causes() <= {f"joint_{channel + 1}.sensor"}
 
 
+@pytest.mark.parametrize("bias", [0.02, 0.05])
+@pytest.mark.parametrize("channel", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_large_offset_at_rest_is_not_named_by_its_size(channel, bias):
+    """Encoder or stroke, without an IMU: the same in one posture, whichever is more usual to be off by so much; made up."""
+    rest, rng, found = [s for s in session()[:3] if s.stream is not Stream.IMU], np.random.default_rng(channel), []
+    sigma = {Stream.STROKES: Settings().stroke_sigma, Stream.ANGLES: Settings().angle_sigma}
+    for k in range(3000):
+        for sample in rest:
+            values = sample.values + rng.normal(0.0, sigma[sample.stream], len(sample.values))
+            found.append(Sample(sample.stream, sample.stamp + k * 5_000_000, values))
+    outcome = run(spoilt(found, Stream.ANGLES, channel, lambda v, t: v + bias, -1.0))
+    both = {f"joint_{channel + 1}.sensor", f"cylinder_{channel + 1}.sensor"}
+    (alarm,) = {alarm.since: alarm for _, alarm in outcome.states()}.values()
+    assert alarm.cause is None and both <= {each.cause for each in alarm.ranked} and outcome.causes() == set()
+
+
 @pytest.mark.parametrize("kind, channel", with_others_slow(["bias", "stuck", "dropout", "spikes"]))
 def test_a_stroke_sensor(kind, channel):
     """Named, or the cause stays open; never another. Single spikes and silence are told within 1 s."""
