@@ -17,7 +17,7 @@ from ..types import Array
 
 MODES = 6  # at most
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD, FIRST_LOAD = range(4)  # of `loads`
-STAYS, STAY_TIME = 2.2, 100.0  # standard deviation of the load that stays over the usual one; s
+STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
 SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
 FORCE_OFF, FORCE_DRIFT = 1.0, 0.03  # standard deviation of o once forces are measured, and what is added to it in a second
 LEAST_FORCE = 0.1  # both of a cylinder's force and this share of the largest one

@@ -34,7 +34,7 @@ from .deviation_filter import (
     oscillate,
     states_of,
 )
-from .deviation_step import LONGEST_STEP, add_offsets, add_unknown
+from .deviation_step import LOAD_RATE, LONGEST_STEP, add_offsets, add_unknown
 
 AGILITY, RETREAT = 2.0, 0.015  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
@@ -188,15 +188,34 @@ def usable(f, channel, residual):
 
 
 @inner
+def turn_back(f, age):
+    """Make `f.row` read what it read `age` s ago, of the state now; gives the variance of what the load did since.
+
+    Modes are turned back about where their inputs, taken to be what they are now, hold them at rest. The load's Gauss-Markov
+    process changes within t by the variance 2 level^2 (1 - (1 + r t) exp(-r t)), r its rate.
+    """
+    n, row, by_x, by_y = f.softness.shape[0], f.row, 0.0, 0.0
+    for j in range(f.status[COUNT]):
+        at, c = mode_place(f, j), f.coupling[j]
+        a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
+        still = row[at]
+        row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+        still = (still - row[at]) / (f.omega[j] * f.omega[j])
+        for b in range(c.shape[0]):
+            if not is_sag(b, n):
+                row[input_place(f, b)] += still * c[b]
+        by_x, by_y = by_x + still * c[0], by_y + still * c[1]
+    gone = LOAD_RATE * age
+    return 2.0 * f.level[0] * f.level[0] * (1.0 - (1.0 + gone) * math.exp(-gone)) * (by_x * by_x + by_y * by_y)
+
+
+@inner
 def correct(f, channel, residual, variance, age):
     """Correct the state by one reading that is read by `f.row`; gives the product of its innovation with the one before."""
     size = states_of(f)
     x, p, row, gain = f.x, f.p, f.row, f.gain
     if age > 0.0:
-        for j in range(f.status[COUNT]):
-            at = mode_place(f, j)
-            a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
-            row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+        variance += turn_back(f, age)
     covary(p, row, gain, size)
     spread, off = variance, residual
     for k in range(size):

@@ -26,6 +26,7 @@ from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
 from boom_twin.kernels.transfer.time_step import observe
 from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import ReportBlock, block_of, row_of
 from boom_twin.twin.twin import Twin
@@ -194,6 +195,31 @@ def test_a_late_reading_is_read_by_the_state_as_it_was(posed: Posed) -> None:
     assert float(f.row[first:size] @ f.x[first:size]) == pytest.approx(then, rel=1e-9)
 
 
+def test_a_late_reading_under_a_load_that_stays_is_what_it_is_now(posed: Posed) -> None:
+    """A load that stays and a softer cylinder hold the boom at rest: 0.2 s ago the angles were the same."""
+    f, place = posed.modes.filter, layout.SHARES + 8
+    f.x[layout.STAYING + 1], f.x[layout.SHARES + 1] = -200.0, 0.1
+    for j in range(int(f.status[layout.COUNT])):
+        f.x[place + 2 * j] = (-200.0 * f.coupling[j, 11] + 0.1 * f.coupling[j, 3]) / f.omega[j] ** 2
+    for i in range(4):
+        reading.read_angle(f, i, f.row)
+        now = float(f.row @ f.x)
+        assert reading.turn_back(f, 0.2) > 0.0
+        assert float(f.row @ f.x) == pytest.approx(now, rel=1e-9, abs=1e-12)
+
+
+def test_angles_that_come_late_and_out_of_order_are_used_as_what_they_are(scene: Scene) -> None:
+    """20 kg hang at the tip; every angle is up to 0.3 s late. A load of the wrong size was told with confidence."""
+    samples, truth = pseudo_session(scene, with_parameters(scene, {"tip.payload": 60.0}), 6.0, 11)
+    rng = np.random.default_rng(12)
+    arrivals = [sample.stamp + (rng.uniform(0.0, 0.3e9) if sample.stream is Stream.ANGLES else 0.0) for sample in samples]
+    late = [samples[k] for k in np.argsort(arrivals, kind="stable")]
+    light = with_parameters(scene, {"tip.payload": 40.0})
+    estimate = estimate_far_nearer_than_prediction(light, late, truth["tip"])
+    deviation = np.sqrt(estimate.tip_covariance[[0, 3]])
+    assert (np.abs(estimate.tip[:2] - truth["tip"]) < 2.5 * deviation).all()
+
+
 @pytest.mark.parametrize("posture", ["arch", "high"])
 def test_motion_of_the_tip_follows_the_posture(scene: Scene, posture: str) -> None:
     """What modes of one posture do to the tip in another: derivative of the frames' places there."""
@@ -241,6 +267,23 @@ def test_angles_tell_nothing_of_a_sag_as_the_boom_moves(scene: Scene) -> None:
     reading.read_tip(f, 1, f.row)
     sag2 = float(np.sum((0.4 * f.row[sags]) ** 2))
     assert float(f.row @ f.p @ f.row) > 0.99 * sag2 > (5e-3) ** 2
+
+
+@pytest.mark.parametrize("example", ["", "five_section_z_fold"])
+def test_sections_may_bend_by_one_percent_more(example: str) -> None:
+    """What that does to the tip, by statics of scenes with each section softer, is in the variance that is stated."""
+    scene = examine_text(example_text(example), example)[0] if example else load_scene()
+    strokes = strokes_of_posture(scene, "arch")
+    base, n = np.array(statics(scene, strokes=strokes).tip), len(scene.joints)
+    softer = [with_parameters(scene, {key: parameter(scene, key) / 1.01}) for key in (f"section_{i}.EI" for i in range(1, n + 1))]
+    spread2 = np.sum([(np.array(statics(each, strokes=strokes).tip) - base) ** 2 for each in softer], axis=0)
+    stated2 = []
+    for settings in (Settings(), Settings(section_deviation=0.0)):
+        f = Posed(scene, strokes, settings).modes.filter
+        for axis in (0, 1):
+            reading.read_tip(f, axis, f.row)
+            stated2.append(float(f.row @ f.p @ f.row))
+    assert np.subtract(stated2[:2], stated2[2:]) == pytest.approx(spread2, rel=0.1, abs=1e-9)
 
 
 def test_modes_move_the_tip_as_they_do_where_they_were_made(posed: Posed) -> None:
