@@ -28,8 +28,9 @@ LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
 that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and o (n,) if forces are measured."""
 
 COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED = range(6)  # of `status`
-ANGLE, FELT_X, FELT_Y, STEP = range(4)
-"""Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s."""
+ANGLE, FELT_X, FELT_Y, STEP, SHAKEN = range(5)
+"""Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s;
+mean squares of its predicted acceleration along x and y lately, (m/s^2)^2."""
 
 
 @by_reference
@@ -60,7 +61,7 @@ class DeviationFilter(NamedTuple):
     loads : (4,) least and largest level, the usual one, and that which it begins with, N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
-    now : (4,) see `ANGLE`.
+    now : (6,) see `ANGLE`.
     """
 
     status: NDArray[np.int64]

@@ -168,5 +168,5 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
         shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
         spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
-        last=np.zeros(len(noise)), now=np.zeros(4),
+        last=np.zeros(len(noise)), now=np.zeros(6),
     )  # fmt: skip

@@ -26,6 +26,7 @@ from .deviation_filter import (
     LOAD,
     LOAD_CHANGE,
     SCENE_ERROR,
+    SHAKEN,
     SHARES,
     SOFTENING,
     STAMP,
@@ -51,6 +52,7 @@ LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
 SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
+INEXACT_MOTION = 0.01  # share of the predicted acceleration, over `SLOW` seconds, that it is off by in haste
 
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 
@@ -192,6 +194,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
         f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
         f.pulls[i] = kept * f.pulls[i] + (1.0 - kept) * results.cylinder_forces[i]
         f.variances[i] = f.noisier[0] * estimates.variances[i]
+    for a in range(2):
+        newest = results.tip[2, a] * results.tip[2, a]
+        f.now[SHAKEN + a] = kept * f.now[SHAKEN + a] + (1.0 - kept) * newest
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
@@ -207,8 +212,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
 
 @inner
 def follow_errors(f):
-    """Variances of the acceleration that errors of the strokes push the tip with."""
-    f.pushes[0], f.pushes[1] = LEAST_ERROR * LEAST_ERROR, LEAST_ERROR * LEAST_ERROR
+    """Variances of the acceleration that errors of the strokes push the tip with, and by which fast motions are not exact."""
+    for a in range(2):
+        f.pushes[a] = LEAST_ERROR * LEAST_ERROR + INEXACT_MOTION * INEXACT_MOTION * f.now[SHAKEN + a]
     for i in range(f.softness.shape[0]):
         x, y = 0.0, 0.0
         for j in range(f.status[COUNT]):

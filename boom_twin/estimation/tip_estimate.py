@@ -23,7 +23,8 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   and angles, which show no sag, would be taken to contradict it.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
 - e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
-  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke.
+  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke; and by `INEXACT_MOTION`
+  of the predicted acceleration itself, which smoothers, steps and the modes left out are off by in haste.
 
 Measured less predicted:
 

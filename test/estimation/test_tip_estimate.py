@@ -269,13 +269,27 @@ def test_angles_tell_nothing_of_a_sag_as_the_boom_moves(scene: Scene) -> None:
     assert float(f.row @ f.p @ f.row) > 0.99 * sag2 > (5e-3) ** 2
 
 
+def test_fast_motion_is_predicted_to_a_share(posed: Posed) -> None:
+    """The error of the predicted acceleration is taken to be 1 % of its root mean square over half a second, at least."""
+    f = posed.modes.filter
+    before = f.pushes.copy()
+    f.status[layout.STARTED], f.now[layout.STEP] = 1, H
+    results, estimates = rows_of(posed.boom)
+    moments, gravity = posed.boom.compiled.bending @ posed.boom.live.z, np.array(posed.boom.plan.tables.gravity)
+    for k in range(1000):
+        results.tip[2, :2] = 12.0 * math.sin(2.0 * math.pi * 4.0 * k * H), 0.0
+        stepping.follow_prediction(f, results, estimates, moments, gravity)
+    assert f.pushes - before == pytest.approx([0.01**2 * 72.0, 0.0], rel=0.1, abs=1e-9)
+
+
 @pytest.mark.parametrize("example", ["", "five_section_z_fold"])
 def test_sections_may_bend_by_one_percent_more(example: str) -> None:
     """What that does to the tip, by statics of scenes with each section softer, is in the variance that is stated."""
     scene = examine_text(example_text(example), example)[0] if example else load_scene()
     strokes = strokes_of_posture(scene, "arch")
     base, n = np.array(statics(scene, strokes=strokes).tip), len(scene.joints)
-    softer = [with_parameters(scene, {key: parameter(scene, key) / 1.01}) for key in (f"section_{i}.EI" for i in range(1, n + 1))]
+    names = [f"section_{i}.EI" for i in range(1, n + 1)]
+    softer = [with_parameters(scene, {name: parameter(scene, name) / 1.01}) for name in names]
     spread2 = np.sum([(np.array(statics(each, strokes=strokes).tip) - base) ** 2 for each in softer], axis=0)
     stated2 = []
     for settings in (Settings(), Settings(section_deviation=0.0)):
