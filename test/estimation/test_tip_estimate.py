@@ -201,23 +201,24 @@ def test_a_late_reading_under_a_load_that_stays_is_what_it_is_now(posed: Posed) 
     f.x[layout.STAYING + 1], f.x[layout.SHARES + 1] = -200.0, 0.1
     for j in range(int(f.status[layout.COUNT])):
         f.x[place + 2 * j] = (-200.0 * f.coupling[j, 11] + 0.1 * f.coupling[j, 3]) / f.omega[j] ** 2
+    before = f.x.copy()
     for i in range(4):
         reading.read_angle(f, i, f.row)
-        now = float(f.row @ f.x)
-        assert reading.turn_back(f, 0.2) > 0.0
-        assert float(f.row @ f.x) == pytest.approx(now, rel=1e-9, abs=1e-12)
+        reading.correct(f, i, float(f.row @ f.x), 1e-12, 0.2)
+        assert f.x == pytest.approx(before, rel=1e-9, abs=1e-9)
 
 
-def test_angles_that_come_late_and_out_of_order_are_used_as_what_they_are(scene: Scene) -> None:
-    """20 kg hang at the tip; every angle is up to 0.3 s late. A load of the wrong size was told with confidence."""
-    samples, truth = pseudo_session(scene, with_parameters(scene, {"tip.payload": 60.0}), 6.0, 11)
-    rng = np.random.default_rng(12)
-    arrivals = [sample.stamp + (rng.uniform(0.0, 0.3e9) if sample.stream is Stream.ANGLES else 0.0) for sample in samples]
-    late = [samples[k] for k in np.argsort(arrivals, kind="stable")]
-    light = with_parameters(scene, {"tip.payload": 40.0})
-    estimate = estimate_far_nearer_than_prediction(light, late, truth["tip"])
-    deviation = np.sqrt(estimate.tip_covariance[[0, 3]])
-    assert (np.abs(estimate.tip[:2] - truth["tip"]) < 2.5 * deviation).all()
+def test_a_late_reading_holds_less_while_the_load_may_have_changed(posed: Posed) -> None:
+    """Its noise has the variance that the load's process gains in that time, against its exact covariance (Van Loan)."""
+    f, rate, age = posed.modes.filter, stepping.LOAD_RATE, 0.1
+    reading.read_angle(f, 2, f.row)
+    f.x[:] = 0.0
+    still = -f.row[layout.LOAD : layout.LOAD + 2].copy()
+    found = reading.turn_back(f, age)
+    still = still + f.row[layout.LOAD : layout.LOAD + 2]
+    a, level2 = np.array([[0.0, 1.0], [-(rate**2), -2.0 * rate]]), float(f.level[0]) ** 2
+    kept = expm(a * age)[0, 0]
+    assert found == pytest.approx(2.0 * level2 * (1.0 - kept) * float(still @ still), rel=1e-9)
 
 
 @pytest.mark.parametrize("posture", ["arch", "high"])
