@@ -122,7 +122,7 @@ class Settings(BaseModel):
     force_sigma: Positive = Field(default=100.0, description="noise of a cylinder's force, N")
     force_resolution: NotNegative = Field(default=20.0, description="resolution of a cylinder's force, N")
     section_deviation: NotNegative = Field(
-        default=0.0, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
+        default=0.01, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
     )
     stroke_agility: Agility = Field(default=1.0, description="more follows strokes sooner, lets more noise through")
     step: Step = Field(default=0.005, description="longest step of the remembered boom, s; halved by its error")

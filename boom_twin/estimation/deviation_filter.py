@@ -16,7 +16,7 @@ from ..kernels.jit import by_reference, inner
 from ..types import Array
 
 MODES = 6  # at most
-LEAST_LOAD, MOST_LOAD, USUAL_LOAD = range(3)  # of `loads`
+LEAST_LOAD, MOST_LOAD, USUAL_LOAD, FIRST_LOAD = range(4)  # of `loads`
 STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
 SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
 FORCE_OFF, FORCE_DRIFT = 1.0, 0.03  # standard deviation of o once forces are measured, and what is added to it in a second
@@ -28,8 +28,9 @@ LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
 that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and o (n,) if forces are measured."""
 
 COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED = range(6)  # of `status`
-ANGLE, FELT_X, FELT_Y, STEP = range(4)
-"""Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s."""
+ANGLE, FELT_X, FELT_Y, STEP, SHAKEN = range(5)
+"""Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s;
+mean squares of its predicted acceleration along x and y lately, (m/s^2)^2."""
 
 
 @by_reference
@@ -57,10 +58,10 @@ class DeviationFilter(NamedTuple):
     inverse, healed, drag : (n, n), (8, n), (n,) scratch, B of `weigh_causes`, and B times `cross` and times the mean of a.
     chances : (n + 2,) of the causes: no cylinder is off, one of them is, all are.
     last : (c,) innovations. level : (1,) N.
-    loads : (3,) least and largest level, and the usual one that it begins with, N.
+    loads : (4,) least and largest level, the usual one, and that which it begins with, N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
-    now : (4,) see `ANGLE`.
+    now : (6,) see `ANGLE`.
     """
 
     status: NDArray[np.int64]
@@ -150,6 +151,12 @@ def input_place(f, b):
     if b < 2:
         return LOAD + b
     return SHARES + b - 2 if b < 2 + shares else STAYING + b - 2 - shares
+
+
+@inner
+def is_sag(b, n):
+    """Whether input b is a share by which a section bends more: that acts at once and shakes nothing."""
+    return 2 + n <= b < 2 + 2 * n
 
 
 @inner

@@ -18,11 +18,11 @@ from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import SENSORS, Array, Mount, Stream
-from .deviation_filter import ANGLES_STAMP, COUNT, FED, FORCED, MODES, SHARES, STAMP, STARTED, USUAL_LOAD, DeviationFilter
+from .deviation_filter import ANGLES_STAMP, COUNT, FED, FIRST_LOAD, FORCED, MODES, SHARES, STAMP, STARTED, DeviationFilter
 from .posture_modes import PostureMode, PostureModes
 from .sensor_model import Mounting
 
-LOADS = np.array([1.0, 31.0, 9.2])
+LOADS = np.array([0.3, 31.0, 9.2, 3.0])
 """See `DeviationFilter.loads`, in loads that turn the joints by one standard deviation of their sensors: 6.5 N of the
 default boom in posture arch, 21 N of the 36 m Z fold."""
 STIFFEST = 1e-3  # of the boom's weight: most that such a load is taken for
@@ -63,7 +63,7 @@ class DeviationModes:
         """A new run: nothing is known of the deviation."""
         f = self.filter
         f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = f.status[FORCED] = 0
-        f.level[0], self._at[:] = f.loads[USUAL_LOAD], math.inf
+        f.level[0], self._at[:] = f.loads[FIRST_LOAD], math.inf
         f.last[:], f.spread[:] = 0.0, 0.0
         self.expect_noise(1.0, 1.0)
 
@@ -168,5 +168,5 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
         shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
         spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
-        last=np.zeros(len(noise)), now=np.zeros(4),
+        last=np.zeros(len(noise)), now=np.zeros(6),
     )  # fmt: skip

@@ -28,14 +28,15 @@ from .deviation_filter import (
     clear,
     covary,
     input_place,
+    is_sag,
     mode_place,
     offset_place,
     oscillate,
     states_of,
 )
-from .deviation_step import LONGEST_STEP, add_offsets, add_unknown
+from .deviation_step import LOAD_RATE, LONGEST_STEP, add_offsets, add_unknown
 
-AGILITY, RETREAT = 2.0, 0.03  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
+AGILITY, RETREAT = 2.0, 0.015  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
 ALIKE = 4.0  # most that one product of successive innovations counts
 
@@ -54,6 +55,7 @@ def read_tip(f, axis, row):
         row[at] = f.tip[j, axis]
         for i in range(n):
             row[SHARES + i] -= still * f.coupling[j, 2 + i]
+            row[SHARES + n + i] += still * f.coupling[j, 2 + n + i]
 
 
 @inner
@@ -70,8 +72,8 @@ def read_angle(f, i, row):
         row[at] = f.turns[j, i]
         for k in range(n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
-            if not f.absolute[i]:
-                row[SHARES + n + k] -= still * f.coupling[j, 2 + n + k]
+            if f.absolute[i]:
+                row[SHARES + n + k] += still * f.coupling[j, 2 + n + k]
     return variance
 
 
@@ -86,7 +88,7 @@ def read_force(f, i, row):
     for j in range(f.status[COUNT]):
         at, still = mode_place(f, j), f.forces[j, i] / (f.omega[j] * f.omega[j])
         row[at] = f.forces[j, i]
-        for k in range(2 * n):
+        for k in range(n):
             row[SHARES + k] -= still * f.coupling[j, 2 + k]
     row[offset_place(f, i)] = 1.0
     for k in range(n):
@@ -100,7 +102,7 @@ def read_force(f, i, row):
 @inner
 def read_acceleration(f, x, y, turn, turned, row):
     """Row of the tip's acceleration along (x, y), `turn` times its angular one and `turned` times its turn beside."""
-    size = states_of(f)
+    size, n = states_of(f), f.softness.shape[0]
     clear(row, size)
     row[ERROR], row[ERROR + 1] = x, y
     for j in range(f.status[COUNT]):
@@ -109,7 +111,8 @@ def read_acceleration(f, x, y, turn, turned, row):
         row[at] = -f.omega[j] * f.omega[j] * along + turned * f.tip[j, 2]
         row[at + 1] = -f.decay[j] * along
         for b in range(f.coupling.shape[1]):
-            row[input_place(f, b)] += along * f.coupling[j, b]
+            by = turned * f.tip[j, 2] / (f.omega[j] * f.omega[j]) if is_sag(b, n) else along
+            row[input_place(f, b)] += by * f.coupling[j, b]
 
 
 @inner
@@ -185,15 +188,34 @@ def usable(f, channel, residual):
 
 
 @inner
+def turn_back(f, age):
+    """Make `f.row` read what it read `age` s ago, of the state now; gives the variance of what the load did since.
+
+    Modes are turned back about where their inputs, taken to be what they are now, hold them at rest. The load's Gauss-Markov
+    process changes within t by the variance 2 level^2 (1 - (1 + r t) exp(-r t)), r its rate.
+    """
+    n, row, by_x, by_y = f.softness.shape[0], f.row, 0.0, 0.0
+    for j in range(f.status[COUNT]):
+        at, c = mode_place(f, j), f.coupling[j]
+        a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
+        still = row[at]
+        row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+        still = (still - row[at]) / (f.omega[j] * f.omega[j])
+        for b in range(c.shape[0]):
+            if not is_sag(b, n):
+                row[input_place(f, b)] += still * c[b]
+        by_x, by_y = by_x + still * c[0], by_y + still * c[1]
+    gone = LOAD_RATE * age
+    return 2.0 * f.level[0] * f.level[0] * (1.0 - (1.0 + gone) * math.exp(-gone)) * (by_x * by_x + by_y * by_y)
+
+
+@inner
 def correct(f, channel, residual, variance, age):
     """Correct the state by one reading that is read by `f.row`; gives the product of its innovation with the one before."""
     size = states_of(f)
     x, p, row, gain = f.x, f.p, f.row, f.gain
     if age > 0.0:
-        for j in range(f.status[COUNT]):
-            at = mode_place(f, j)
-            a11, a12, a21, a22 = oscillate(f.omega[j], f.decay[j], -age)
-            row[at], row[at + 1] = row[at] * a11 + row[at + 1] * a21, row[at] * a12 + row[at + 1] * a22
+        variance += turn_back(f, age)
     covary(p, row, gain, size)
     spread, off = variance, residual
     for k in range(size):

@@ -18,6 +18,7 @@ from .deviation_filter import (
     FED,
     FELT_X,
     FELT_Y,
+    FIRST_LOAD,
     FORCE_DRIFT,
     FORCE_OFF,
     FORCED,
@@ -25,6 +26,7 @@ from .deviation_filter import (
     LOAD,
     LOAD_CHANGE,
     SCENE_ERROR,
+    SHAKEN,
     SHARES,
     SOFTENING,
     STAMP,
@@ -38,6 +40,7 @@ from .deviation_filter import (
     clear,
     copy_columns,
     input_place,
+    is_sag,
     mix_rows,
     mode_place,
     offset_place,
@@ -49,6 +52,7 @@ LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
 SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
+INEXACT_MOTION = 0.01  # share of the predicted acceleration, over `SLOW` seconds, that it is off by in haste
 
 LONGEST_STEP = 0.05  # s, of the covariance's differential equation
 
@@ -102,17 +106,17 @@ def start_state(f):
         f.x[k] = 0.0
         for b in range(f.x.shape[0]):
             f.p[k, b] = 0.0
-    f.level[0] = f.loads[USUAL_LOAD]
+    f.level[0] = f.loads[FIRST_LOAD]
     for b in range(2):
-        add_unknown(f, b, f.loads[USUAL_LOAD])
+        add_unknown(f, b, f.level[0])
         add_unknown(f, 2 + 2 * n + b, STAYS * f.loads[USUAL_LOAD])
-        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.loads[USUAL_LOAD]) ** 2
+        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.level[0]) ** 2
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
         f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
     for i in range(n):
         if f.softness[i] > 0.0:
             add_unknown(f, 2 + i, SCENE_ERROR)
-        add_unknown(f, 2 + n + i, f.sections_off[i])
+        f.p[SHARES + n + i, SHARES + n + i] = f.sections_off[i] * f.sections_off[i]
     for j in range(f.status[COUNT]):
         at = mode_place(f, j)
         swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
@@ -190,6 +194,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
         f.ahead[i] = min(max(newest / f.drawn[i] - 1.0, -1.0), 1.0) if f.drawn[i] != 0.0 else 0.0
         f.pulls[i] = kept * f.pulls[i] + (1.0 - kept) * results.cylinder_forces[i]
         f.variances[i] = f.noisier[0] * estimates.variances[i]
+    for a in range(2):
+        newest = results.tip[2, a] * results.tip[2, a]
+        f.now[SHAKEN + a] = kept * f.now[SHAKEN + a] + (1.0 - kept) * newest
     follow_errors(f)
     for j in range(f.status[COUNT]):
         c = f.coupling[j]
@@ -205,8 +212,9 @@ def follow_prediction(f, results, estimates, moments, gravity):
 
 @inner
 def follow_errors(f):
-    """Variances of the acceleration that errors of the strokes push the tip with."""
-    f.pushes[0], f.pushes[1] = LEAST_ERROR * LEAST_ERROR, LEAST_ERROR * LEAST_ERROR
+    """Variances of the acceleration that errors of the strokes push the tip with, and by which fast motions are not exact."""
+    for a in range(2):
+        f.pushes[a] = LEAST_ERROR * LEAST_ERROR + INEXACT_MOTION * INEXACT_MOTION * f.now[SHAKEN + a]
     for i in range(f.softness.shape[0]):
         x, y = 0.0, 0.0
         for j in range(f.status[COUNT]):
@@ -219,7 +227,7 @@ def follow_errors(f):
 @inner
 def step_state(f, h):
     """Mean and covariance h (s) later: half a step of the inputs, one of the modes under these, the other half (Strang)."""
-    size, inputs = states_of(f), f.coupling.shape[1]
+    size, n, inputs = states_of(f), f.softness.shape[0], f.coupling.shape[1]
     x, p, row = f.x, f.p, f.row
     step_inputs(f, 0.5 * h, size)
     for j in range(f.status[COUNT]):
@@ -229,18 +237,20 @@ def step_state(f, h):
         force = 0.0
         clear(row, size)
         for b in range(inputs):
-            place = input_place(f, b)
-            force += c[b] * x[place]
-            add_row(row, c[b], p[place], size)
+            if not is_sag(b, n):
+                place = input_place(f, b)
+                force += c[b] * x[place]
+                add_row(row, c[b], p[place], size)
         x[at], x[at + 1] = a11 * x[at] + a12 * x[at + 1] + g1 * force, a21 * x[at] + a22 * x[at + 1] + g2 * force
         mix_rows(p[at], p[at + 1], a11, a12, a21, a22, f.gain, size)
         add_row(p[at], g1, row, size)
         add_row(p[at + 1], g2, row, size)
         by_q, by_rate = 0.0, 0.0
         for b in range(inputs):
-            place = input_place(f, b)
-            by_q += c[b] * p[at, place]
-            by_rate += c[b] * p[at + 1, place]
+            if not is_sag(b, n):
+                place = input_place(f, b)
+                by_q += c[b] * p[at, place]
+                by_rate += c[b] * p[at + 1, place]
         _, b12, _, b22 = oscillate(f.omega[j], f.decay[j], 0.5 * h)
         share = f.density[j] * h / 6.0  # of the noise's integral, by Simpson's rule
         q2 = a11 * p[at, at] + a12 * p[at, at + 1] + g1 * by_q + share * (4.0 * b12 * b12 + a12 * a12)

@@ -3,7 +3,7 @@
 The prediction is a function of the strokes alone. What it lacks, by load or by parameters that are off, is a small motion
 about it, in the natural modes j of the present posture (coordinates q_j, unit modal mass):
 
-    q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j = Phi_j^T f + sum_i N_ij (F_i / k_i) a_i + sum_s B_js b_s + w_j
+    q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j = Phi_j^T f + sum_i N_ij (F_i / k_i) a_i + w_j
 
 - f (2), N: force at the tip that the model does not know, a Gauss-Markov process of second order, twice damped at `LOAD_RATE`,
   so that its rate is a state too: what shakes a boom has no corners, and a process of first order states twice the error of
@@ -18,14 +18,17 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   would be drawn to what explains noise by noise. While a boom moves that is behind by a share of a_i itself, which a_i may
   drift by within `SLOW`: else load and other shares would have to make up for it.
 - b_s: likewise of section s's bending, as a share of 1/EI: B_js = sum of M_j M w / EI over its stations, M the predicted
-  moment, slow likewise, M_j the mode's, w Simpson's weights.
+  moment, slow likewise, M_j the mode's, w Simpson's weights. What it sags, sum_j Phi_j B_js / omega_j^2 of its share, follows
+  the moments at once and is no part of q: as an input of the modes it would have to wait for them where the posture changes,
+  and angles, which show no sag, would be taken to contradict it.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
 - e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
-  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke.
+  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke; and by `INEXACT_MOTION`
+  of the predicted acceleration itself, which smoothers, steps and the modes left out are off by in haste.
 
 Measured less predicted:
 
-    angle_i   Theta_i q + what is quasi-static in a and b and in no mode
+    angle_i   Theta_i q + what is quasi-static in a and in no mode; of an inclinometer, the sag inboard of it
     force_i   N_i q, likewise, and an offset o_i
     IMU       Phi q'' + e, turned into the tip's axes, the specific force turned by the tip's own turn, and a bias of each axis
 
@@ -35,8 +38,8 @@ Measured less predicted:
   explained by a load and softer cylinders and put the tip off by 114 mm. It is no share of the predicted force, whose
   quick part holds the strokes' noise as the residual does: a share would be drawn to what explains noise by noise.
 
-What a and b do at rest is known in closed form: a stroke turns its own joint only, bending turns none, and neither changes a
-cylinder's force. The part of that which the few modes lack is added (static correction).
+What a does at rest is known in closed form: a stroke turns its own joint only and changes no cylinder's force. The part of
+that which the few modes lack is added (static correction). Bending turns no joint and changes no force.
 
 At rest a load that stays and softer cylinders look alike. Gaussian deviations as wide as a soft cylinder needs would always
 take it for these, all of them a little softer at once; so what is told is a mixture over the causes: no cylinder is off by
