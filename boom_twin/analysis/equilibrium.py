@@ -208,7 +208,7 @@ def statics(
         joints=found.joints,
         cylinder_forces=found.cylinder_forces,
         modes=natural_modes(plan, state, work, modes),
-        outline=outline(plan, state, work.position),
+        outline=outline(plan, state.frames, work.position),
         doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),
     )
 
@@ -329,11 +329,20 @@ def is_stable(plan: Plan, state: State, work: Work) -> bool:
         return False
 
 
-def outline(plan: Plan, state: State, position: Array) -> Array:
-    """Points (k, 2) of the centre line, base to tip, m; `position` holds all history positions."""
-    frames, points = plan.outline[:, 0] == 0, plan.outline[:, 0] == 1
-    line = np.empty((len(plan.outline), 2))
-    line[frames] = state.frames[plan.outline[frames, 1], :2]
-    at = plan.outline[points, 1]
-    line[points, 0], line[points, 1] = position[at], position[at + 1]
-    return line[1:]
+def outline(plan: Plan, frames: Array, position: Array) -> Array:
+    """Points (.., k, 2) of the centre line, base to tip, m.
+
+    Parameters
+    ----------
+    plan : Plan
+    frames : ndarray, shape (.., operations + 1, 5)
+        See `boom_twin.kernels.tables.State`.
+    position : ndarray, shape (.., histories)
+        All history positions.
+    """
+    are_frames, are_points = plan.outline[:, 0] == 0, plan.outline[:, 0] == 1
+    line = np.empty((*frames.shape[:-2], len(plan.outline), 2))
+    line[..., are_frames, :] = frames[..., plan.outline[are_frames, 1], :2]
+    at = plan.outline[are_points, 1]
+    line[..., are_points, 0], line[..., are_points, 1] = position[..., at], position[..., at + 1]
+    return line[..., 1:, :]

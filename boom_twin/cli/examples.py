@@ -23,6 +23,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "replay": (
         "replay bags/arch_session --out out/replay --report",
+        "replay bags/arch_session --out out/numbers --no-bag --no-pictures --table csv",
         "replay session.csv --scene my_boom.yaml --out out/replay --start 10 --duration 20 --table csv",
     ),
     "calibrate": ("calibrate bags/today bags/tomorrow --out calibrated.yaml",),

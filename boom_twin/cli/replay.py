@@ -35,7 +35,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session_scene(parser)
     add_window(parser)
-    place = "folder for summary.json, bag/ and pictures: new, empty, or of an earlier replay, which is replaced"
+    place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_params(parser)
     add_mapping(parser)
@@ -46,6 +46,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
+    told = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
+    parser.add_argument("--no-bag", action="store_true", help=told)
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
@@ -103,7 +105,7 @@ def run(args: Namespace) -> int:
             if table is not None:
                 table.add(stretch)
 
-        result = replay_into(building, args.bag, scene, *options, take=take)
+        result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag)
         found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:
@@ -114,7 +116,7 @@ def run(args: Namespace) -> int:
         print_json(flat(result.summary))
         return 0
     print("\n".join(as_text(result.summary)))
-    for name in ["summary.json", "bag", *files]:
+    for name in ["summary.json", *([] if args.no_bag else ["bag"]), *files]:
         print(out / name)
     return 0
 
@@ -173,6 +175,8 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines.append(f"{name:18s} lost contact between two samples {count} times")
     lines += [f"noise              {told}" for told in noise_as_text(summary)]
     lines += [f"judgement          {told}" for told in limits_as_text(summary)]
+    if summary["output_sha256"] is None:
+        lines.append("result bag         not written (--no-bag)")
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,24 +28,40 @@ class UndeflectedPredictor:
         self._plan, self._pivot = plan, np.array(scene.base.pivot)
         self._lengths = np.array([section.length for section in scene.sections])
         self._reach = np.concatenate([[0.0], np.cumsum(self._lengths)])
-        self._along = self._points_along(np.radians([sum(joint.range_deg) / 2 for joint in scene.joints]))
+        along = self._points_along(np.radians([sum(joint.range_deg) / 2 for joint in scene.joints]))
+        self._section = np.clip(np.searchsorted(self._reach, along, side="right") - 1, 0, len(self._lengths))
+        self._beyond = np.where(self._section < len(self._lengths), np.maximum(along - self._reach[self._section], 0.0), 0.0)
 
     def at(self, angles: Array) -> Array:
-        """Points (k, 2), m, at relative joint `angles` (rad), shape (n,)."""
+        """Points (.., k, 2), m, at relative joint `angles` (rad), shape (.., n)."""
         _, pivots = rigid_chain(self._pivot, self._lengths, angles)
-        return np.stack([np.interp(self._along, self._reach, column) for column in pivots.T], axis=1)
+        steps = np.diff(pivots, axis=-2) / np.diff(self._reach)[:, None]
+        steps = np.concatenate([steps, np.zeros_like(steps[..., :1, :])], axis=-2)
+        return np.asarray(steps[..., self._section, :] * self._beyond[:, None] + pivots[..., self._section, :])
 
     def _points_along(self, angles: Array) -> Array:
         """How far along the sections every point is, m, shape (k,): all pivots are among the points; found at some angles."""
         state, work = self._plan.state(), self._plan.work()
         set_undeformed(self._plan, state, angles)
         place(self._plan.tables, state, work)
-        line = outline(self._plan, state, work.position)
+        line = outline(self._plan, state.frames, work.position)
         steps = np.hypot(*np.diff(line, axis=0, prepend=self._pivot[None, :]).T)
         return np.asarray(np.cumsum(steps))
 
 
 TINY = 1e-12
+
+
+class Drawn(NamedTuple):
+    """A boom at one instant, as far as its outline needs it.
+
+    frames, positions : of `State` and `Work`. angles : (n,) joint angles of the rigid boom, rad. pins : (n, 4) of `State`.
+    """
+
+    frames: Array
+    positions: Array
+    angles: Array
+    pins: Array
 
 
 class CompiledBoom(NamedTuple):
@@ -170,10 +187,16 @@ class BoomPredictor:
         """Strokes (m) as estimated at the newest sample, shape (n,)."""
         return self._row[self.places.strokes]
 
-    def outline(self) -> Outline:
-        """Centre lines and cylinder pins at the newest sample."""
-        shape = outline(self.plan, self.live, self._work.position)
-        return Outline(shape, self._undeflected.at(self.angles), self.live.pins.copy())
+    @property
+    def drawn(self) -> Drawn:
+        """What an outline at the newest sample needs: to be kept, and made `outlines` of with others."""
+        return Drawn(self.live.frames.copy(), self._work.position.copy(), self.angles.copy(), self.live.pins.copy())
+
+    def outlines(self, drawn: Sequence[Drawn]) -> list[Outline]:
+        """Centre lines and cylinder pins at several samples, at least one."""
+        frames, positions, angles, _ = map(np.array, zip(*drawn, strict=True))
+        lines = outline(self.plan, frames, positions), self._undeflected.at(angles)
+        return [Outline(shape, undeflected, each.pins) for shape, undeflected, each in zip(*lines, drawn, strict=True)]
 
     def prediction(self, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
         """What the newest sample gave, with an outline and bending moments (N m) if they are given."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import Plan, width_of
 from ..errors import UsageError
 from ..kernels.jit import inner
+from ..kernels.result_row import places_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
+from ..kernels.transfer.time_step import observe
 from ..types import Array, Mount
 
 TURN = 2.0 * np.pi
@@ -92,16 +94,28 @@ class Reading:
 
     def __init__(self, plan: Plan, mounting: Mounting) -> None:
         self._plan, self._mounting = plan, mounting
+        self._row, self._at = np.zeros(width_of(plan)), places_in(plan.joints, len(plan.pins))
+        self._gravity: tuple[float, float] = tuple(plan.tables.gravity.tolist())
+        self._observe: Callable[..., object] | None = None
 
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
-        joints = taken_apart(self._plan, first_row(self._plan, state)).joints
-        x, y, angle = (state.frames[-1, place] for place in (FRAME_X, FRAME_Y, FRAME_ANGLE))
+        self._look(state)
+        x, y, angle = state.frames[-1, [FRAME_X, FRAME_Y, FRAME_ANGLE]].tolist()
         c, s = math.cos(angle), math.sin(angle)
-        gx, gy = self._plan.tables.gravity
-        angles = self._mounting.expected(joints, state)
-        return np.concatenate([angles, [*specific_force(-gx, -gy, c, s), x, y]])
+        found, (gx, gy) = np.empty(self._plan.joints + 4), self._gravity
+        found[:-4] = self._mounting.expected(self._row[self._at.joints], state)
+        found[-4:] = *specific_force(-gx, -gy, c, s), x, y
+        return found
 
     def forces(self, state: State) -> Array:
         """Of the cylinders, N, positive in tension, shape (n,)."""
-        return taken_apart(self._plan, first_row(self._plan, state)).cylinder_forces
+        self._look(state)
+        return self._row[self._at.cylinder_forces].copy()
+
+    def _look(self, state: State) -> None:
+        """Bring the row of results up to date."""
+        arguments = self._plan.tables, state, self._row
+        if self._observe is None:
+            self._observe = observe.for_types_of(*arguments)
+        self._observe(*arguments)

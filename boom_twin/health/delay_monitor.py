@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -59,7 +60,9 @@ class DelayMonitor:
         self._blocks: deque[tuple[Array, Array]] = deque()
         self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
 
-    def take(self, number: int, stamps: Array, left: Array, expected: Array, end: int, is_doubted: bool = False) -> list[Alarm]:
+    def take(
+        self, number: int, stamps: Array, left: Array, expected: Array, end: int, is_doubted: Callable[[], bool] = lambda: False
+    ) -> list[Alarm]:
         """Take the readings of a block; gives an alarm that began, changed or ended.
 
         Parameters
@@ -72,8 +75,8 @@ class DelayMonitor:
             Residuals, NaN of channels that are not to be used, and what was expected.
         end : int
             Of the block, ns.
-        is_doubted : bool
-            Another fault puts vibration out of step: no alarm begins.
+        is_doubted : callable, optional
+            Asked once a span is complete: whether another fault puts vibration out of step, so that no alarm begins.
         """
         if number != self._number + 1 or len(stamps) < 2 or stamps[-1] <= stamps[0]:
             self._blocks.clear()
@@ -89,7 +92,7 @@ class DelayMonitor:
         found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
         is_known = np.isfinite(found[0])
         self._spans.append(tuple(np.where(is_known, each, 0.0) for each in found))  # type: ignore[arg-type]
-        return self._judge(end, is_doubted)
+        return self._judge(end, is_doubted())
 
     @staticmethod
     def _averaged(blocks: list[Array]) -> Array:

@@ -11,7 +11,6 @@ k being the allowance and h the threshold; that of the window by the quantile of
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,8 @@ class Detector:
         self.limit = EXCESS * chi_square_exceeded(2.0 * rate)
         self._up, self._down = np.zeros(channels), np.zeros(channels)
         self._began = np.zeros((2, channels), dtype=np.int64)
-        self._squares: deque[Array] = deque(maxlen=WINDOW)
+        self._squares = np.zeros((WINDOW, channels))  # the newest last
+        self._lasting = np.zeros(channels)
         self._count = 0
 
     def take(self, normal: Array) -> None:
@@ -55,12 +55,14 @@ class Detector:
         for row, (sums, signed) in enumerate(((self._up, z), (self._down, -z))):
             self._began[row, sums == 0.0] = self._count
             np.maximum(0.0, sums + (signed - allowed), out=sums)
-        self._squares.append(z**2)
+        self._squares[:-1] = self._squares[1:]
+        self._squares[-1] = z**2
+        self._note_lasting()
 
     @property
     def levels(self) -> Array:
         """Of each channel: 1 and above is an alarm; shape (channels,)."""
-        window = np.sum(self._squares, axis=0) if len(self._squares) == WINDOW else 0.0
+        window = self._squares.sum(axis=0) if self._count >= WINDOW else 0.0
         return np.maximum(self._lasting, window / self.limit)
 
     @property
@@ -69,9 +71,8 @@ class Detector:
         worst = float(self.levels.max())
         return max(float(self._lasting.max()), worst if worst > 0.5 else 0.0)
 
-    @property
-    def _lasting(self) -> Array:
-        return np.asarray(np.maximum(self._up, self._down) / self.threshold)
+    def _note_lasting(self) -> None:
+        self._lasting = np.maximum(self._up, self._down) / self.threshold
 
     def blocks_since(self, channel: int) -> int:
         """Blocks since the deviation of a channel began, as far as it can be told."""
@@ -84,8 +85,8 @@ class Detector:
         """Begin anew, at some channels or all."""
         which = np.ones(len(self._up), dtype=bool) if channels is None else channels
         self._up[which], self._down[which] = 0.0, 0.0
-        for squares in self._squares:
-            squares[which] = 0.0
+        self._squares[:, which] = 0.0
+        self._note_lasting()
 
 
 def cusum_threshold(run: float) -> float:

@@ -72,6 +72,8 @@ class ForceReading:
         start, end : int
             Of the block, ns.
         """
+        if not len(left):
+            return []
         known = np.isfinite(left)
         counts = known.sum(axis=0)
         heard = counts > 0

@@ -65,13 +65,15 @@ class ImuMount:
         start, end : int
             Of the block, ns.
         """
-        known = np.isfinite(left).all(axis=1)
-        if not known.any():
+        if not math.isfinite(left.sum()):
+            known = np.isfinite(left).all(axis=1)
+            raw, left = raw[known], left[known]
+        if not len(left):
             return []
-        read, share = raw[known].mean(axis=0), min(1.0, span / WINDOW)
+        read, share = raw.mean(axis=0), min(1.0, span / WINDOW)
         self._read += share * (read - self._read)
-        self._expected += share * (read - left[known].mean(axis=0) - self._expected)
-        self._squares += share * (float((left[known] ** 2).sum(axis=1).mean()) - self._squares)
+        self._expected += share * (read - left.mean(axis=0) - self._expected)
+        self._squares += share * (float((left**2).sum(axis=1).mean()) - self._squares)
         self._weight += share * (1.0 - self._weight)
         return self._judge(start, end)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,8 @@ from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, Blo
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, bends2, sensor_ranges
+from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, sensor_ranges
+from .sensor_survey import follow_noise, is_bent
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0
@@ -69,6 +71,8 @@ class HealthMonitor:
         self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
+        self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
+        self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
         self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
         self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
@@ -116,13 +120,14 @@ class HealthMonitor:
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """The same of one stream."""
-        if stream is Stream.FORCES:
+        if stream is Stream.FORCES and self._forces.alarms:
             return self._sensors[stream].masked | self._forces.masked
         if stream is Stream.ANGLES:
             return self._sensors[stream].masked | self._angles.masked
         if stream in self._sensors:
             return self._sensors[stream].masked
-        return np.full(len(self._channels[stream]), stream is Stream.IMU and self._mount.alarm is not None)
+        masked = self._trusted[stream]
+        return ~masked if stream is Stream.IMU and self._mount.alarm is not None else masked
 
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
@@ -166,7 +171,7 @@ class HealthMonitor:
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []
         readings = {stream: block.readings(stream, len(names)) for stream, names in self._channels.items()}
-        is_followed = bool((predictions.variances < UNCERTAIN * self._settings.stroke_variance).all())
+        is_followed = bool(predictions.variances.max() < UNCERTAIN * self._settings.stroke_variance)
         is_shaken = any(self._is_shaken(stream, rows.raw) for stream, rows in readings.items() if stream is not Stream.STROKES)
         for stream, (stamps, raw, left) in readings.items():
             if stream in CHECKED and stream is not Stream.STROKES:
@@ -210,23 +215,24 @@ class HealthMonitor:
         news: list[Alarm] = []
         for stream, monitor in self._delays.items():
             stamps, raw, left = readings[stream]
-            left = np.where(self._masked(stream), np.nan, left)
-            cause = delay_cause(stream)
-            suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
-            is_doubted = self.residuals.is_shaken(block.end) or any(cause not in each for each in suspects)
+            if (masked := self._masked(stream)).any():
+                left = np.where(masked, np.nan, left)
             times = np.asarray((stamps - block.number * BLOCK) * NANO)
-            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted)
+            news += monitor.take(block.number, times, left, raw - left, block.end, partial(self._is_doubted, stream, block.end))
         return news
+
+    def _is_doubted(self, stream: Stream, stamp: int) -> bool:
+        """Whether a load, or a fault that is not its lag, may put the vibration that a stream reads out of step at `stamp`."""
+        cause = delay_cause(stream)
+        suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
+        return self.residuals.is_shaken(stamp) or any(cause not in each for each in suspects)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate.
 
         Noise gives the same variance by second and by third differences, motion much less by third ones.
         """
-        trusted = raw[:, ~self._masked(stream)]
-        power, rougher = bends2(trusted).sum(axis=0), (np.diff(trusted, n=3, axis=0) ** 2).sum(axis=0) / 20.0
-        is_bent = power > SHAKEN * self._settings.variance(SENSORS[stream]) * (len(trusted) - 2)
-        return bool((is_bent & (rougher < WHITE * power)).any())
+        return bool(is_bent(np.ascontiguousarray(raw), self._masked(stream), self._stated[stream], SHAKEN, WHITE))
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
@@ -234,7 +240,7 @@ class HealthMonitor:
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO, float), raw, expected, block.end * NANO)
         is_predicted = stream is not Stream.STROKES
-        blamed = self.residuals.blamed if is_predicted else frozenset()
+        blamed = self.residuals.blamed if is_predicted and findings.jumped.any() else frozenset()
         news = monitor.take(findings, block.number * BLOCK, block.end, blamed)
         if stream in JUDGED and (monitor.masked & ~before).any():
             self.residuals.forget()
@@ -244,9 +250,10 @@ class HealthMonitor:
         """Means of the residuals (k, channels) of every stream that is judged."""
         stamps, found = predictions.stamps, []
         for stream in JUDGED:
-            stated, left = self._settings.variance(SENSORS[stream]), readings[stream].left
+            stated, left = self._stated[stream], np.ascontiguousarray(readings[stream].left)
             mean, count = means(left, stated**0.5)
-            count = count * stated / self._measured_noise(stream, left, stated)
+            follow_noise(left, LOUDEST * stated, NOISE_SHARE, self._noise2[stream])
+            count = count * stated / np.maximum(self._noise2[stream], stated)
             mean[self._masked(stream)] = np.nan
             found.append((mean, count))
         imu = readings[Stream.IMU]
@@ -261,14 +268,6 @@ class HealthMonitor:
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
             motion=readings[Stream.IMU if len(readings[Stream.IMU].stamps) else Stream.ANGLES],
         )
-
-    def _measured_noise(self, stream: Stream, left: Array, stated: float) -> Array:
-        """Variance (channels,) of single readings lately, by their second differences; at least that which is stated."""
-        power = bends2(left)
-        if len(power) and np.isfinite(power.sum()):
-            heard = np.minimum(power.mean(axis=0), LOUDEST * stated)
-            self._noise2[stream] += NOISE_SHARE * (heard - self._noise2[stream])
-        return np.asarray(np.maximum(self._noise2[stream], stated))
 
     def _tip_sigmas(self) -> Array:
         """Of the predicted tip, m: what strokes and parameters may be off by."""
@@ -290,6 +289,9 @@ def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     none, two = np.zeros((0, 0)), np.zeros((2, 2))
     SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
+    is_bent(two, np.zeros(2, dtype=bool), 1.0, 1.0, 1.0)
+    follow_noise(two, 1.0, 1.0, np.zeros(2))
+    means(two, 1.0)
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
     whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
     found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)

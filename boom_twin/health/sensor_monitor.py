@@ -103,6 +103,8 @@ class SensorFindings:
     silent: Flags
     outside: Flags
     level: Array
+    is_calm: bool = False
+    """Nothing was found in any channel; `level` is not told then."""
 
     def by_kind(self) -> dict[str, Flags]:
         """In the words of alarms."""
@@ -138,6 +140,8 @@ class SensorCheck:
         self._power, self._missing = np.full(count, np.nan), np.zeros(count)
         self._usual2 = self._lasting2 = self._sigma**2  # of the noise, as it is with most channels: now, and lately
         self._first = math.inf
+        none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
+        self._calm = SensorFindings(none, none, none, np.zeros(count), none, none, unknown, is_calm=True)
 
     @property
     def noise(self) -> float:
@@ -164,7 +168,7 @@ class SensorCheck:
         """
         count = raw.shape[1]
         if not len(stamps):
-            return self._nothing(count, now)
+            return self._calm if self._first == math.inf else self._nothing(count, now)
         times = np.concatenate([self._stamps, stamps])
         all_raw = np.concatenate([self._raw, raw])
         left = np.concatenate([self._left, raw - expected])
@@ -172,21 +176,25 @@ class SensorCheck:
         self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
         share, cut, outside = min(1.0, span / NOISY_WINDOW), (4.0 * NOISY * self._sigma) ** 2, np.zeros(count)
         variance, own = self._sigma**2, (self._power, self._run, self._since, self._missing, outside)
-        largest = survey(times, all_raw, left, self._low, self._high, SILENT_FOR, share, cut, variance, *own)
+        found = survey(times, all_raw, left, self._low, self._high, SILENT_FOR, share, cut, variance, *own)
         self._usual2 = self._usual_power()
         self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
+        loud, newest = NOISY**2 * min(self._usual2, NOISY**2 * variance), float(stamps[-1])
+        self._first = min(self._first, float(stamps[0]))
+        if whole and now - newest <= SILENT_FOR and self._is_calm(found, loud, len(raw)):
+            self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
+            return self._calm
         spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
-        if largest > SPIKE * self._sigma:
+        if found[0] > SPIKE * self._sigma:
             steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
             noise = np.sqrt(np.fmax(np.fmax(self._power, self._sigma**2), _usual_bend2(left)))
             spikes, jumped = self._spikes(steps, noise), self._jumps(times, all_raw, left, steps, noise)
-        self._first = min(self._first, float(stamps[0]))
         interval = (times[-1] - times[2]) / len(stamps)
         is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
         is_known = now - self._first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
         findings = SensorFindings(
-            stuck=self._stuck(float(stamps[-1])),
-            noisy=is_known & (self._power > NOISY**2 * min(self._usual2, NOISY**2 * self._sigma**2)),
+            stuck=self._stuck(newest),
+            noisy=is_known & (self._power > loud),
             spikes=spikes & is_known,
             jumped=jumped,
             silent=(now - self._heard > SILENT_FOR) | (self._missing > MISSING),
@@ -195,6 +203,12 @@ class SensorCheck:
         )
         self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
         return findings
+
+    def _is_calm(self, found: tuple[float, float, int, float, float], loud: float, rows: int) -> bool:
+        """Whether no channel can have a finding, by what `survey` gave of so many rows; variances up to `loud` are usual."""
+        largest, loudest, longest, lack, most = found
+        is_live = lack <= MISSING and longest < self._patience and most <= 0.5 * rows
+        return is_live and largest <= SPIKE * self._sigma and loudest <= loud
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
         none = np.zeros(count, dtype=bool)
@@ -216,8 +230,8 @@ class SensorCheck:
 
         At least what is stated; of a single channel just that. A judgement takes at most `NOISY` times that for usual.
         """
-        known, stated = np.sort(self._power[np.isfinite(self._power)]), self._sigma**2
-        middle = float(known[(len(known) - 1) // 2]) if len(known) > 1 else stated
+        known, stated = sorted(power for power in self._power.tolist() if math.isfinite(power)), self._sigma**2
+        middle = known[(len(known) - 1) // 2] if len(known) > 1 else stated
         return max(middle, stated)
 
     def _stuck(self, newest: float) -> Flags:
@@ -315,6 +329,7 @@ class SensorMonitor:
     def __init__(self, names: tuple[str, ...], kind: SensorKind) -> None:
         self._names, self._sensors = names, kind
         self._faults: dict[tuple[int, str], _Fault] = {}
+        self._none: Flags = np.zeros(len(names), dtype=bool)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -324,7 +339,9 @@ class SensorMonitor:
     @property
     def masked(self) -> Flags:
         """Channels that are not to be trusted, shape (channels,)."""
-        flags = np.zeros(len(self._names), dtype=bool)
+        if not self._faults:
+            return self._none
+        flags = self._none.copy()
         for channel, kind in self._faults:
             flags[channel] |= kind != "spikes"
         return flags
@@ -336,6 +353,8 @@ class SensorMonitor:
         come back, and residuals tell so.
         """
         news: list[Alarm] = []
+        if findings.is_calm and not self._faults:
+            return news
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue

@@ -11,7 +11,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -138,6 +138,7 @@ def replay(
     baseline: str | Path | None = None,
     window: TimeWindow = WHOLE,
     namespace: str = "",
+    with_bag: bool = True,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -168,6 +169,8 @@ def replay(
         times of the result count from there.
     namespace : str
         ROS namespace of the node in the session, where the mapping does not tell that.
+    with_bag : bool
+        Write the result bag; without it, ``output_sha256`` of the summary is None, and all else is the same.
 
     Returns
     -------
@@ -184,7 +187,7 @@ def replay(
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
         options = progress, mapping, changes, health, baseline, window, namespace
-        return replay_into(building, bag, scene, settings, *options)
+        return replay_into(building, bag, scene, settings, *options, with_bag=with_bag)
 
 
 def replay_into(
@@ -200,12 +203,13 @@ def replay_into(
     window: TimeWindow = WHOLE,
     namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
+    with_bag: bool = True,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    with _processes(building) as (reader, writer):
+    with _processes(building, with_bag) as (reader, writer):
         session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
         taken = scene_for(session.path, scene)
         scene, joints = taken.scene, len(taken.scene.joints)
@@ -219,11 +223,12 @@ def replay_into(
         recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
         refused = RefusedStrokes(scene, taken.source)
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
-        behind = ReportWriter(writer, session.notes, topics, scene, settings)
+        behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
         with _unhurried_collector():
             twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
             ahead.wait_ready()
-            behind.wait_ready()
+            if behind is not None:
+                behind.wait_ready()
             samples: Iterator[SampleBlock | Change | None] = iter(ahead)
             bar = progress(_expected(session, wanted, window)) if progress else None
             began = time.perf_counter()
@@ -239,14 +244,15 @@ def replay_into(
                 recording.add_samples(block)
                 for each in found:
                     recording.add(each)
-                    for part in each.all if isinstance(each, Report) else (each,):
-                        behind.put(part)
+                    if behind is not None:
+                        behind.put(each)
                 if recording.is_empty:
                     refused.take(block)
                     read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
                 _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
             _refuse(session, taken, other_boom.judge())
-            behind.close()
+            if behind is not None:
+                behind.close()
             if bar is not None:
                 bar.close()
             wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
@@ -258,8 +264,9 @@ def replay_into(
                 f"cylinders' travel, and stamps.{refused.told}"
             )
         recording.close()
-        SessionSheet(__version__, taken.text).write(out / "bag")
-        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME) | {
+        if with_bag:
+            SessionSheet(__version__, taken.text).write(out / "bag")
+        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if with_bag else None) | {
             "scene": taken.source,
             "scene_sha256": taken.sha256,
             "baseline": None if usual is None else usual.source,
@@ -350,17 +357,15 @@ def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], win
 
 
 @contextmanager
-def _processes(building: UnfinishedResult) -> Iterator[tuple[Pipe, Pipe]]:
-    """The processes that read and write: their imports go on while the session is looked at."""
-    reader = SampleReader.started()
-    try:
-        writer = ReportWriter.started(building.folder / "bag", building.lock)
-        try:
-            yield reader, writer
-        finally:
-            writer.stop()
-    finally:
-        reader.stop()
+def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pipe, Pipe | None]]:
+    """The processes that read and write, none for the latter without a bag: their imports go on while the session is read."""
+    with ExitStack() as ended:
+        reader, writer = SampleReader.started(), None
+        ended.callback(reader.stop)
+        if with_bag:
+            writer = ReportWriter.started(building.folder / "bag", building.lock)
+            ended.callback(writer.stop)
+        yield reader, writer
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
@@ -394,8 +399,8 @@ def _told(twin: Twin) -> str:
     return ", ".join(f"{name}: {count}" for name, count in twin.counts.items()) or "it was empty"
 
 
-def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[str, Any]:
-    """The contract's numbers of a replay."""
+def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -> dict[str, Any]:
+    """The contract's numbers of a replay; `file` is that of the result bag, if there is one."""
     totals, duration = recording.totals, recording.duration
     return {
         "samples": totals.samples,
@@ -413,7 +418,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path) -> dict[
         **_pins(recording, twin),
         **_steps(twin),
         **recording.noise,
-        "output_sha256": sha256_of(file),
+        "output_sha256": None if file is None else sha256_of(file),
         "alarms": _alarms(recording, recording.first),
     }
 

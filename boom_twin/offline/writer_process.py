@@ -78,9 +78,10 @@ class ReportWriter:
     def put(self, item: ReportBlock | Report) -> None:
         """Write what `item` holds, in its turn; the stamps of the samples become the log times."""
         if isinstance(item, Report):
-            self._reports.append(item)
-            if len(self._reports) == BATCH:
-                self._send_reports()
+            for report in item.all:
+                self._reports.append(report)
+                if len(self._reports) == BATCH:
+                    self._send_reports()
         else:
             self._send_reports()
             self._pipe.send([item])

@@ -316,7 +316,7 @@ def _provenance(subject: Subject) -> list[str]:
     rows = [
         ("boom_twin", __version__),
         ("mapping", summary["mapping"]),
-        ("sha256 of the result bag", summary["output_sha256"]),
+        ("sha256 of the result bag", summary["output_sha256"] or "no bag was written"),
         *subject.result.session.notes.items(),
     ]
     return [heading("Where this comes from"), table((), rows)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..analysis.equilibrium import SHARE
 from ..compiler.plan import Plan
 from ..config.settings import Settings
-from ..estimation.boom_predictor import BoomPredictor
+from ..estimation.boom_predictor import BoomPredictor, Drawn
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
 from ..estimation.sensor_model import Mounting
@@ -65,10 +65,10 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, m
 class _UpdateExtras:
     """What one call of the compiled update gives beside numbers.
 
-    outlines by row of a prediction, health and events by row of a sample.
+    drawn, of which outlines are made, by row of a prediction; health and events by row of a sample.
     """
 
-    outlines: dict[int, Outline] = field(default_factory=dict)
+    drawn: dict[int, Drawn] = field(default_factory=dict)
     health: dict[int, Health] = field(default_factory=dict)
     events: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
@@ -214,7 +214,7 @@ class BlockUpdate:
         if not clock[BEGINS_SLOT]:
             return
         if not self._shedding.leaves_out_shape():
-            news.outlines[at] = self._boom.outline()
+            news.drawn[at] = self._boom.drawn
         if self._judge is not None and self._shedding.leaves_out_health():
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
@@ -303,8 +303,13 @@ class BlockUpdate:
             cylinder_forces=rows[:, at.cylinder_forces],
             clearances=rows[:, at.pins].reshape(len(rows), self._pins, PIN),
             moments=found.moments[own].copy(),
-            outlines=self._news.outlines,
+            outlines=self._outlines(),
         )
+
+    def _outlines(self) -> dict[int, Outline]:
+        """Outlines by row of a prediction."""
+        drawn = self._news.drawn
+        return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
     def _estimates(self) -> EstimateBlock:
         own = slice(self._begin[0], int(self._found.counts[0]))
@@ -330,7 +335,7 @@ class BlockUpdate:
             residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
-        prediction = self._boom.prediction(stamp, news.outlines.get(0), found.moments[predicted - 1].copy())
+        prediction = self._boom.prediction(stamp, self._outlines().get(0), found.moments[predicted - 1].copy())
         told = (*events, *news.events.get(0, ()))
         estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
         passes, health = int(found.passes[predicted - 1]), self.judge() if judged else None

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..types import Array, Sample, Stream
@@ -56,6 +57,13 @@ class SampleCheck:
         if not self.is_sure and stream is Stream.STROKES:
             self._look(stamp)
         return Sample(stream, stamp, values)
+
+    def look_at(self, stamps: NDArray[np.int64]) -> None:
+        """Look at the stamps (ns) of strokes that are to come in a block: if these are enough to be sure, be so at once."""
+        deciding = stamps[: FIRST - self._count]
+        if not self.is_sure and 0 < len(deciding) == FIRST - self._count:
+            span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
+            self.is_sure = span >= FIRST * SHORTEST
 
     def _look(self, stamp: int) -> None:
         """Whether stamps are nanoseconds; those that once were are never doubted, and one alone again and again is no sign."""

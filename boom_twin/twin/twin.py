@@ -299,6 +299,8 @@ class Twin:
         """
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
+        if not self._edge.is_sure:
+            self._edge.look_at(block.stamps[block.streams == CODES[Stream.STROKES]])
         row, size, channels = 0, len(block.stamps), self._widths
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:

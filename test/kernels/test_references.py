@@ -12,7 +12,7 @@ import pytest
 
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.estimation.look_ahead import Track
-from boom_twin.kernels.jit import by_reference, kernel, referenced
+from boom_twin.kernels.jit import _kind, by_reference, kernel, referenced
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.scene import load_scene
@@ -118,3 +118,22 @@ def test_compiled_code_for_known_types_gives_what_the_kernel_gives() -> None:
         put(plan.tables, state, work)
         places.append(work.position.copy())
     assert places[0].tobytes() == places[1].tobytes() and np.ptp(places[0]) > 1.0
+
+
+def test_what_types_are_known_by_tells_apart_all_that_numba_does() -> None:
+    """Code compiled for one is never given the other."""
+    import numba
+
+    grid = np.arange(12.0).reshape(3, 4)
+    fixed = grid.copy()
+    fixed.flags.writeable = False
+    arrays = [grid, grid.copy(), grid.T, grid[:, ::2], fixed, grid[0], grid.astype(np.float32), grid.astype(np.int64)]
+    arrays += [np.zeros(2, [("a", "f8")]), np.zeros(2, [("b", "f8")]), np.zeros((0, 4)), grid.astype(bool)]
+    plan = compile_scene(load_scene())
+    given = [*arrays, 1, 2, 1.0, True, None, (grid, 1), (grid.T, 1), (grid.copy(), 2), plan.state(), plan.state(), plan.work()]
+    types = [numba.typeof(each) for each in given]
+    for one, kind in zip(given, types, strict=True):
+        for other, its in zip(given, types, strict=True):
+            assert kind == its or _kind(one) != _kind(other)
+            assert (_kind(one) == _kind(other)) or one is not other
+    assert _kind(grid) == _kind(grid.copy()) and _kind(plan.state()) == _kind(plan.state())

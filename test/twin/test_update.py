@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.config.settings import Settings
+from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of, joined, report_block, samples_in
@@ -103,6 +106,18 @@ def test_a_block_is_taken_in_one_piece_where_nothing_is_odd() -> None:
     (block,) = twin.update_block(block_of(samples[400:], N))
     assert isinstance(block, ReportBlock) and len(block.stamps) == len(samples) - 400
     assert len(block.predictions.outlines) >= 6
+
+
+def test_the_first_block_tells_that_stamps_are_nanoseconds() -> None:
+    """All but the sample that the model starts with are taken in one piece; stamps of another unit are refused as ever."""
+    samples = stream(0, 120, 0.0)
+    first, rest = Twin(load_scene()).update_block(block_of(samples, N))
+    assert isinstance(first, Report) and first.change is not None
+    assert isinstance(rest, ReportBlock) and len(rest.stamps) == len(samples) - 1
+    milliseconds = [replace(sample, stamp=sample.stamp // MS) for sample in samples]
+    for given in (milliseconds, [sample for sample in milliseconds if sample.stream is Stream.STROKES]):
+        with pytest.raises(UsageError, match="nanoseconds"):
+            Twin(load_scene()).update_block(block_of(given, N))
 
 
 def test_arrays_of_another_layout_and_kind_are_taken_as_what_they_say() -> None:

@@ -16,6 +16,7 @@ from ...errors import BoomTwinError
 from ...scene.schema import Scene
 from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
+from ..sensor_survey import mean_of_near
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
 from .innovation_filter import CALM, ModalStates, modes_of
@@ -109,11 +110,12 @@ def joined(parts: list[Rows]) -> Rows:
 
 def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     """The rows of every block that they are of, with its number."""
+    first, last = int(rows.stamps.min()) // BLOCK, int(rows.stamps.max()) // BLOCK
+    if first == last:
+        yield first, rows
+        return
     numbers = rows.stamps // BLOCK
     steps: NDArray[np.int64] = np.diff(numbers)
-    if not steps.any():
-        yield int(numbers[0]), rows
-        return
     is_sorted, edges = bool((steps > -1).all()), [0, *(np.flatnonzero(steps) + 1).tolist(), len(numbers)]
     for k, number in enumerate(numbers[edges[:-1]].tolist() if is_sorted else sorted(set(numbers.tolist()))):
         own: Any = slice(edges[k], edges[k + 1]) if is_sorted else numbers == number
@@ -170,15 +172,13 @@ def means(left: Array, sigma: float) -> tuple[Array, Array]:
     sigma : float
         Their noise: what is further than 6 of it from the median is an outlier.
     """
+    channels = left.shape[1]
     if not len(left):
-        return np.full(left.shape[1], np.nan), np.zeros(left.shape[1])
-    if not np.isfinite(left.sum()):
+        return np.full(channels, np.nan), np.zeros(channels)
+    mean, count = np.empty(channels), np.empty(channels)
+    if not mean_of_near(np.ascontiguousarray(left), 6.0 * sigma, np.empty(len(left)), mean, count):
         return _means_of_some(left, sigma)
-    middle = np.sort(left, axis=0)[len(left) // 2]
-    near = np.abs(left - middle) <= 6.0 * sigma
-    if near.all():
-        return left.mean(axis=0), np.full(left.shape[1], float(len(left)))
-    return np.where(near, left, 0.0).sum(axis=0) / near.sum(axis=0), near.sum(axis=0).astype(float)
+    return mean, count
 
 
 def _means_of_some(left: Array, sigma: float) -> tuple[Array, Array]:

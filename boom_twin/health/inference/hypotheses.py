@@ -343,6 +343,7 @@ class Regression:
 
     def __init__(self, mean: Array, covariance: Array) -> None:
         self._prior = mean, covariance
+        self._prior2, self._size = covariance.diagonal().copy(), -1
         self.restart()
 
     def restart(self) -> None:
@@ -352,9 +353,9 @@ class Regression:
     @property
     def has_strayed(self) -> bool:
         """Whether what was learnt bit by bit is, all together, more than healthy parameters may be off by."""
-        mean, covariance = self._prior
-        learnt = np.diag(covariance) - np.diag(self.covariance)
-        return bool(np.any((self.mean - mean) ** 2 > STRAYED**2 * np.maximum(learnt, LEAST * np.diag(covariance))))
+        learnt = self._prior2 - self.covariance.diagonal()
+        off2 = (self.mean - self._prior[0]) ** 2
+        return bool((off2 > STRAYED**2 * np.maximum(learnt, LEAST * self._prior2)).any())
 
     def take(self, white: Array, learn: bool) -> tuple[Array, float]:
         """Narrow by whitened innovations, shape (rows, 1 + parameters), what is known.
@@ -375,10 +376,13 @@ class Regression:
             Logarithm of the deviations that it had, in all.
         """
         first, signature = np.ascontiguousarray(white[:, :1]), np.ascontiguousarray(white[:, 1:])
-        measured, (count, states) = np.arange(len(white)), signature.shape
-        mean, covariance = self.mean[:, None].copy(), self.covariance.copy()
-        left, scratch = np.empty((count, 1)), (np.empty((count, count)), np.empty((count, states)))
-        log = correct(measured, first, signature, np.eye(count), np.zeros(count), mean, covariance, *scratch, left)
+        mean, covariance, left = self.mean[:, None].copy(), self.covariance.copy(), np.empty((len(white), 1))
+        if self._size != len(white):
+            self._size, (count, states) = len(white), signature.shape
+            self._own = np.arange(count), np.eye(count), np.zeros(count)
+            self._scratch = np.empty((count, count)), np.empty((count, states))
+        measured, noise, others = self._own
+        log = correct(measured, first, signature, noise, others, mean, covariance, *self._scratch, left)
         if learn and np.abs(left).max() < GATE:
             self.mean, self.covariance = mean[:, 0], covariance
         return left[:, 0], -log - 0.5 * float(left[:, 0] @ left[:, 0])

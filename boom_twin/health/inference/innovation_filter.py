@@ -198,6 +198,7 @@ class InnovationFilter:
         self._added = np.zeros((count, states))
         self._added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
+        self._own = np.arange(size + LOAD, states)  # errors of the channels
         self._scratch = np.zeros((states, max(states, columns)))
         if is_first:
             self._p[:, :size, :size] += _swung(modes, self._level2)
@@ -223,10 +224,10 @@ class InnovationFilter:
         Innovations
             Of the channels that were measured, and the probability of the residuals among them.
         """
-        kept, rest = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH), self._size + LOAD
+        kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
-        self._turn[rest:, rest:] = kept * np.eye(self._channels)
-        self._added[:, rest:] = (1.0 - kept * kept) * errors2
+        self._turn[self._own, self._own] = kept
+        self._added[:, self._own[0] :] = (1.0 - kept * kept) * errors2
         rows = np.flatnonzero(np.isfinite(table[:, 0]))
         count, measured = len(self._level2), len(rows)
         white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed

@@ -160,9 +160,9 @@ class HoldInWork:
     made: int = 0
 
 
-def _frequencies(boom: _Boom) -> Array:
+def _frequencies(boom: _Boom, count: int = MODES) -> Array:
     """The lowest natural frequencies (Hz) of a boom where it is."""
-    return natural_frequencies(boom.plan, boom.state, boom.work, MODES, WIDTH)
+    return natural_frequencies(boom.plan, boom.state, boom.work, count, WIDTH)
 
 
 class Signatures:
@@ -205,7 +205,8 @@ class Signatures:
         boom.follow(work.stand)
         if boom.rest(work.problem.strokes) is None:
             raise SolverError("a changed boom finds no rest")
-        work.problem.frequencies[:, 1 + place] = (_frequencies(boom)[work.problem.modes] / work.model - 1.0) / step
+        modes = work.problem.modes  # ascending; each is found from the one below it, whatever is above
+        work.problem.frequencies[:, 1 + place] = (_frequencies(boom, int(modes[-1]) + 1)[modes] / work.model - 1.0) / step
         work.made += 1
         return work.made < len(self._changed)
 

@@ -1,0 +1,93 @@
+"""What is compiled of the look at a block of readings, against numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin.health.inference.block_problem import means
+from boom_twin.health.sensor_monitor import SensorCheck, bends2
+from boom_twin.health.sensor_survey import follow_noise, is_bent
+from boom_twin.types import Array
+
+SIGMA = 2.0
+
+
+def readings(seed: int, rows: int = 20, channels: int = 4) -> Array:
+    return np.random.default_rng(seed).normal(3.0, SIGMA, (rows, channels))
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 19, 20])
+def test_means_leave_out_what_is_far_from_the_median(rows: int) -> None:
+    left = readings(rows, rows)
+    left[rows // 2, 1] += 100.0 * SIGMA
+    near = np.abs(left - np.sort(left, axis=0)[rows // 2]) <= 6.0 * SIGMA
+    mean, count = means(left, SIGMA)
+    assert count.tolist() == near.sum(axis=0).tolist()
+    assert np.array_equal(mean, np.where(near, left, 0.0).sum(axis=0) / count)
+
+
+def test_means_of_readings_some_of_which_are_missing() -> None:
+    left = readings(1)
+    left[3, 0], left[:, 2] = np.nan, np.nan
+    mean, count = means(left, SIGMA)
+    assert count.tolist() == [19.0, 20.0, 0.0, 20.0] and np.isnan(mean).tolist() == [False, False, True, False]
+    assert mean[0] == pytest.approx(np.nanmean(left[:, 0]))
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_noise_is_followed_by_second_differences(order: str) -> None:
+    left, before = np.array(readings(2), order=order), np.array([1.0, 4.0, 9.0, 16.0])
+    found = before.copy()
+    follow_noise(np.ascontiguousarray(left), 5.0, 0.25, found)
+    assert found == pytest.approx(before + 0.25 * (np.minimum(bends2(left).mean(axis=0), 5.0) - before), rel=1e-14)
+    for unknown in (left[:2], np.where(left == left[4, 2], np.nan, left)):
+        again = before.copy()
+        follow_noise(np.ascontiguousarray(unknown), 5.0, 0.25, again)
+        assert np.array_equal(again, before)
+
+
+def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
+    """Against what it is by numpy's differences, over sines of all frequencies with noise."""
+    times, told = np.arange(20.0)[:, None] / 200.0, []
+    for seed in range(200):
+        frequency = np.random.default_rng(seed).uniform(1.0, 90.0)
+        raw = readings(seed) + 8.0 * SIGMA * np.sin(2.0 * np.pi * frequency * times + np.arange(4.0))
+        masked = np.arange(4) == seed % 5
+        trusted = raw[:, ~masked]
+        power, rougher = bends2(trusted).sum(axis=0), (np.diff(trusted, n=3, axis=0) ** 2).sum(axis=0) / 20.0
+        wanted = bool(((power > 3.0 * SIGMA**2 * 18) & (rougher < 0.75 * power)).any())
+        assert bool(is_bent(raw, masked, SIGMA**2, 3.0, 0.75)) is wanted
+        told.append(wanted)
+    assert 20 < sum(told) < 180
+    assert not is_bent(readings(1), np.zeros(4, dtype=bool), SIGMA**2, 3.0, 0.75)
+    assert not is_bent(np.zeros((0, 4)), np.zeros(4, dtype=bool), SIGMA**2, 3.0, 0.75)
+
+
+class Careful(SensorCheck):
+    """Never takes the short way of a block in which nothing is found."""
+
+    def _is_calm(self, *_: object) -> bool:
+        return False
+
+
+def test_a_block_without_findings_is_told_as_the_long_way_tells_it() -> None:
+    """Readings that are noisy, repeated, missing, out of range or have spikes, some of them just within the limits."""
+    given = SIGMA, 0.0, np.full(2, -90.0), np.full(2, 90.0), 0.0
+    rng, check, careful, calm = np.random.default_rng(5), SensorCheck(*given), Careful(*given), 0
+    for block in range(400):
+        times = 0.1 * block + 0.005 * np.arange(20.0)
+        raw = rng.normal(0.0, SIGMA, (20, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
+        if block % 7 == 0:
+            raw[5:, rng.integers(2)] = raw[4, 0]
+        if block % 11 == 0:
+            raw[rng.integers(20), 1] += rng.choice([7.0, 8.5, 30.0, 100.0]) * SIGMA
+        if block % 13 == 0:
+            raw[:12, 0] = np.nan
+        found, wanted = (each.look(times, raw, np.zeros_like(raw), times[-1] + 0.005) for each in (check, careful))
+        assert {kind: flags.tolist() for kind, flags in found.by_kind().items()} == {
+            kind: flags.tolist() for kind, flags in wanted.by_kind().items()
+        }
+        assert found.jumped.tolist() == wanted.jumped.tolist() and not wanted.is_calm
+        calm += found.is_calm
+    assert 50 < calm < 380 and check.noise == careful.noise
