@@ -19,7 +19,7 @@ from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
 from .alarm_text import LIMIT_OF, LISTED, AlarmText
 from .baseline import JUDGED, Baseline
 from .detection import Detector
-from .hold_test import HoldTest
+from .hold_test import DOUBTED, HoldTest
 from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
 from .inference.fault_catalogue import Form, parameters
 from .inference.holds import HoldProblem
@@ -107,6 +107,7 @@ class ResidualMonitor:
         self._frequency_error = baseline.frequency_error
         self._hold_test = HoldTest(self._bank, self._errors2, baseline.frequency_error)
         self._hold_alarm: Alarm | None = None
+        self._is_held = False  # whether that was certain once
         self.begin()
 
     def begin(self) -> None:
@@ -205,12 +206,17 @@ class ResidualMonitor:
             if self._hold_test.change(each.place, -each.value, *about) > max(HELD, found.verdict.strength - ENDED):
                 return self._end_known(each, hold.end)
         is_load = self._weight(found.verdict.best) < LOAD_MEANS * self._load_lately(hold.end)
-        if self._hold_alarm is None and (found.verdict.strength < HELD or is_load):
+        is_sure = found.verdict.strength >= HELD
+        if self._hold_alarm is None and (not (is_sure or found.is_far) or is_load):
             return []
-        if found.verdict.strength < LET_GO:
+        self._is_held = is_sure or (self._is_held and self._hold_alarm is not None)
+        if found.verdict.strength < (LET_GO if self._is_held else DOUBTED):
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
-        self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        if self._is_held:
+            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        else:
+            self._hold_alarm = alarm = self._tell.of_far_tip(alarm, found.verdict, found.tip, self._hold_test.telling)
         if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
             self._go_on_with_held(found.verdict)
         return [alarm]
