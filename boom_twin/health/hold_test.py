@@ -81,7 +81,7 @@ class HoldTest:
             leave, in the parameters' units: what these say of large faults is crude, and no further fault.
         """
         self._holds: list[HoldProblem] = []
-        self._was_far = False
+        self._before: HoldVerdict | None = None
         self._known = tuple(known)
 
     @property
@@ -101,9 +101,9 @@ class HoldTest:
                 found = verdict.best
                 best = HoldVerdict(start.start, verdict, float(np.hypot(*hold.tip[:, found.place]) * abs(found.value)))
         assert best is not None
-        strength, was_far = best.verdict.strength, self._was_far
-        self._was_far = best.tip >= FAR and strength >= DOUBTED
-        return replace(best, is_far=was_far and self._was_far and strength >= LIKELY)
+        before, self._before = self._before, best
+        was_far = before is not None and before.tip >= FAR and before.verdict.strength >= DOUBTED
+        return replace(best, is_far=was_far and best.tip >= FAR and best.verdict.strength >= LIKELY)
 
     def change(self, place: int, by: float, mean: Array, covariance: Array) -> float:
         """ln of how much more probable it is that a parameter has changed by exactly `by`, from any hold on, than not."""

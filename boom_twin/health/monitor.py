@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -199,8 +200,13 @@ class HealthMonitor:
             suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
             is_doubted = self.residuals.is_shaken(block.end) or any(cause not in each for each in suspects)
             times = np.asarray((stamps - block.number * BLOCK) * NANO)
-            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted)
+            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted, self._slowest())
         return news
+
+    def _slowest(self) -> float:
+        """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
+        modes = () if self._noise is None else self._noise.modes
+        return 1.0 / min((mode.frequency for mode in modes), default=math.inf)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate.
