@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,9 +11,10 @@ import numpy as np
 
 from ..scene.schema import Scene
 from ..types import NANO, Alarm, Array, Ranked
-from .baseline import JUDGED
+from .baseline import JUDGED, judged_channels
 from .delay_monitor import delay_remedy
 from .inference.fault_catalogue import Form, Parameter, physical
+from .inference.holds import HoldProblem
 from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
@@ -26,6 +28,7 @@ DRIFTING = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may wand
 CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 LIMIT_OF = "told_from_"  # and a cause: how the figures of `ResidualMonitor.limits` are called
 SI = {"k": "N/m", "EI": "N m^2", "mass": "kg"}  # of parameters of a scene that are judged by their share
+SAYABLE = 9.2  # ln of ten thousand, the largest odds that are told
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
 
@@ -53,6 +56,7 @@ class AlarmText:
 
     def __init__(self, scene: Scene, known: tuple[Parameter, ...], signatures: Signatures, errors: Array) -> None:
         self._scene, self._known, self._signatures, self._errors = scene, known, signatures, errors
+        self._names = judged_channels(len(scene.joints))
         self._advised: tuple[str, str] | None = None
         self._advice = ""
         self._leading: tuple[str, int] = "", 0
@@ -98,6 +102,36 @@ class AlarmText:
             return replace(alarm, kind="softer", cause=None, told=told, ranked=ranks)
         told = f"holds are off in mean and frequency, why is not told yet: {names}{off}; hold still in other postures"
         return replace(alarm, kind="residual", cause=None, told=told, ranked=ranks)
+
+    def of_far_tip(self, alarm: Alarm, verdict: Verdict, tip: float, hold: HoldProblem) -> Alarm:
+        """The alarm of a tip that is far off (by `tip`, m), as holds suggest, though the baseline allows for it; no name.
+
+        `hold`: the newest that tells of frequencies; the words say by how much these, angles and IMU are off.
+        """
+        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
+        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
+        odds = math.exp(min(verdict.strength, SAYABLE))
+        names = " or ".join(rank.cause for rank in ranks)
+        told = (
+            f"the tip is off by about {1e3 * tip:.0f} mm: {self._deviations(hold)}; a fault explains that {odds:.0f} times as "
+            f"well as what the baseline allows; nearest: {names}; look at the boom, or learn a baseline of this rig while all "
+            "is well (boom_twin calibrate --baseline)"
+        )
+        return replace(alarm, kind="residual", cause=None, told=told, ranked=ranks)
+
+    def _deviations(self, hold: HoldProblem) -> str:
+        """By how much a hold is off from what is predicted: every frequency, the angle and the IMU's axis that are most."""
+        count, left = len(self._scene.joints), hold.table[:, 0]
+        found = [
+            f"natural frequency {mode + 1} by {100.0 * off:+.1f} %"
+            for mode, off in zip(hold.modes.tolist(), hold.frequencies[:, 0].tolist(), strict=True)
+        ]
+        for own, factor, unit in ((left[:count], 1e3, "mrad"), (left[count:], 1.0, "m/s^2")):
+            if np.isfinite(own).any():
+                place = int(np.nanargmax(np.abs(own)))
+                name = self._names[place if unit == "mrad" else count + place]
+                found.append(f"{name} by {factor * own[place]:+.2g} {unit}")
+        return ", ".join(found)
 
     def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time."""

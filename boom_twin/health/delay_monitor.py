@@ -1,9 +1,10 @@
 """Monitor a constant lag of a stream's stamps: what is read is that of an earlier time, by as much whatever moves.
 
-Readings that are d late differ from the prediction by -d times its slope. Both are averaged over two seconds (a triangle of
-blocks), which takes vibration out: a natural frequency that is 1 % wrong puts vibration out of phase as a lag does. Spans of
-4 s, each less its mean, give d by least squares, and how it scatters among them gives its deviation: whatever else is wrong
-with the model goes with where the boom is, not with which way it moves, and does not agree about d.
+Readings that are d late differ from the prediction by -d times its slope. Both are averaged over two periods of the slowest
+vibration, two seconds at least (a triangle of blocks), which takes vibration out: a natural frequency that is 1 % wrong puts
+vibration out of phase as a lag does. Spans of 4 s, each less its mean, give d by least squares, and how it scatters among
+them gives its deviation: whatever else is wrong with the model goes with where the boom is, not with which way it moves, and
+does not agree about d.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 from ..types import Alarm, Array, Ranked, Stream
 
-TRIANGLE = np.convolve(np.ones(10), np.ones(10)) / 100.0  # weights of blocks
+BLOCK, LEAST = 0.1, 10  # s of a block; blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
 KEPT = 30  # spans that are looked at, the newest
 FEWEST = 4.0  # spans, by how much they weigh, before anything is told
@@ -61,7 +62,14 @@ class DelayMonitor:
         self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
 
     def take(
-        self, number: int, stamps: Array, left: Array, expected: Array, end: int, is_doubted: Callable[[], bool] = lambda: False
+        self,
+        number: int,
+        stamps: Array,
+        left: Array,
+        expected: Array,
+        end: int,
+        is_doubted: Callable[[], bool] = lambda: False,
+        period: float = 1.0,
     ) -> list[Alarm]:
         """Take the readings of a block; gives an alarm that began, changed or ended.
 
@@ -77,6 +85,8 @@ class DelayMonitor:
             Of the block, ns.
         is_doubted : callable, optional
             Asked once a span is complete: whether another fault puts vibration out of step, so that no alarm begins.
+        period : float
+            Of the slowest vibration, s.
         """
         if number != self._number + 1 or len(stamps) < 2 or stamps[-1] <= stamps[0]:
             self._blocks.clear()
@@ -84,9 +94,11 @@ class DelayMonitor:
         if len(stamps) < 2 or stamps[-1] <= stamps[0]:
             return []
         self._blocks.append((left.mean(axis=0), (expected[-1] - expected[0]) / (stamps[-1] - stamps[0])))
-        if len(self._blocks) < SPAN + len(TRIANGLE) - 1:
+        half = max(LEAST, math.ceil(period / BLOCK))
+        if len(self._blocks) < SPAN + 2 * (half - 1):
             return []
-        rows, slopes = (self._averaged([block[i] for block in self._blocks]) for i in range(2))
+        newest = list(self._blocks)[-(SPAN + 2 * (half - 1)) :]
+        rows, slopes = (self._averaged([block[i] for block in newest], half) for i in range(2))
         for _ in range(SPAN):
             self._blocks.popleft()
         found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
@@ -95,10 +107,10 @@ class DelayMonitor:
         return self._judge(end, is_doubted())
 
     @staticmethod
-    def _averaged(blocks: list[Array]) -> Array:
-        """Less their mean, shape (SPAN, channels)."""
-        rows = np.array(blocks)
-        smooth = np.column_stack([np.convolve(column, TRIANGLE, "valid") for column in rows.T])
+    def _averaged(blocks: list[Array], half: int) -> Array:
+        """Less their mean, shape (SPAN, channels); `half` blocks are half of the triangle."""
+        rows, triangle = np.array(blocks), np.convolve(np.ones(half), np.ones(half)) / half**2
+        smooth = np.column_stack([np.convolve(column, triangle, "valid") for column in rows.T])
         return np.asarray(smooth - smooth.mean(axis=0))
 
     def estimate(self) -> tuple[float, float]:

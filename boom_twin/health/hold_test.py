@@ -10,7 +10,7 @@ the holds on; those before tell what this rig is like while all is well.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from .inference.innovation_filter import REACH, REST
 
 MOST = 12  # holds that are kept
 BENT = 0.1  # share of a deviation of a frequency by which its derivative may be wrong
+FAR, LIKELY, DOUBTED = 0.01, 4.6, 2.3  # m at the tip, ln of a hundred and of ten to one: see `HoldVerdict.is_far`
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,16 @@ class HoldVerdict:
     verdict : Verdict
     tip : float
         By how much the most probable fault puts the tip off in the newest hold, m.
+    is_far : bool
+        Whether that is `FAR` or more, such a fault is more probable than none by e^`LIKELY`, and the holds before the newest
+        said the same by e^`DOUBTED`: a single one does not count. A baseline that allows much explains much, so that no fault
+        becomes certain; the tip is off all the same.
     """
 
     since: int
     verdict: Verdict
     tip: float
+    is_far: bool = False
 
 
 def rows_of(hold: HoldProblem, errors2: Array, frequency_error: float) -> tuple[Array, Array, Array]:
@@ -75,7 +81,13 @@ class HoldTest:
             leave, in the parameters' units: what these say of large faults is crude, and no further fault.
         """
         self._holds: list[HoldProblem] = []
+        self._before: HoldVerdict | None = None
         self._known = tuple(known)
+
+    @property
+    def telling(self) -> HoldProblem:
+        """The newest hold that gave a frequency, or else the newest; there is at least one."""
+        return next((hold for hold in reversed(self._holds) if len(hold.modes)), self._holds[-1])
 
     def take(self, hold: HoldProblem, mean: Array, covariance: Array) -> HoldVerdict:
         """A further hold; gives what all say of parameters that are healthy about a mean (parameters,)."""
@@ -89,7 +101,9 @@ class HoldTest:
                 found = verdict.best
                 best = HoldVerdict(start.start, verdict, float(np.hypot(*hold.tip[:, found.place]) * abs(found.value)))
         assert best is not None
-        return best
+        before, self._before = self._before, best
+        was_far = before is not None and before.tip >= FAR and before.verdict.strength >= DOUBTED
+        return replace(best, is_far=was_far and best.tip >= FAR and best.verdict.strength >= LIKELY)
 
     def change(self, place: int, by: float, mean: Array, covariance: Array) -> float:
         """ln of how much more probable it is that a parameter has changed by exactly `by`, from any hold on, than not."""

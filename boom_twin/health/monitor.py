@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -218,7 +219,8 @@ class HealthMonitor:
             if (masked := self._masked(stream)).any():
                 left = np.where(masked, np.nan, left)
             times = np.asarray((stamps - block.number * BLOCK) * NANO)
-            news += monitor.take(block.number, times, left, raw - left, block.end, partial(self._is_doubted, stream, block.end))
+            is_doubted = partial(self._is_doubted, stream, block.end)
+            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted, self._slowest())
         return news
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
@@ -226,6 +228,11 @@ class HealthMonitor:
         cause = delay_cause(stream)
         suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
         return self.residuals.is_shaken(stamp) or any(cause not in each for each in suspects)
+
+    def _slowest(self) -> float:
+        """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
+        modes = () if self._noise is None else self._noise.modes
+        return 1.0 / min((mode.frequency for mode in modes), default=math.inf)
 
     def _is_shaken(self, stream: Stream, raw: Array) -> bool:
         """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate.

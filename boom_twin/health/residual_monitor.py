@@ -19,7 +19,7 @@ from ..types import NANO, SECOND, Alarm, Array, Mount, Stream
 from .alarm_text import LIMIT_OF, LISTED, AlarmText
 from .baseline import JUDGED, Baseline
 from .detection import Detector
-from .hold_test import HoldTest
+from .hold_test import DOUBTED, HoldTest
 from .inference.block_problem import BLOCK, BlockMeans, BlockProblem, LinearModel
 from .inference.fault_catalogue import Form, parameters
 from .inference.holds import HoldProblem
@@ -42,7 +42,7 @@ GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
 HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
-AFRESH = 30  # blocks of evidence that begins anew all the time beside an alarm: whether its fault is there still
+AFRESH, EVERY = 30, 15  # blocks of evidence that is collected afresh beside an alarm (is its fault there?), begun so often
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,14 @@ class _KnownFault:
     place: int
     value: float
     sigma: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Afresh:
+    """Evidence that is collected afresh beside an alarm, and what may explain that alarm, when it began."""
+
+    evidence: Suspicion
+    explained: tuple[Explanation, ...]
 
 
 class ResidualMonitor:
@@ -107,6 +115,7 @@ class ResidualMonitor:
         self._frequency_error = baseline.frequency_error
         self._hold_test = HoldTest(self._bank, self._errors2, baseline.frequency_error)
         self._hold_alarm: Alarm | None = None
+        self._is_held = False  # whether that was certain once
         self.begin()
 
     def begin(self) -> None:
@@ -127,8 +136,7 @@ class ResidualMonitor:
         detuning = DETUNING if self._known else self._detuning
         self._healthy = InnovationFilter(len(self._names), 1 + self._count, BLOCK * NANO, detuning)
         self._detector.reset()
-        self._afresh: Suspicion | None = None
-        self._explained: tuple[Explanation, ...] = ()  # what may explain the alarm, when the evidence above began
+        self._afresh: tuple[_Afresh, ...] = ()
         self.surprise = np.full(len(self._names), np.nan)
 
     @property
@@ -205,12 +213,18 @@ class ResidualMonitor:
             if self._hold_test.change(each.place, -each.value, *about) > max(HELD, found.verdict.strength - ENDED):
                 return self._end_known(each, hold.end)
         is_load = self._weight(found.verdict.best) < LOAD_MEANS * self._load_lately(hold.end)
-        if self._hold_alarm is None and (found.verdict.strength < HELD or is_load):
+        is_sure = found.verdict.strength >= HELD
+        is_far = found.is_far and (math.isinf(self._weight(found.verdict.best)) or len(hold.modes) > 0)  # no mean of a load
+        if self._hold_alarm is None and (not (is_sure or is_far) or is_load):
             return []
-        if found.verdict.strength < LET_GO:
+        self._is_held = is_sure or (self._is_held and self._hold_alarm is not None)
+        if found.verdict.strength < (LET_GO if self._is_held else DOUBTED):
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
-        self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        if self._is_held:
+            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+        else:
+            self._hold_alarm = alarm = self._tell.of_far_tip(alarm, found.verdict, found.tip, self._hold_test.telling)
         if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
             self._go_on_with_held(found.verdict)
         return [alarm]
@@ -274,27 +288,34 @@ class ResidualMonitor:
 
         What a suspicion has collected before the end of a fault outweighs what comes after it for long: to its filter, the
         end is one more error of the model or a load. Evidence from after the end knows neither the fault nor its end: no fault
-        explains it well, and one of the size that the alarm has would be much less probable.
+        explains it well, and one of the size that the alarm has would be much less probable. Some begins before the one
+        before is judged, or an end in the midst of that one would wait for the whole of the next.
         """
         if self._suspicion is None or (self._alarm is None and not self._known):
-            self._afresh, self._explained = None, ()
+            self._afresh = ()
             return []
-        if self._afresh is None:
-            verdict = self._suspicion.explain()
-            if verdict.strength >= SURE:
-                likely = [cause for cause in verdict.causes if cause.probability >= LISTED]
-                self._explained = tuple(cause.parts[0] for cause in likely)
-            self._afresh = self._suspicion_from(problem.start, {})
-        self._afresh.take(problem)
-        if self._afresh.blocks < AFRESH:
+        if not self._afresh or self._afresh[-1].evidence.blocks == EVERY:
+            self._afresh = (*self._afresh, _Afresh(self._suspicion_from(problem.start, {}), self._explain_now()))
+        for each in self._afresh:
+            each.evidence.take(problem)
+        if self._afresh[0].evidence.blocks < AFRESH:
             return []
-        afresh, self._afresh = self._afresh, None
-        verdict = afresh.explain()
-        if verdict.strength >= SURE and (known := self._change_of_known(afresh, verdict)) is not None:
+        (oldest, *_), self._afresh = self._afresh, self._afresh[1:]
+        verdict = oldest.evidence.explain()
+        if verdict.strength >= SURE and (known := self._change_of_known(oldest.evidence, verdict)) is not None:
             return self._end_known(known, problem.start)
-        is_free = self._alarm is not None and verdict.strength < GONE and bool(self._explained)
-        is_over = is_free and all(afresh.log_factor(each) < -HELD for each in self._explained)
+        is_free = self._alarm is not None and verdict.strength < GONE and bool(oldest.explained)
+        is_over = is_free and all(oldest.evidence.log_factor(each) < -HELD for each in oldest.explained)
         return self._end_open(problem.start) if is_over else []
+
+    def _explain_now(self) -> tuple[Explanation, ...]:
+        """What may explain the alarm, by all evidence so far; if that is not sure, what could when some last began afresh."""
+        assert self._suspicion is not None
+        verdict = self._suspicion.explain()
+        if verdict.strength < SURE:
+            return self._afresh[-1].explained if self._afresh else ()
+        likely = [cause for cause in verdict.causes if cause.probability >= LISTED]
+        return tuple(cause.parts[0] for cause in likely)
 
     # -- suspicion, alarm, end ------------------------------------------------------------------------------------------
 
@@ -396,7 +417,7 @@ class ResidualMonitor:
         if self._alarm is not None:
             self._restart_holds()
         self._alarm, self._suspicion, self._unexplained, self._carried = None, None, None, {}
-        self._afresh, self._explained = None, ()
+        self._afresh = ()
         self._detector.reset()
         return ended
 

@@ -259,3 +259,13 @@ def test_a_growing_fault_below_its_least_value_early_on_explains_nothing():
     white[:, 0] = 3.0 * times / 10.0
     verdict = BANK.explain(Evidence.of(white[None], np.zeros(1)), np.zeros(SIZE), np.zeros((SIZE, SIZE)), 10.0, {})
     assert explained(verdict, growing=True)[0].log_factor > 10.0
+
+
+def test_what_shows_in_no_reading_is_no_cause():
+    """An IMU that is not there, say; it explains nothing, and so nothing worse than healthy deviations do."""
+    problem = Problem(2, {1: 0.3})
+    with_it = probability(problem.verdict(), "joint_2.sensor")
+    problem.signature[:, 3] = 0.0
+    verdict = problem.verdict()
+    assert with_it > 0.01 and probability(verdict, "joint_2.sensor") == 0.0
+    assert sum(cause.probability for cause in verdict.causes) == pytest.approx(1.0)

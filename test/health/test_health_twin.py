@@ -272,6 +272,14 @@ def test_the_end_of_a_fault_without_a_name_is_told():
     assert outcome.states()[-1][1].until is not None
 
 
+@pytest.mark.parametrize("end", [18.0, 21.0])
+def test_the_end_does_not_wait_for_evidence_that_began_before_it(end):
+    """It comes in the midst of what was collected afresh, and the next one was judged 4.4 s after it."""
+    samples = [sample for sample in session(36.0) if sample.stream is not Stream.IMU]
+    outcome = run(spoilt(samples, Stream.STROKES, 3, lambda v, t: v + 5e-4 * (t < end), 5.0))
+    assert 0.0 < max(time for time, alarm in outcome.states() if alarm.until is None) - 5.0 - end < 4.0
+
+
 def test_a_drift_that_is_over_is_no_jump():
     """The encoder wanders by 0.1 degrees a second for 10 s and is right again at once: no alarm lasts, nor begins."""
     outcome = run(spoilt(session(30.0), Stream.ANGLES, 1, lambda v, t: v + 0.1 * DEGREE * t * (t < 10.0), 5.0))

@@ -243,6 +243,8 @@ class HypothesisTest:
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
         excess = max(1.0, float(squares[best]) / max(healthy.rows, 1.0))
         priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
+        seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._places] > 0.0).any(axis=0)
+        priors[~np.tile(seen, 2)] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
         weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
         shares = np.exp(weights - weights.max())
         shares = shares.sum(axis=0) / shares.sum()

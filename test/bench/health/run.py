@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import stored
-from scenarios import RIGS, Scenario, learning, scenario
+from scenarios import Scenario, learning, nominal, scenario
 
-from boom_twin import Twin, load_scene
+from boom_twin import Twin
 from boom_twin.calibration.baseline import learn_baseline
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline, load_baseline
@@ -33,37 +33,41 @@ AT_ONCE = 400  # samples
 def main(args: Namespace) -> None:
     """Learn, replay, keep."""
     args.out.mkdir(parents=True, exist_ok=True)
-    for rig in range(1, RIGS):
-        _learn(rig, args.sessions, args.out)
     kept = args.out / "outcomes.jsonl"
     done = {json.loads(line)["number"] for line in kept.read_text().splitlines()} if kept.is_file() else set()
     numbers = sorted(int(path.stem[-4:]) for path in args.sessions.glob("session_*.npz"))
     wanted = [each for each in map(scenario, numbers) if each.number not in done and each.is_held_out == args.held_out]
     if args.only:
         wanted = [each for each in wanted if each.number in args.only]
+    for rig, scene in sorted({(each.rig, each.scene) for each in wanted if each.rig}):
+        _learn(rig, args.sessions, args.out, scene)
     with Pool(args.jobs, maxtasksperchild=20) as pool, kept.open("a") as file:
         for row in pool.imap_unordered(partial(outcome, args.sessions, args.out), wanted):
             file.write(json.dumps(row) + "\n")
             file.flush()
 
 
-def baseline_file(out: Path, rig: int) -> Path:
+def baseline_file(out: Path, rig: int, scene: str = "") -> Path:
     """Where the baseline of a rig is kept."""
-    return out / f"baseline_{rig}.json"
+    return out / f"baseline_{scene}{'_' if scene else ''}{rig}.json"
 
 
-def _learn(rig: int, sessions: Path, out: Path) -> None:
-    path = baseline_file(out, rig)
+def _learn(rig: int, sessions: Path, out: Path, scene: str = "") -> None:
+    path = baseline_file(out, rig, scene)
     if not path.is_file():
-        own = [each for each in learning() if each.rig == rig]
+        own = [each for each in learning(scene) if each.rig == rig]
         names = [stored.path_of(sessions, each).name for each in own]
-        learnt = learn_baseline(load_scene(), Settings(), [stored.load_samples(sessions, each) for each in own], names)
+        learnt = learn_baseline(nominal(scene), Settings(), [stored.load_samples(sessions, each) for each in own], names)
         path.write_text(learnt.model_dump_json())
 
 
-def outcome(sessions: Path, out: Path, each: Scenario) -> dict[str, Any]:
-    """What is true of a session and everything that was told of it: each alarm at each of its changes."""
-    twin = Twin(load_scene(), baseline=load_baseline(baseline_file(out, each.rig)) if each.rig else Baseline())
+def outcome(sessions: Path, out: Path, each: Scenario, shipped: bool = False) -> dict[str, Any]:
+    """What is true of a session and everything that was told of it: each alarm at each of its changes.
+
+    By the baseline of its rig, or by the one that ships.
+    """
+    baseline = load_baseline(baseline_file(out, each.rig, each.scene)) if each.rig and not shipped else Baseline()
+    twin = Twin(each.model, baseline=baseline)
     told: list[dict[str, Any]] = []
     last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
     samples = stored.load_samples(sessions, each)

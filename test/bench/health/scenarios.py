@@ -2,6 +2,9 @@
 
 What is drawn: whether there is a fault, its cause, size, onset, ramp and end, a second one; pump and wind; noise, rate and
 sensors; the rig, whose parameters are right or 2 % wrong. A fifth of all numbers is held out: see `Scenario.is_held_out`.
+
+Numbers below 5000 are of the default boom at 50 to 500 Hz; from 5000 on of a five-section boom that folds in a Z, at 50 to 1000
+Hz; from 7000 on of the default boom at 1000 Hz.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from boom_twin.scene import load_scene
+from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Sensors
 from boom_twin.validation.rig.faults import RigFault
@@ -30,6 +34,9 @@ SIZES: dict[str, tuple[float, ...]] = {
     "cylinder bias": (5e-4, 2e-3), "cylinder drift": (5e-5,), "cylinder scale": (0.01,),
 }  # fmt: skip
 """Of each kind of fault, SI; all kinds are drawn alike, cylinders twice as often."""
+RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.6, 500.0: 0.1}  # Hz, and how often
+Z_FOLD, Z_FOLD_FROM, FAST_FROM = "five_section_z_fold", 5000, 7000  # an example scene; numbers
+Z_FOLD_RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.4, 1000.0: 0.3}
 GROUPS = {"healthy": 0.4, "one": 0.42, "recovery": 0.08, "two": 0.1}
 
 
@@ -47,6 +54,17 @@ class Scenario:
     noise: float
     rate: float
     streams: tuple[str, ...]
+    scene: str = ""
+
+    @property
+    def model(self) -> Scene:
+        """The boom as its scene file has it."""
+        return nominal(self.scene)
+
+    @property
+    def boom(self) -> Scene:
+        """The boom that is simulated, without its faults."""
+        return wrong_by(self.model, WRONG, self.rig) if self.rig else self.model
 
     @property
     def seed(self) -> int:
@@ -72,37 +90,43 @@ class Scenario:
             "number": self.number, "group": self.group, "rig": self.rig, "posture": self.posture, "duration": self.duration,
             "faults": [str(fault) for fault in self.faults], "causes": [fault.cause for fault in self.faults],
             "loads": [str(load) for load in self.loads], "noise": self.noise, "rate": self.rate, "streams": self.streams,
+            "scene": self.scene,
         }  # fmt: skip
 
 
 @lru_cache
-def boom(rig: int) -> Scene:
-    """The boom that is simulated, without its faults."""
-    return wrong_by(load_scene(), WRONG, rig) if rig else load_scene()
+def nominal(name: str) -> Scene:
+    """The default scene, or an example by its name."""
+    if not name:
+        return load_scene()
+    found, _ = examine_text(example_text(name), name)
+    assert found is not None
+    return found
 
 
-def learning() -> list[Scenario]:
-    """Healthy sessions of the rigs that are wrong."""
-    streams = ("angles", "imu")
-    names = sorted(load_scene().postures)
+def learning(scene: str = "") -> list[Scenario]:
+    """Healthy sessions of the rigs of a boom that are wrong."""
+    streams, first = ("angles", "imu"), -101 if scene else -1
+    names = sorted(nominal(scene).postures)
     pairs = [(rig, k) for rig in range(1, RIGS) for k in range(LEARN_EACH)]
     return [
-        Scenario(-1 - i, "learn", rig, names[k % len(names)], LEARNING, (), (), 1.0, 200.0, streams)
+        Scenario(first - i, "learn", rig, names[k % len(names)], LEARNING, (), (), 1.0, 200.0, streams, scene)
         for i, (rig, k) in enumerate(pairs)
     ]
 
 
 def scenario(number: int) -> Scenario:
     """The session of a number, from 0."""
+    scene = Z_FOLD if Z_FOLD_FROM <= number < FAST_FROM else ""
+    rates = {1000.0: 1.0} if number >= FAST_FROM else Z_FOLD_RATES if scene else RATES
     rng = np.random.default_rng([number, 17])
     group = str(rng.choice(list(GROUPS), p=list(GROUPS.values())))
     streams = ("angles", *(["imu"] if rng.random() < 0.8 else []), *(["forces"] if rng.random() < 0.2 else []))
     noise = float(rng.choice([0.5, 1.0, 2.0], p=[0.15, 0.7, 0.15]))
-    rate = float(rng.choice([50.0, 100.0, 200.0, 500.0], p=[0.1, 0.2, 0.6, 0.1]))
-    posture = str(rng.choice(sorted(load_scene().postures)))
-    return Scenario(
-        number, group, int(rng.integers(RIGS)), posture, DURATION, _faults(group, rng), _loads(rng), noise, rate, streams
-    )
+    rate = float(rng.choice(list(rates), p=list(rates.values())))
+    posture = str(rng.choice(sorted(nominal(scene).postures)))
+    rig, faults = int(rng.integers(RIGS)), _faults(group, rng, len(nominal(scene).joints))
+    return Scenario(number, group, rig, posture, DURATION, faults, _loads(rng), noise, rate, streams, scene)
 
 
 def _loads(rng: np.random.Generator) -> tuple[RigLoad, ...]:
@@ -115,26 +139,26 @@ def _loads(rng: np.random.Generator) -> tuple[RigLoad, ...]:
     return {"none": (), "pump": (pump,), "wind": (wind,), "both": (pump, wind)}[str(kind)]
 
 
-def _faults(group: str, rng: np.random.Generator) -> tuple[RigFault, ...]:
+def _faults(group: str, rng: np.random.Generator, joints: int) -> tuple[RigFault, ...]:
     if group == "healthy":
         return ()
     ramp = float(rng.choice([0.0, 0.05, 2.0, 5.0, 15.0, 30.0]))
-    first = _fault(rng, float(rng.choice([0.0, rng.uniform(5.0, 15.0)])), ramp)
+    first = _fault(rng, joints, float(rng.choice([0.0, rng.uniform(5.0, 15.0)])), ramp)
     if group == "recovery":
         ramp = min(first.ramp, 5.0)
         return (replace(first, ramp=ramp, end=max(50.0, first.onset + ramp + 30.0)),)
     if group == "one":
         return (first,)
-    while (second := _fault(rng, float(rng.uniform(35.0, 45.0)), 0.05)).cause == first.cause:
+    while (second := _fault(rng, joints, float(rng.uniform(35.0, 45.0)), 0.05)).cause == first.cause:
         pass
     return first, second
 
 
-def _fault(rng: np.random.Generator, onset: float, ramp: float) -> RigFault:
+def _fault(rng: np.random.Generator, joints: int, onset: float, ramp: float) -> RigFault:
     kind = str(rng.choice([*SIZES, "k", "k", "payload"]))
-    size, i = float(rng.choice(SIZES[kind])), int(rng.integers(1, 5))
+    size, i = float(rng.choice(SIZES[kind])), int(rng.integers(1, joints + 1))
     if kind == "k":
-        return RigFault(f"cylinder_{i}.k", "softer", 0.4 if i == 4 else 0.3, onset, ramp)
+        return RigFault(f"cylinder_{i}.k", "softer", 0.4 if i >= 4 else 0.3, onset, ramp)
     if kind == "EI":
         return RigFault(f"section_{i}.EI", "softer", size, onset, ramp)
     if kind in ("payload", "line_fill"):

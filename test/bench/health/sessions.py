@@ -1,6 +1,7 @@
 """Makes the sessions of the health benchmark with the virtual rig; goes on where it was stopped.
 
     python test/bench/health/sessions.py --out out/health/sessions --count 100 [--jobs 2]
+    python test/bench/health/sessions.py --out out/health/sessions --only 720 753 [--jobs 2]
 
 Six elements a section, exact at their nodes, with steps of 5 ms at a tolerance of 1e-4 agree with 16 elements and 0.5 ms (20 s
 of random moves) within 8e-6 rad rms in every joint, 0.09 mm and 0.007 m/s^2 at the tip: a twentieth of the noise of the angle
@@ -20,10 +21,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process per core; and files
 
 import numpy as np
 import stored
-from scenarios import Scenario, boom, learning, scenario
+from scenarios import FAST_FROM, Z_FOLD, Z_FOLD_FROM, Scenario, learning, scenario
 
 from boom_twin.errors import SolverError
-from boom_twin.scene import load_scene
 from boom_twin.validation.rig import Scheme, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import spoil
 from boom_twin.validation.rig.faulty_boom import changes
@@ -37,8 +37,8 @@ AT_ONCE = 20  # sessions of one process: what Exudyn does not give back, its end
 
 def simulated(each: Scenario, programme: Programme | None = None) -> dict[str, np.ndarray]:
     """The readings of one session, as arrays; of random moves unless there is a programme."""
-    start, changing = changes(boom(each.rig), each.faults)
-    programme = programme or random_programme(load_scene(), each.posture, each.duration, each.seed)
+    start, changing = changes(each.boom, each.faults)
+    programme = programme or random_programme(each.model, each.posture, each.duration, each.seed)
     load = tip_load(start, each.loads, each.duration, each.seed) if each.loads else None
     resting = at_rest(start, np.array(programme.first), ELEMENTS, nodally_exact=True)
     rows, _ = move(resting, programme, each.duration, STEP, STEP, SCHEME, load, changing)
@@ -66,8 +66,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     parser.add_argument("--count", type=int, default=1000, help="sessions beside those that baselines are learnt from")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
+    parser.add_argument("--only", type=int, nargs="*", help="numbers, instead of all from the first on")
     args = parser.parse_args()
-    todo = [*learning(), *(scenario(number) for number in range(args.first, args.first + args.count))]
+    numbers = args.only or range(args.first, args.first + args.count)
+    is_folding = any(Z_FOLD_FROM <= number < FAST_FROM for number in numbers)
+    todo = [*learning(), *(learning(Z_FOLD) if is_folding else []), *map(scenario, numbers)]
     with Pool(args.jobs, os.nice, (NICE,), AT_ONCE) as pool:
         for done, failure in enumerate(pool.imap(partial(make, folder=args.out), todo), 1):
             print(failure or f"{done} of {len(todo)}", file=sys.stderr, flush=True)
