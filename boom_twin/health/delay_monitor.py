@@ -2,8 +2,9 @@
 
 Readings that are d late differ from the prediction by -d times its slope. Both are averaged over two periods of the slowest
 vibration, two seconds at least (a triangle of blocks), which takes vibration out: a natural frequency that is 1 % wrong puts
-vibration out of phase as a lag does. Spans of 4 s, each less its mean, give d by least squares, and how it scatters among them gives its deviation: whatever else is wrong
-with the model goes with where the boom is, not with which way it moves, and does not agree about d.
+vibration out of phase as a lag does. Spans of 4 s, each less its mean, give d by least squares, and how it scatters among them
+gives its deviation: whatever else is wrong with the model goes with where the boom is, not with which way it moves, and does
+not agree about d.
 """
 
 from __future__ import annotations
