@@ -270,6 +270,21 @@ def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
         assert len(monitor._judge_hold(hold)) == alarms, (weight, level)
 
 
+def test_a_far_tip_by_a_weight_takes_a_hold_that_no_load_shakes() -> None:
+    """Which gives a frequency: the mean of a load does to every sensor what a weight does. A section is no such thing."""
+    hold = drawn(np.random.default_rng(1), 0.0)[0]
+    shaken = hold._replace(modes=hold.modes[:0], frequencies=hold.frequencies[:0], sigmas=hold.sigmas[:0])
+    known = parameters(load_scene())
+    places = {each.cause: i for i, each in enumerate(known)}
+    for cause, at, alarms in (("tip.payload", shaken, 0), ("tip.payload", hold, 1), ("section_1.EI", shaken, 1)):
+        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        best = Cause(cause, 1.0, (Explanation(places[cause], 0, 6.0, 12.0, 0.5),))
+        found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0), 0.02, is_far=True)
+        monitor._hold_test.take = lambda *_, found=found: found
+        monitor._hold_test._holds = [at]
+        assert len(monitor._judge_hold(at)) == alarms, cause
+
+
 def verdict_of(**shares: float) -> Verdict:
     """Two sections, each with what it is probable by."""
     known = parameters(load_scene())
