@@ -101,11 +101,13 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     assert remote.set("look_step", 0.05).successful
 
 
-def test_only_what_is_listened_to_is_encoded_and_what_late_listeners_get(domain: None) -> None:
+def test_only_what_is_listened_to_is_encoded_and_what_late_listeners_get(domain: None, monkeypatch: Any) -> None:
+    """Of a node in this process, by another name: its services are seen until the process ends."""
+    monkeypatch.setattr("boom_twin.ros.node.node.NODE", "listened_twin")
     node, listener, end = TwinNode(), rclpy.create_node("listener"), time.monotonic() + 60.0
     assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
     assert [key for key in node._outputs if node._is_wanted(key)] == [Output.CHANGES]
-    heard = listener.create_subscription(PointStamped, "/boom_twin/tip/position", print, 10)
+    heard = listener.create_subscription(PointStamped, "/listened_twin/tip/position", print, 10)
     while not node._is_wanted(Output.TIP_POSITION):
         assert time.monotonic() < end
         time.sleep(0.01)

@@ -46,7 +46,8 @@ recording is brought into the order of its stamps: angles 2 s behind the strokes
 JUDGED = (Output.HEALTH, Output.TIP_UNCERTAINTY)
 """Told when there is news, or after a second; an overloaded node leaves out looks, a replay none."""
 NODES = ("boom_twin", "boom_twin_recorder", "boom_twin_monitor")
-SLOWLY = ("--namespace", "front", "--rate", "0.01", "--wait", "0")
+ALONE = "/alone"
+SLOWLY = ("--namespace", ALONE.strip("/"), "--rate", "0.01", "--wait", "0")
 PLAYED = ("cylinder_strokes", "joint_angles", "tip_imu", "rosout", "parameter_events")
 RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.SHAPE)
 CONFIG = Path(boom_twin.__file__).parent / "msg_config"
@@ -118,12 +119,15 @@ def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Pat
 
 
 def access_of_player(graph: Any, player: Any) -> Access:
-    """Of one that plays for long enough to be discovered whole, which takes a while on a busy machine."""
+    """Of one that plays for long enough to be discovered whole, which takes a while on a busy machine.
+
+    It has a namespace of its own: a player that has ended may still be seen, and would be asked about in its place.
+    """
     found: Access = {}
     end = time.monotonic() + 60.0
     while time.monotonic() < end and len(found.get("topics publish", ())) < len(PLAYED):
         time.sleep(0.2)
-        found = access(graph, "boom_twin_player")
+        found = access(graph, "boom_twin_player", ALONE)
     player.stop(signal.SIGINT)
     return found
 
@@ -150,8 +154,8 @@ def wait_for_all(graph: Any, name: str, sent: str) -> None:
 Access = dict[str, set[str]]
 
 
-def access(graph: Any, name: str) -> Access:
-    """What a node in /front publishes, hears, answers and asks, by the words of a policy; {} if it is not there."""
+def access(graph: Any, name: str, namespace: str = "/front") -> Access:
+    """What a node publishes, hears, answers and asks, by the words of a policy as if in /front; {} if it is not there."""
     queries = {
         "topics publish": graph.get_publisher_names_and_types_by_node,
         "topics subscribe": graph.get_subscriber_names_and_types_by_node,
@@ -159,7 +163,8 @@ def access(graph: Any, name: str) -> Access:
         "services request": graph.get_client_names_and_types_by_node,
     }
     try:
-        return {verb: {each for each, _ in query(name, "/front")} for verb, query in queries.items()}
+        found = {verb: [each for each, _ in query(name, namespace)] for verb, query in queries.items()}
+        return {verb: {each.replace(f"{namespace}/", "/front/") for each in names} for verb, names in found.items()}
     except NodeNameNonExistentError:
         return {}
 
