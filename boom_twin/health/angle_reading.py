@@ -19,9 +19,8 @@ from ..errors import BoomTwinError
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, Ranked
+from .reading_means import ENOUGH, ReadingMeans
 
-WINDOW = 2.0  # s, time constant of the means
-ENOUGH = 0.6  # of their weight: after 1.8 s
 FAR = radians(1.0)  # by which readings have to be off, and two expected angles apart, for their exchange to be told
 FAR_SIGN = radians(10.0)  # likewise a reading for its sign: an offset looks like it where the angle is minus half of it
 FAR_STROKES = radians(6.0)  # likewise two joints for strokes that are swapped
@@ -57,8 +56,8 @@ class AngleReading:
     def begin(self) -> None:
         """The boom starts from rest; alarms last until they are refuted."""
         count = len(self._scene.joints)
-        self._read, self._expected, self._strokes = np.zeros(count), np.zeros(count), np.zeros(count)
-        self._weight, self._since = np.zeros(count), np.full(count, -1, dtype=np.int64)
+        self._sums, self._strokes = ReadingMeans(count), np.zeros(count)
+        self._since = np.full(count, -1, dtype=np.int64)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -97,26 +96,19 @@ class AngleReading:
         start, end : int
             Of the block, ns.
         """
-        known = np.isfinite(left)
-        counts = known.sum(axis=0)
-        heard = counts > 0
+        share, off = self._sums.take(raw, left, span)
+        heard = share > 0.0
         if not heard.any():
             return []
-        read = np.where(known, raw, 0.0).sum(axis=0) / np.maximum(counts, 1)
-        off = np.where(known, left, 0.0).sum(axis=0) / np.maximum(counts, 1)
-        share = np.where(heard, min(1.0, span / WINDOW), 0.0)
-        self._read += share * (read - self._read)
-        self._expected += share * (read - off - self._expected)
         self._strokes += share * (strokes - self._strokes)
-        self._weight += share * (1.0 - self._weight)
         is_off = np.abs(off) > FAR
         self._since = np.where(is_off, np.where(self._since < 0, start, self._since), np.where(heard, -1, self._since))
         return self._ended(end) + self._begun()
 
     def _means(self) -> tuple[Array, Array, Array]:
         """Angles that were read and expected, rad, and strokes, m, lately, shape (n,) each."""
-        weight = np.maximum(self._weight, 1e-9)
-        return self._read / weight, self._expected / weight, self._strokes / weight
+        weight = np.maximum(self._sums.weight, 1e-9)
+        return self._sums.read / weight, self._sums.expected / weight, self._strokes / weight
 
     def _ended(self, end: int) -> list[Alarm]:
         read, expected, _ = self._means()
@@ -135,7 +127,7 @@ class AngleReading:
     def _begun(self) -> list[Alarm]:
         taken = self.masked
         read, expected, strokes = self._means()
-        off = (self._weight > ENOUGH) & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
+        off = (self._sums.weight > ENOUGH) & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
         if not off.any():
             return []
         news: list[Alarm] = []

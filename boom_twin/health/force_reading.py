@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import SENSORS, Alarm, Array, Ranked, Stream
+from .reading_means import ENOUGH, ReadingMeans
 
-WINDOW = 2.0  # s, time constant of the means
-ENOUGH = 0.6  # of their weight: after 1.8 s
 LARGE = 0.2  # of the largest force, from which on a cylinder's is judged: a smaller one may be as large by a load
 CLOSE = 0.2  # of the factor by which a reason explains it: share by which the reading may be off it
 RIGHT = 0.5  # of the force: a reading that is less off has the right unit and sign
@@ -46,8 +45,7 @@ class ForceReading:
 
     def begin(self) -> None:
         """The boom starts from rest; alarms last until they are refuted."""
-        count = len(self._names)
-        self._read, self._expected, self._weight = np.zeros(count), np.zeros(count), np.zeros(count)
+        self._means = ReadingMeans(len(self._names))
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -74,21 +72,11 @@ class ForceReading:
         """
         if not len(left):
             return []
-        known = np.isfinite(left)
-        counts = known.sum(axis=0)
-        heard = counts > 0
-        if not heard.any():
-            return []
-        read = np.where(known, raw, 0.0).sum(axis=0) / np.maximum(counts, 1)
-        off = np.where(known, left, 0.0).sum(axis=0) / np.maximum(counts, 1)
-        share = np.where(heard, min(1.0, span / WINDOW), 0.0)
-        self._read += share * (read - self._read)
-        self._expected += share * (read - off - self._expected)
-        self._weight += share * (1.0 - self._weight)
+        share, _ = self._means.take(raw, left, span)
         news: list[Alarm] = []
-        for i in np.flatnonzero(heard & self._is_large()).tolist():
-            factor = self._read[i] / self._expected[i]
-            if i not in self._alarms and self._weight[i] > ENOUGH and (reason := _reason(factor)):
+        for i in np.flatnonzero((share > 0.0) & self._is_large()).tolist():
+            factor = self._means.read[i] / self._means.expected[i]
+            if i not in self._alarms and self._means.weight[i] > ENOUGH and (reason := _reason(factor)):
                 self._alarms[i] = self._begun(i, reason, start)
                 news.append(self._alarms[i])
             elif i in self._alarms and abs(factor - 1.0) < RIGHT:
@@ -96,12 +84,12 @@ class ForceReading:
         return news
 
     def _is_large(self) -> NDArray[np.bool_]:
-        expected = np.abs(self._expected)
+        expected = np.abs(self._means.expected)
         return np.asarray((expected > LARGE * expected.max()) & (expected > 0.0))
 
     def _begun(self, i: int, reason: str, start: int) -> Alarm:
         name, cause = self._names[i], f"{self._names[i]}.sensor"
-        read, expected = self._read[i] / self._weight[i], self._expected[i] / self._weight[i]
+        read, expected = self._means.read[i] / self._means.weight[i], self._means.expected[i] / self._means.weight[i]
         told = (
             f"{cause} reads {_three_digits(read)} N where the model has {_three_digits(expected)} N, as if {reason}: not used; "
             "give cylinder forces their unit and sign (positive in tension) in the mapping"
