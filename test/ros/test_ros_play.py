@@ -28,8 +28,8 @@ from boom_twin.bag.writer import BagWriter, SessionWriter
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Qos
-from boom_twin.ros.bag.player import Player
-from boom_twin.types import Stream
+from boom_twin.ros.bag.player import CATCH_UP, Player
+from boom_twin.types import SECOND, Stream
 
 
 def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path, motion: dict[str, Any]) -> None:
@@ -57,6 +57,20 @@ def test_a_part_of_a_session_with_its_clock(spawn: Callable[..., Any], bag: Path
         assert list(msg.position) == motion["strokes"][rows[stamp_of(msg)]].tolist()
     assert 70 <= len(ticks) <= 81
     assert {after - before for before, after in pairwise(ticks)} == {25_000_000}
+
+
+def test_what_is_overdue_is_not_sent_in_a_flood(domain: None, bag: Path) -> None:
+    """Listeners of best effort have room for some hundred messages, so that a second of them at once would be lost in part."""
+    player, sent, awake = Player(scan(bag)), [], 0.0
+    for offset in player.play(duration=2.0):
+        sent.append((offset / SECOND, time.monotonic()))
+        if len(sent) == 100:
+            time.sleep(1.0)
+            awake = time.monotonic()
+    player.close()
+    late = sent[100:]
+    assert len(late) > 400
+    assert all(at - awake >= (offset - late[0][0]) / CATCH_UP - 1e-6 for offset, at in late)
 
 
 def test_it_ends_only_when_reliable_listeners_have_everything(

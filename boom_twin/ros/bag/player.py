@@ -30,6 +30,11 @@ DELIVERY = 10.0
 """Time (s) in which reliable listeners are to acknowledge what was sent, at the end."""
 SETTLE = 0.5
 """Time (s) from the match with the last listener to the first message."""
+CATCH_UP = 4.0
+"""Times the rate at which a player that was kept waiting sends what is overdue.
+
+All at once would be lost on best-effort listeners: in shared memory Fast DDS holds 512 messages for each program that listens.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,11 +148,13 @@ class Player:
         first = self._session.start + round(start / NANO)
         end = self._session.end + 1 if duration is None else first + round(duration / NANO)
         entered = began = time.monotonic()
+        sent, previous = began, 0.0
         try:
             for stamp, name, data in self._schedule(first, end, rate):
                 due = (stamp - first) * NANO / rate
-                began += self._wait(began + due, stamp, is_held)
-                self._latest = max(self._latest, time.monotonic() - began - due)
+                began += self._wait(max(began + due, sent + (due - previous) / CATCH_UP), stamp, is_held)
+                sent, previous = time.monotonic(), due
+                self._latest = max(self._latest, sent - began - due)
                 self._publish(name, data)
                 yield stamp - first
         finally:
