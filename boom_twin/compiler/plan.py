@@ -12,7 +12,7 @@ from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
-from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Work
+from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Tangents, Work
 from ..kernels.transfer.time_step import observe
 from ..types import Array
 
@@ -135,6 +135,13 @@ class Plan:
             corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip
+
+    def tangents(self, count: int) -> Tangents:
+        """Room for what `count` steps that take turns keep."""
+        works = [self.work() for _ in range(count)]
+        own = {name: [getattr(work.condensed, name) for work in works] for name in Condensed._fields}
+        own |= {name: [getattr(work, name) for work in works] for name in Tangents._fields if name not in own}
+        return Tangents(**{name: np.stack(arrays) for name, arrays in own.items()})
 
 
 def width_of(plan: Plan) -> int:

@@ -13,12 +13,12 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import PIN, places_in, prediction_width
-from ..kernels.tables import State, Tables, Work
+from ..kernels.tables import State, Tables, Tangents, Work
 from ..kernels.transfer.forward_kinematics import place
 from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
 from ..scene.schema import Scene
 from ..types import Array, Outline, Prediction
-from .look_ahead import Track, new_track
+from .look_ahead import STEPS, Track, new_track
 
 
 class UndeflectedPredictor:
@@ -68,6 +68,7 @@ class CompiledBoom(NamedTuple):
     """A boom as kernels take it.
 
     tables : of the scene. anchor, live : the boom that is remembered, and as predicted by the newest sample. work : scratch.
+    tangents : that steps keep from sample to sample.
     track : see `boom_twin.estimation.look_ahead.Track`. bending : (stations, unknowns) bending moments by the unknowns, N m.
     row : the newest prediction, see `boom_twin.kernels.result_row`.
     """
@@ -76,6 +77,7 @@ class CompiledBoom(NamedTuple):
     anchor: State
     live: State
     work: Work
+    tangents: Tangents
     track: Track
     bending: Array
     row: Array
@@ -110,7 +112,14 @@ class BoomPredictor:
         self._row = np.zeros(prediction_width(*size))
         self.places = places_in(*size)
         self.compiled = CompiledBoom(
-            self.plan.tables, self._anchor, self.live, self._work, self._track, moments_by_unknowns(self.plan), self._row
+            self.plan.tables,
+            self._anchor,
+            self.live,
+            self._work,
+            self.plan.tangents(int(STEPS)),
+            self._track,
+            moments_by_unknowns(self.plan),
+            self._row,
         )
 
     @property

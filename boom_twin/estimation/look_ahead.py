@@ -4,7 +4,8 @@ Strokes estimated at the instant they are measured carry noise that the boom's l
 seen 45 ms later are far quieter. So the boom that is remembered, the anchor, is stepped only as far as the smoother's
 window reaches back, with strokes that will not change much any more; for every new sample a copy of it runs through the
 window to now, in few long steps, and is the prediction. Nothing is delayed, and an error made in the window is forgotten with
-the copy.
+the copy. The steps ahead of the anchor, each a little later than for the sample before, keep their tangents and the corrections
+of their guesses from sample to sample.
 """
 
 from __future__ import annotations
@@ -20,16 +21,19 @@ from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
 from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
-from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, observe
+from ..kernels.transfer.kept_tangent import forget_all, keep_corrections, work_of
+from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, advance_again, observe
 from ..types import Array
 from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, new_filter, start_filter, take_strokes
 
-TOLERANCE = 1e-5  # rad in the last pass of a step of the anchor; what is left is about its square
-LOOK_TOLERANCE = 3e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
+TOLERANCE = 1e-4  # rad in the last pass of a step of the anchor; what is left is about a fiftieth of its square
+LOOK_TOLERANCE = 1e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
 LOOK_SHARE = 0.58  # of the lag, longest step ahead of the anchor: two steps
-ROUNDING = 1e-9  # s, by which stamps that are a step apart may be further apart
+UNEVEN = 0.1  # of a step, by which stamps that are to be a step apart may be further apart
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
+STEPS = np.int64(4)  # ahead of the anchor, that keep tangents of their own; the last for all behind it
+AHEAD_ORDER = 1.0  # corrections that a guess ahead of the anchor is corrected by: noise of the strokes is in them
 REST_PASSES, REST_INCREMENT = np.int64(60), 0.1
 WIDEST = math.pi  # rad, how far a rigid joint is followed beyond its range
 
@@ -81,7 +85,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
 
 
 @inner
-def follow(t, anchor, live, work, track, tuning, time, y, out):
+def follow(t, anchor, live, work, tangents, track, tuning, time, y, out):
     """Take strokes y (m; NaN = missing) measured at `time` (s) and write the prediction for it.
 
     The first sample of a track without nodes is taken as rest, in equilibrium; `anchor` holds a first guess of it.
@@ -95,12 +99,15 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
     ahead, old, nodes = False, track.nodes[0] - 1, track.bank.nodes
     lag = lag_of(track.bank, tuning.strokes)
     look_step, lag = min(tuning.look_step, LOOK_SHARE * lag), max(lag, tuning.least_lag)
-    boom, start, longest, tolerance = anchor, track.anchor, tuning.step, TOLERANCE
+    boom, start, longest, tolerance, at = anchor, track.anchor, tuning.step, TOLERANCE, np.int64(0)
+    may_keep = t.clearances.shape[0] == 0
     while True:
         if not ahead and not anchor_must_advance(track, lag, old, longest):
             track.nodes[0] = old + 1
             if track.moved[0] == 0:
                 hold(track, nodes[old])
+                for k in range(STEPS):
+                    forget_all(work_of(work, tangents, k))
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
                     t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, ANEW
@@ -109,18 +116,23 @@ def follow(t, anchor, live, work, track, tuning, time, y, out):
                 if status != OK:
                     return status
             copy_state(anchor, live)
-            ahead, boom, longest, tolerance = True, live, look_step, LOOK_TOLERANCE
+            ahead, boom, longest, tolerance, at = True, live, look_step, LOOK_TOLERANCE, np.int64(0)
         if old == 0:
             report(t, live, track, out)
             return OK
         new = next_node(track, old, longest)
         span = track.times[new] - track.times[old]
-        steps = max(1, math.ceil(span / longest - 1e-6))
+        steps = max(1, math.ceil(span / longest - UNEVEN))
         scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
         for k in range(steps):
             drive_to(track, start, nodes[new], span, (k + 1) / steps)
-            status, count, _ = advance(
-                t, boom, work, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, ANEW
+            own = work
+            if ahead:
+                own = work_of(work, tangents, at)
+                keep_corrections(own, AHEAD_ORDER)
+                at = min(at + 1, STEPS - 1)
+            status, count = advance_again(
+                t, boom, own, scheme, track.drive, track.rate, tolerance, PASSES, LONGEST_INCREMENT, None, may_keep and ahead
             )
             track.passes[0] += count
             if status != OK:
@@ -143,7 +155,7 @@ def anchor_must_advance(track, lag, old, longest):
 def next_node(track, old, longest):
     """The youngest node within one step of at most `longest` ahead of `old`, at least the next one."""
     new = old - 1
-    while new > 0 and track.times[new - 1] - track.times[old] <= longest + ROUNDING:
+    while new > 0 and track.times[new - 1] - track.times[old] <= longest * (1.0 + UNEVEN):
         new -= 1
     return new
 

@@ -204,6 +204,27 @@ class Work(NamedTuple):
     cut: Array  # (SLOTS,)
 
 
+@by_reference
+class Tangents(NamedTuple):
+    """What k steps that take turns keep, each its own: fields of `Condensed` and of `Work` with a leading axis over them.
+
+    See `kernels.transfer.kept_tangent.work_of`.
+    """
+
+    gains: Array
+    free: Array
+    factors: Array
+    order: np.ndarray
+    blocks: Array
+    ends: Array
+    end_gains: Array
+    end_free: Array
+    drho: Array
+    corrections: Array
+    kept_z: Array
+    kept: Array
+
+
 OF_FORCES = (
     "offset", "s", "p", "g", "h", "own_g", "own_h", "right", "hold", "apart", "local", "drive", "drive_rate", "dz", "cut",
 )  # fmt: skip

@@ -60,13 +60,30 @@ was stepped to; the sample is complete and begins a slot, left the model's valid
 
 @kernel
 def update(
-    t, anchor, live, work, track, bending, out, limits, state, tip, streams, stamps, values, first, resumed, trusted, found
+    t,
+    anchor,
+    live,
+    work,
+    tangents,
+    track,
+    bending,
+    out,
+    limits,
+    state,
+    tip,
+    streams,
+    stamps,
+    values,
+    first,
+    resumed,
+    trusted,
+    found,
 ):
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
     Parameters
     ----------
-    t, anchor, live, work, track, bending, out : fields of CompiledBoom
+    t, anchor, live, work, tangents, track, bending, out : fields of CompiledBoom
         See `boom_twin.estimation.boom_predictor`; as they are, because tuples of tuples take long to compile.
     limits : Limits
     state : TwinState
@@ -101,7 +118,7 @@ def update(
                     return ODD, row
                 note_stamp(state, STROKES, stamp)
             time, tuning = begin_step(limits, state, stamp)
-            state.clock[STATUS] = follow(t, anchor, live, work, track, tuning, time, state.taken, out)
+            state.clock[STATUS] = follow(t, anchor, live, work, tangents, track, tuning, time, state.taken, out)
             if state.clock[STATUS] != OK:
                 return FAILED, row
             end_step(state, stamp)

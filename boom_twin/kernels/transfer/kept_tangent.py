@@ -12,6 +12,10 @@ by: solving the equations of a long step more exactly makes nothing better. At t
 thousandth from 14 ms on, and 5e-6 at 1 ms, where no number moves by more than 1e-9 of its range. After a step with more than
 one pass the next begins with a new tangent, and so does a pass where the share would be above `MOST_SHARE`.
 
+Steps of nearly the same length share a tangent, too, so that stamps need not be even: what another gain leaves counts as so
+much more travel. Where less exactness is asked for than usual, for steps that begin anew with every sample, the lead also falls
+to three times what passes show: it is far less than 1 for long steps, whose tangent is mostly stiffness.
+
 A second-order step takes the acceleration as changing little within it; what its change a' - a moves in the step, (a' - a)/gain
 with 1/gain about a quarter of the step's square, is of the size of the step's own error (Hairer, Norsett and Wanner, Solving
 Ordinary Differential Equations I, 1993, section II.4).
@@ -24,8 +28,8 @@ the corrections of three steps. Without it an error of one sign was left in ever
 from __future__ import annotations
 
 from ..integrators import A
-from ..jit import inner
-from ..tables import CORRECTIONS
+from ..jit import inner, referenced
+from ..tables import CORRECTIONS, Condensed, Work
 
 LEAD = 4.0  # at first
 MOST_SHARE = 0.15  # of an error that a pass may leave
@@ -33,7 +37,11 @@ CLOSER = 0.1  # of the square of the tolerance, that may be left
 LEAST_ERROR = 1e-15  # rad, that is asked for
 ROUNDING = 0.5  # of the increment before, that one consists of rounding above
 SEEN = 1e-7  # rad, increments from which a share is measured
+EXACT = 2e-6  # rad, a tolerance up to which the lead is never lowered
+NEAR = 1e-3  # rad, added to the travel then: nearer, what passes show is rounding
+SAFE, LEAST_LEAD = 3.0, 0.05  # times the share that passes show; lowest lead
 STEP_SHARE = 1e3  # of a long step's own error, that may be left at a tolerance of 1 rad, and in proportion at a smaller one
+LARGEST_SHARE = 0.005  # of it, at whatever tolerance
 LONG_GAIN = 2e4  # 1/s^2, of a long step: one of 14 ms. Of shorter ones less may be left, by the square of the step
 
 # Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known; travel after the newest pass.
@@ -53,9 +61,44 @@ def forget_tangent(work):
 
 
 @inner
+def keep_corrections(work, most):
+    """The next step's guess is corrected by the polynomial through the last `most` corrections at most."""
+    work.kept[CORRECTED] = min(work.kept[CORRECTED], most)
+
+
+@inner
+def work_of(work, tangents, k):
+    """`work` with what the `k`-th of several steps has kept."""
+    condensed = referenced(
+        Condensed(
+            gains=tangents.gains[k], free=tangents.free[k], factors=tangents.factors[k], order=tangents.order[k],
+            blocks=tangents.blocks[k], ends=tangents.ends[k], end_gains=tangents.end_gains[k], end_free=tangents.end_free[k],
+        )
+    )  # fmt: skip
+    return referenced(
+        Work(
+            position=work.position, velocity=work.velocity, acceleration=work.acceleration, hat=work.hat,
+            offset=work.offset, weights=work.weights, finer=work.finer, s=work.s, p=work.p, g=work.g, h=work.h,
+            own_g=work.own_g, own_h=work.own_h, right=work.right, condensed=condensed, hold=work.hold, apart=work.apart,
+            rho=work.rho, drho=tangents.drho[k], turn=work.turn, local=work.local, drive=work.drive,
+            drive_rate=work.drive_rate, dz=work.dz, guess=work.guess, corrections=tangents.corrections[k],
+            kept_z=tangents.kept_z[k], kept=tangents.kept[k], cut=work.cut,
+        )
+    )  # fmt: skip
+
+
+@inner
 def may_keep(work, gain):
     """Whether the kept tangent is good enough for a step of a scheme with `gain`."""
-    return work.kept[GAIN] == gain and work.kept[SHARE_LEAD] * work.kept[TRAVEL] < MOST_SHARE
+    if work.kept[GAIN] == 0.0:
+        return False
+    return max(work.kept[SHARE_LEAD], LEAD) * (work.kept[TRAVEL] + detuning(work, gain)) < MOST_SHARE
+
+
+@inner
+def detuning(work, gain):
+    """By how much the gain that the tangent is for is off `gain`, as the travel (rad) that at first counts as much."""
+    return abs(work.kept[GAIN] - gain) / gain / LEAD
 
 
 @inner
@@ -85,6 +128,12 @@ def step_error(t, state, work, gain):
 
 
 @inner
+def is_rough(tolerance):
+    """Whether less exactness is asked for than usual, so that the lead may fall to what passes show."""
+    return tolerance > EXACT
+
+
+@inner
 def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     """Whether a pass with an increment of `size` (rad) was the last of a step.
 
@@ -92,11 +141,18 @@ def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     about the square of `size`. Below the tolerance an increment that does not get smaller is rounding. gain : of the scheme.
     """
     way = work.kept[TRAVEL] = travel(t, state, work)
+    way += detuning(work, gain)
+    if is_rough(tolerance):
+        way += NEAR
     if before > SEEN and way > 0.0:
-        work.kept[SHARE_LEAD] = max(work.kept[SHARE_LEAD], size / before / way)
+        lead, seen = work.kept[SHARE_LEAD], size / before / way
+        if is_rough(tolerance):
+            work.kept[SHARE_LEAD] = max(LEAST_LEAD, 0.5 * lead, SAFE * seen)
+        else:
+            work.kept[SHARE_LEAD] = max(lead, seen)
     if size < tolerance and (renewed or size > ROUNDING * before > 0.0):
         return True
-    share = STEP_SHARE * tolerance * min(1.0, LONG_GAIN / gain)
+    share = min(STEP_SHARE * tolerance * min(1.0, LONG_GAIN / gain), LARGEST_SHARE)
     left = max(CLOSER * tolerance * tolerance, LEAST_ERROR, share * step_error(t, state, work, gain))
     return work.kept[SHARE_LEAD] * way * size < left
 

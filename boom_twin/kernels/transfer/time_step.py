@@ -18,6 +18,7 @@ from .kept_tangent import (
     forget_all,
     forget_tangent,
     is_converged,
+    is_rough,
     keep_tangent,
     may_keep,
     note_correction,
@@ -103,7 +104,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 status = newton_status(work, solved, size, tolerance, passes)
         if keep:
             note_correction(state, work)
-            if left < passes - 1:
+            if left < passes - (2 if is_rough(tolerance) else 1):
                 forget_tangent(work)
         total += passes - left
         error = coarseness(t, state, work, condensed, now)
@@ -123,6 +124,19 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     for i in range(drive.shape[0]):
         state.drives[0, i], state.drives[1, i] = drive[i], drive_rate[i]
     return OK, total, size
+
+
+@inner
+def advance_again(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
+    """As `advance`; a step that fails with a kept tangent is made once more, with new ones. Gives status and passes."""
+    total, may_use = 0, keep
+    while True:
+        status, count, _ = advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, may_use)
+        total += count
+        if status == OK or not may_use:
+            return status, total
+        forget_all(work)
+        may_use = False
 
 
 @inner
@@ -264,16 +278,10 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
-            may_use = keep
-            while True:
-                status, count, _ = advance(
-                    t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, may_use
-                )
-                total += count
-                if status == OK or not may_use:
-                    break
-                forget_all(work)
-                may_use = False  # once more from the step's beginning, with tangents made anew
+            status, count = advance_again(
+                t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, keep
+            )
+            total += count
             at += 1
             if status != OK:
                 return status, row, total, jolt, shake
