@@ -29,7 +29,7 @@ from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, ne
 TOLERANCE = 1e-4  # rad in the last pass of a step of the anchor; what is left is about a fiftieth of its square
 LOOK_TOLERANCE = 1e-3  # rad, likewise ahead of it, where an error is not remembered: nearly always a single pass
 LOOK_SHARE = 0.58  # of the lag, longest step ahead of the anchor: two steps
-UNEVEN = 0.1  # of a step, by which stamps that are to be a step apart may be further apart
+ROUNDING = 1e-9  # s, by which stamps that are a step apart may be further apart
 PASSES = np.int64(20)  # typed, because numba compiles once more for every literal
 NODES = 256  # most nodes of a window; beyond 4 kHz the window gets shorter than its lag
 STEPS = np.int64(4)  # ahead of the anchor, that keep tangents of their own; the last for all behind it
@@ -122,7 +122,7 @@ def follow(t, anchor, live, work, tangents, track, tuning, time, y, out):
             return OK
         new = next_node(track, old, longest)
         span = track.times[new] - track.times[old]
-        steps = max(1, math.ceil(span / longest - UNEVEN))
+        steps = max(1, math.ceil(span / longest - 1e-6))
         scheme = prepare(GENERALISED_ALPHA, tuning.rho, span / steps, work.weights)
         for k in range(steps):
             drive_to(track, start, nodes[new], span, (k + 1) / steps)
@@ -155,7 +155,7 @@ def anchor_must_advance(track, lag, old, longest):
 def next_node(track, old, longest):
     """The youngest node within one step of at most `longest` ahead of `old`, at least the next one."""
     new = old - 1
-    while new > 0 and track.times[new - 1] - track.times[old] <= longest * (1.0 + UNEVEN):
+    while new > 0 and track.times[new - 1] - track.times[old] <= longest + ROUNDING:
         new -= 1
     return new
 

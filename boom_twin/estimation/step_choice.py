@@ -26,7 +26,6 @@ from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
 from ..types import Array
-from .look_ahead import UNEVEN
 from .stroke_filter import filter_tuning
 
 SHARE, RISE = 0.05, 1.0  # of the travel of a cylinder; s
@@ -60,9 +59,8 @@ def choose_steps(scene: Scene, plan: Plan, settings: Settings) -> StepChoice:
     try:
         move = _TestMove(scene, plan, settings.rho)
         lag = float(filter_tuning(settings.stroke_variance, settings.stroke_agility).lags[0]) * USUAL ** (1.0 / 6.0)
-        longest = 1.0 + UNEVEN  # what uneven stamps make of a step
-        step, moved = _halved(lambda step: move.errors_of_step(longest * step), settings.step, settings)
-        look_step, looked = _halved(lambda step: move.errors_ahead(lag, longest * step), settings.look_step, settings)
+        step, moved = _halved(move.errors_of_step, settings.step, settings)
+        look_step, looked = _halved(lambda step: move.errors_ahead(lag, step), settings.look_step, settings)
     except (SolverError, UsageError):
         return StepChoice(settings.step, settings.look_step, np.nan, np.nan)
     return StepChoice(step, look_step, *np.maximum(moved, looked).tolist())
