@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from ..estimation.step_choice import StepChoice
 from ..estimation.stroke_filter import filter_tuning
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
+from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
@@ -126,8 +128,18 @@ class BlockUpdate:
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
-        self._update: Callable[..., tuple[int, int]] | None = None
-        self._measure: Callable[..., bool] | None = None
+        self._held: tuple[tuple[Any, ...], tuple[Any, ...], Any] | None  # what the compiled code takes with every call
+        self._update: Callable[..., tuple[int, int]]
+        self._measure: Callable[..., bool]
+
+    @property
+    def limits(self) -> Limits:
+        """What samples are judged by."""
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
         """What was found up to now is of no concern to the health monitor any more."""
@@ -152,15 +164,14 @@ class BlockUpdate:
         reason, count : int
             Why that ended, see `boom_twin.twin.update.DONE`, and how many samples were taken.
         """
-        found = self._found
         self.judge()
         self.make_room()
+        if self._held is None:
+            self._hold()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
-            args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            arguments = self.limits, self._state, self._modes.filter, *args, trusted, found
-            if self._measure is None:
-                self._measure = measure.for_types_of(*arguments)
-            is_taken = self._measure(*arguments)
+            _, twin, found = self._held
+            sample = int(block.streams[0]), int(block.stamps[0]), block.values[0]
+            is_taken = self._measure(*twin, *sample, trusted, found)
             reason, row = (DONE, 1) if is_taken else (ODD, 0)
         else:
             reason, row = self._advance_strokes(run, block, trusted)
@@ -168,6 +179,14 @@ class BlockUpdate:
             self._told_counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
         return reason, row
+
+    def _hold(self) -> None:
+        """Write once what the compiled code takes with every call, and look up that code."""
+        boom, twin = map(hold, self._boom.compiled), map(hold, (self._limits, self._state, self._modes.filter))
+        self._held = boom, twin, found = tuple(boom), tuple(twin), hold(self._found)
+        one, width = np.zeros(1, np.int64), int(self._widths.max())
+        self._measure = measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+        self._update = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
 
     def make_room(self) -> None:
         """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
@@ -179,13 +198,10 @@ class BlockUpdate:
 
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         row, is_resumed, size = 0, False, len(block.stamps)
-        assert run is not None
+        assert run is not None and self._held is not None
+        arguments, twin, found = self._held
         while True:
-            twin = *self._boom.compiled, self.limits, self._state, self._modes.filter
-            arguments = *twin, *block, row, is_resumed, trusted, self._found
-            if self._update is None:
-                self._update = update.for_types_of(*arguments)
-            reason, row = self._update(*arguments)
+            reason, row = self._update(*arguments, *twin, *block, row, is_resumed, trusted, found)
             if is_resumed := reason == REFRESH:
                 interval, boom = run.interval or self._step, self._boom
                 prediction = boom.prediction(run.newest)
