@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 import numpy as np
 
 from ..config.settings import Thresholds
-from ..types import Health, Report, Residuals, Sample, Stream
+from ..types import Health, Report, Sample, Stream
 from .levels import Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
 from .sensor_status import SensorJudge, SensorSpec
@@ -69,7 +69,8 @@ class TwinWatch:
             stream.begin(now)
         self._model.begin(now)
         self._looked = now
-        self._residuals: list[Residuals] = []
+        self._with_residuals: list[Report] = []
+        self._newest: Report | None = None  # that has a prediction
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
         self.health: HealthWatch | None = None
@@ -86,11 +87,11 @@ class TwinWatch:
         self._streams[sample.stream].took(sample)
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
-            if each.residuals:
-                self._residuals += each.residuals
-            if self._stress is not None and each.prediction is not None:
-                self._stress.took(each.prediction, each.estimate)
-            if each.estimate is not None:
+            if each.has_residuals:
+                self._with_residuals.append(each)
+            if each.is_predicted:
+                self._newest = each
+            if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
 
@@ -187,8 +188,8 @@ class TwinWatch:
         if (load := self._load.status(at)) is not None:
             found.append(load)
         yield
-        if self._stress is not None and (stress := self._stress.status(at)) is not None:
-            found.append(stress)
+        if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
+            found.append(self._stress.status(self._newest.prediction, self._newest.estimate, at))
         return found + sensors + (yield from self._look_at_residuals(now))
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
@@ -209,7 +210,8 @@ class TwinWatch:
 
     def _look_at_residuals(self, now: Callable[[], Evaluation]) -> Generator[None, None, list[Status]]:
         """Every channel that ever had a residual, one stream after the other."""
-        taken, self._residuals = self._residuals, []
+        reports, self._with_residuals = self._with_residuals, []
+        taken = [each for report in reports for each in report.residuals]
         for names in dict.fromkeys(each.names for each in taken):
             yield
             at, those = now(), [each for each in taken if each.names == names]

@@ -25,9 +25,10 @@ from ..health.monitor import HealthMonitor
 from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
-from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from ..types import NANO, SECOND, Health, Mount, Outline, Report, Stream, channels_of
+from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
 from .load_shedding import LoadShedding
+from .report_rows import ReportRows
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
@@ -76,6 +77,9 @@ class _UpdateExtras:
 
 
 NO_EXTRAS = _UpdateExtras()
+
+_Held = tuple[tuple[Any, ...], tuple[Any, ...], Any]
+"""Fields of a boom; limits, state and filter of the estimate; output: see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
@@ -128,7 +132,7 @@ class BlockUpdate:
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
-        self._held: tuple[tuple[Any, ...], tuple[Any, ...], Any] | None  # what the compiled code takes with every call
+        self._held: _Held | None  # what the compiled code takes with every call
         self._update: Callable[..., tuple[int, int]]
         self._measure: Callable[..., bool]
 
@@ -166,10 +170,8 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        if self._held is None:
-            self._hold()
         if len(block.stamps) == 1 and block.streams[0] != STROKES:
-            _, twin, found = self._held
+            _, twin, found = self._held or self._hold()
             sample = int(block.streams[0]), int(block.stamps[0]), block.values[0]
             is_taken = self._measure(*twin, *sample, trusted, found)
             reason, row = (DONE, 1) if is_taken else (ODD, 0)
@@ -180,13 +182,15 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
         return reason, row
 
-    def _hold(self) -> None:
+    def _hold(self) -> _Held:
         """Write once what the compiled code takes with every call, and look up that code."""
-        boom, twin = map(hold, self._boom.compiled), map(hold, (self._limits, self._state, self._modes.filter))
-        self._held = boom, twin, found = tuple(boom), tuple(twin), hold(self._found)
+        boom, found = tuple(map(hold, self._boom.compiled)), hold(self._found)
+        twin = tuple(map(hold, (self._limits, self._state, self._modes.filter)))
+        self._held = boom, twin, found
         one, width = np.zeros(1, np.int64), int(self._widths.max())
         self._measure = measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
         self._update = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
+        return self._held
 
     def make_room(self) -> None:
         """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
@@ -198,8 +202,8 @@ class BlockUpdate:
 
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         row, is_resumed, size = 0, False, len(block.stamps)
-        assert run is not None and self._held is not None
-        arguments, twin, found = self._held
+        assert run is not None
+        arguments, twin, found = self._held or self._hold()
         while True:
             reason, row = self._update(*arguments, *twin, *block, row, is_resumed, trusted, found)
             if is_resumed := reason == REFRESH:
@@ -343,16 +347,17 @@ class BlockUpdate:
     def report(self, stamp: int, events: list[str], judged: bool = True) -> Report:
         """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
-        residuals = []
-        for row in range(self._begin[1], known):
-            stream = STREAMS[found.residual_streams[row]]
-            names = self._channels[stream]
-            values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
-            residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
-        if predicted == self._begin[0]:
-            return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
-        prediction = self._boom.prediction(stamp, self._outlines().get(0), found.moments[predicted - 1].copy())
-        told = (*events, *news.events.get(0, ()))
-        estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
-        passes, health = int(found.passes[predicted - 1]), self.judge() if judged else None
-        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=health, estimate=estimate)
+        rows = ReportRows(self._boom, self._channels, stamp)
+        if known > self._begin[1]:
+            own = slice(self._begin[1], known)
+            rows.streams, rows.stamps = found.residual_streams[own].tolist(), found.residual_stamps[own].tolist()
+            rows.values, rows.sigmas = found.values[own].copy(), found.sigmas[own].copy()
+        passes, told, health = 0, tuple(events), None
+        if predicted > self._begin[0]:
+            at = predicted - 1
+            rows.row, rows.estimated = found.rows[at].copy(), found.estimates[at].copy()
+            rows.moments, passes = found.moments[at].copy(), int(found.passes[at])
+            if news is not NO_EXTRAS:
+                rows.outline, told = self._outlines().get(0), (*events, *news.events.get(0, ()))
+            health = self.judge() if judged else None
+        return Report.of_rows(stamp, rows, told, passes, health)

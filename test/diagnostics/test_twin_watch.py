@@ -177,16 +177,15 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
     prediction = Twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
     watch, at = stress_watch(scene), Evaluation(Thresholds(), 0.0, 0.0)
-    assert watch is not None and prediction is not None and watch.status(at) is None
+    assert watch is not None and prediction is not None
     for load, told in (
         (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
         (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
     ):
         variance = np.full(2, 400.0)
         estimate = Estimate(10**18, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), variance)
-        watch.took(prediction, estimate)
-        status = watch.status(at)
-        assert status is not None and status.level == Level.OK and status.message.startswith(told), status.message
+        status = watch.status(prediction, estimate, at)
+        assert status.level == Level.OK and status.message.startswith(told), status.message
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_watch(rigid) is None
