@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from math import pi
@@ -439,7 +439,7 @@ class _Rows(Protocol):
     """What some fields of a report are made of when they are asked for."""
 
     row: Array | None
-    streams: list[int]
+    streams: Sequence[int]
 
     def prediction(self) -> Prediction | None: ...
 

@@ -171,8 +171,10 @@ class ReportEncoder:
         messages = [] if rows.row is None else self._compiled.fill(rows, is_wanted)
         if rows.outline is not None:
             numbers = self._compiled.numbers[:, np.newaxis]
-            shaped = [(Output.JOINT_STATES, self._fill_joint_states(rows.stamp, numbers, True))]
-            messages = [shaped[0] if each[0] is Output.JOINT_STATES else each for each in messages]
+            messages = [
+                (key, self._fill_joint_states(rows.stamp, numbers, True) if key is Output.JOINT_STATES else message)
+                for key, message in messages
+            ]
         if rows.streams and is_wanted(Output.RESIDUALS):
             messages += [(Output.RESIDUALS, each) for each in self._compiled.fill_residuals(rows)]
         return messages
@@ -240,10 +242,12 @@ class ReportEncoder:
 
     def _fill_joint_states(self, stamp: int, numbers: Array, is_shaped: bool) -> bytes:
         """Of numbers, shape (all, 1); with the passive joints where there is a shape."""
-        if is_shaped:
-            return self._shaped_joint_states(np.array([stamp]), numbers).tobytes()
         _, template, chosen = self._predicted[-1]
-        return template.fill(stamp, chosen.of(numbers)[:, 0])
+        own = chosen.of(numbers)[:, 0]
+        if not is_shaped:
+            return template.fill(stamp, own)
+        passive = self._passive.positions(numbers[JOINTS : JOINTS + len(self._chain.lengths), 0])
+        return self._all_joints.fill(stamp, [*own, *passive])
 
     def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
         """With the passive joints, a row for each of the stamps (ns), of numbers, shape (all, k)."""

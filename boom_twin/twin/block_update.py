@@ -25,12 +25,12 @@ from ..health.monitor import HealthMonitor
 from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Health, Mount, Outline, Report, Stream, channels_of
+from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
 from .load_shedding import LoadShedding
 from .report_rows import ReportRows
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
 from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 
@@ -157,7 +157,7 @@ class BlockUpdate:
         Parameters
         ----------
         run : Run or None
-            The present one; only measured samples, one a block, are taken without.
+            The present one.
         block : SampleBlock
             At most `CAPACITY` samples; int64, int64 and float64 arrays without gaps.
         trusted : bool
@@ -170,17 +170,35 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        if len(block.stamps) == 1 and block.streams[0] != STROKES:
-            _, twin, found = self._held or self._hold()
-            sample = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            is_taken = self._measure(*twin, *sample, trusted, found)
-            reason, row = (DONE, 1) if is_taken else (ODD, 0)
-        else:
-            reason, row = self._advance_strokes(run, block, trusted)
+        reason, row = self._advance_strokes(run, block, trusted)
+        self._count_unmatched()
+        return reason, row
+
+    def measure(self, code: int, stamp: int, values: Array, trusted: bool) -> int:
+        """Take one measured sample, without the boom; `DONE`, or `ODD` and nothing done.
+
+        Parameters
+        ----------
+        code : int
+            Of its stream, see `boom_twin.twin.blocks.CODES`.
+        stamp : int
+            ns.
+        values : ndarray
+            float64 without gaps, all channels of the stream.
+        trusted : bool
+            Whether it was looked at before.
+        """
+        self.judge()
+        self.make_room()
+        _, twin, found = self._held or self._hold()
+        is_taken = self._measure(*twin, code, stamp, values, trusted, found)
+        self._count_unmatched()
+        return DONE if is_taken else ODD
+
+    def _count_unmatched(self) -> None:
         if unmatched := int(self._state.clock[UNMATCHED]):
             self._told_counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
-        return reason, row
 
     def _hold(self) -> _Held:
         """Write once what the compiled code takes with every call, and look up that code."""
@@ -239,6 +257,11 @@ class BlockUpdate:
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
             self._due = run
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the newest sample was the first of a slot, and the rig's health was not judged yet."""
+        return self._due is not None
 
     def judge(self) -> Health | None:
         """Judge the rig's health if the newest sample was the first of a slot and that was not done yet; gives the news.
@@ -344,7 +367,7 @@ class BlockUpdate:
         reports = enumerate(block.reports(self._joints))
         return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
-    def report(self, stamp: int, events: list[str], judged: bool = True) -> Report:
+    def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
         """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         rows = ReportRows(self._boom, self._channels, stamp)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class ReportRows:
         Of the prediction, if it has one.
     pins : int
         Pins with clearance.
-    streams, stamps : list of int
+    streams, stamps : sequence of int
         Of residuals; streams by `boom_twin.twin.blocks.CODES`.
     values, sigmas : ndarray, shape (k, w)
         Of residuals; NaN behind a stream's own channels.
@@ -50,8 +50,8 @@ class ReportRows:
         self.estimated: Array | None = None
         self.moments: Array | None = None
         self.outline: Outline | None = None
-        self.streams: list[int] = []
-        self.stamps: list[int] = []
+        self.streams: Sequence[int] = ()
+        self.stamps: Sequence[int] = ()
         self.values = self.sigmas = NOTHING
 
     def prediction(self) -> Prediction | None:

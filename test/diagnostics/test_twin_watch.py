@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -203,3 +204,26 @@ def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
     assert status.level == Level.OK and status.message.startswith("pulses of 12")
     assert status.values["frequency_Hz"] == pytest.approx(0.5, rel=0.02)
     assert status.values["pulses_N"] == pytest.approx(120.0, rel=0.05)
+
+
+def test_reports_of_rows_are_judged_as_those_that_were_made_at_once() -> None:
+    """Residuals of several streams, at once or when strokes come, the load, the bending stresses."""
+    scene, random = load_scene(), np.random.default_rng(3)
+    twin, rest = Twin(scene), strokes_of_posture(scene, "horizontal")
+    watches = []
+    for _ in range(2):
+        sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)
+        watches.append(TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_watch(scene)))
+    for k in range(100):
+        stamp = 10**18 + k * 5_000_000
+        early = [Sample(stream, stamp + 1000, random.normal(size=4)) for stream in (Stream.ANGLES, Stream.FORCES)]
+        late = Sample(Stream.IMU, stamp, np.array([0.1, 9.8]))
+        for sample in (*early, Sample(Stream.STROKES, stamp, rest + random.normal(0.0, 2e-5, 4)), late):
+            report = twin.update(sample)
+            for watch, each in zip(watches, (report, replace(report)), strict=True):
+                watch.took(sample, each, 1e-4)
+    peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
+    found = [all_pieces(watch.look({}, True, peers, [], 100.0)) for watch in watches]
+    assert repr(found[0]) == repr(found[1])
+    names = {status.name for status in found[0]}
+    assert names >= {"residual joint_1", "residual tip_imu_z", "residual cylinder_force_4", "tip load", "bending"}, names
