@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..analysis.equilibrium import outline, set_undeformed, settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import cylinder_length
+from ..kernels.jit import hold
 from ..kernels.result_row import PIN, places_in, prediction_width
 from ..kernels.tables import State, Tables, Work
 from ..kernels.transfer.forward_kinematics import place
@@ -115,6 +117,11 @@ class BoomPredictor:
         self.compiled = CompiledBoom(
             self.plan.tables, self._anchor, self.live, self._work, self._track, moments_by_unknowns(self.plan), self._row
         )
+
+    @cached_property
+    def held(self) -> tuple[Any, ...]:
+        """`compiled` as compiled code takes it with every call, see `boom_twin.kernels.jit.hold`."""
+        return tuple(map(hold, self.compiled))
 
     @property
     def variances(self) -> Array:

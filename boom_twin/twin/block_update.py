@@ -78,8 +78,10 @@ class _UpdateExtras:
 
 NO_EXTRAS = _UpdateExtras()
 
-_Held = tuple[tuple[Any, ...], tuple[Any, ...], Any]
-"""Fields of a boom; limits, state and filter of the estimate; output: see `boom_twin.kernels.jit.hold`."""
+_Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
+"""`update` and `measure`, compiled for a scene's types."""
+_Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
+"""With fields of a boom; limits, state and filter of the estimate; output: see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
@@ -133,8 +135,9 @@ class BlockUpdate:
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
         self._held: _Held | None  # what the compiled code takes with every call
-        self._update: Callable[..., tuple[int, int]]
-        self._measure: Callable[..., bool]
+        is_same = before is not None and before._state is state
+        self._kept: tuple[Any, Any] | None = before._kept if before is not None and is_same else None  # state and output, held
+        self._code: _Code | None = before._code if before is not None and is_same else None
 
     @property
     def limits(self) -> Limits:
@@ -190,8 +193,8 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        _, twin, found = self._held or self._hold()
-        is_taken = self._measure(*twin, code, stamp, values, trusted, found)
+        (_, measure_one), (_, twin, found) = self._held or self._hold()
+        is_taken = measure_one(*twin, code, stamp, values, trusted, found)
         self._count_unmatched()
         return DONE if is_taken else ODD
 
@@ -201,13 +204,14 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
-        """Write once what the compiled code takes with every call, and look up that code."""
-        boom, found = tuple(map(hold, self._boom.compiled)), hold(self._found)
-        twin = tuple(map(hold, (self._limits, self._state, self._modes.filter)))
-        self._held = boom, twin, found
-        one, width = np.zeros(1, np.int64), int(self._widths.max())
-        self._measure = measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
-        self._update = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
+        """Look up the compiled code, and write once what it takes with every call; another load needs little of that anew."""
+        self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
+        boom, twin = self._boom.held, (hold(self._limits), state, self._modes.held)
+        if self._code is None:
+            one, width = np.zeros(1, np.int64), int(self._widths.max())
+            advance = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
+            self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+        self._held = self._code, (boom, twin, found)
         return self._held
 
     def make_room(self) -> None:
@@ -221,9 +225,9 @@ class BlockUpdate:
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
-        arguments, twin, found = self._held or self._hold()
+        (advance, _), (arguments, twin, found) = self._held or self._hold()
         while True:
-            reason, row = self._update(*arguments, *twin, *block, row, is_resumed, trusted, found)
+            reason, row = advance(*arguments, *twin, *block, row, is_resumed, trusted, found)
             if is_resumed := reason == REFRESH:
                 interval, boom = run.interval or self._step, self._boom
                 prediction = boom.prediction(run.newest)
